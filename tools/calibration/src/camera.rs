@@ -1,4 +1,4 @@
-//! What a camera shows of the modulator: patterns, the marks that register them, and photographs.
+//! The camera side of a calibration: test patterns, the marks that register them, and photographs.
 
 pub mod homography;
 pub mod marks;

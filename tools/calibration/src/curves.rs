@@ -1,4 +1,4 @@
-//! Phase curves: fits, tables for each pixel, and reports on them.
+//! Phase curves: fits, tables for each pixel, and reports.
 
 pub mod chart;
 pub mod curve;

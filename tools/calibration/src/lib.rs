@@ -1,15 +1,15 @@
-//! Calibrating a real display: from photographs of it to the files that a `Display` file refers to.
+//! Calibration of a real display: from photographs of it to the files that a `Display` file refers to.
 //!
-//! * [`curves::lut`] finds each pixel's phase curve from photographs of the patterns of [`camera::pattern`], which
-//!   [`camera::marks`] registers and [`curves::curve`] fits, and makes the per-pixel table that a phone holds by a
-//!   [`curves::surface`] through them.
-//! * [`optics::laser`] makes the map of the laser's amplitude.
-//! * [`optics::spot`] finds the coefficients of an aberration from photographs of a focused spot, by what
-//!   [`optics::pupil`] says of them.
+//! * [`curves::lut`] computes each pixel's phase curve from photographs of the patterns of [`camera::pattern`].
+//!   [`camera::marks`] registers the photographs and [`curves::curve`] fits the curves. A [`curves::surface`] through
+//!   the curves gives the compact per-pixel table.
+//! * [`optics::laser`] computes the map of the laser's amplitude.
+//! * [`optics::spot`] finds the coefficients of an aberration from photographs of a focused spot, using the model of
+//!   [`optics::pupil`].
 //! * [`rehearse`] does all three on a simulated display.
 //!
-//! The files of a calibration are in [`phasefront_io::display::calibration`]; [`curves::report`] and [`curves::chart`]
-//! make its figures and drawings.
+//! [`phasefront_io::display::calibration`] reads and writes the calibration files. [`curves::report`] and
+//! [`curves::chart`] produce the figures and charts.
 
 pub mod camera;
 pub mod curves;
@@ -17,5 +17,5 @@ pub mod optics;
 pub mod rehearse;
 pub mod simulated_display;
 
-/// The names of the three colours, in their order: the folders of their photographs.
+/// The names of the three colours, in order, which are also the folders of their photographs.
 pub const COLOURS: [&str; 3] = ["red", "green", "blue"];

@@ -1,4 +1,4 @@
-//! Light and aberrations: the laser's amplitude over the modulator, and the aberration of a focused spot.
+//! Calibration of the optics: the laser's amplitude over the modulator, and aberrations from a focused spot.
 
 pub mod laser;
 pub mod pupil;

@@ -1,5 +1,4 @@
-//! A calibration from beginning to end on a simulated display, with what only a simulation knows: how far what was
-//! found is from the truth.
+//! A complete calibration of a simulated display, compared with the true values that only a simulation knows.
 
 use crate::COLOURS;
 use crate::camera::marks;
@@ -27,56 +26,57 @@ use std::f64::consts::TAU;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What is rehearsed.
+/// The settings of a rehearsal.
 #[derive(Debug, Clone)]
 pub struct Rehearsal {
-    /// The display's physics.
+    /// The display's physical parameters.
     pub display: Display,
-    /// Pixels of the camera for one of the modulator.
+    /// The number of camera pixels per modulator pixel.
     pub zoom: f64,
-    /// Seed of the display's flaws and the camera's noise.
+    /// The seed of the display's flaws and the camera's noise.
     pub seed: u64,
-    /// z of the focused spot, metres.
+    /// The z of the focused spot, in metres.
     pub spot_z_m: f64,
     /// Whether all photographs of the patterns are kept.
     pub keep_captures: bool,
 }
 
-/// Three colours' number before a calibration and after it.
+/// A value for each of the three colours, before and after calibration.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct BeforeAfter {
-    /// With the factory's linear table and no correction.
+    /// The values with the factory's linear table and no correction.
     pub before: [f64; 3],
-    /// With what was calibrated.
+    /// The values with the calibration.
     pub after: [f64; 3],
 }
 
-/// What came of it, by the simulation's own truth.
+/// The results of a rehearsal, measured against the simulation's true values.
 #[derive(Debug, Clone, Serialize)]
 pub struct Outcome {
     /// The measured curves and their table.
     pub lut: LutReport,
-    /// Root mean square of the phase error over all pixels and reachable phases, radians.
+    /// The RMS phase error over all pixels and reachable phases, in radians.
     pub phase_error_rad: BeforeAfter,
-    /// Light of double-phase black against white (Fig. 11), dB.
+    /// The light of double-phase black relative to white (Fig. 11), in dB.
     pub black_db: BeforeAfter,
-    /// Variation of the light of a flat grey over the frame, its standard deviation over its mean.
+    /// The variation of the light of a flat grey over the frame: its standard deviation divided by its mean.
     pub unevenness: BeforeAfter,
-    /// Strehl ratio of the focused spot.
+    /// The Strehl ratio of the focused spot.
     pub strehl: BeforeAfter,
-    /// Coefficients of the correction that would be perfect, radians.
+    /// The coefficients of the perfect correction, in radians.
     pub true_coefficients: [Coefficients; 3],
-    /// Those that the search found.
+    /// The coefficients that the search found.
     pub found_coefficients: [Coefficients; 3],
-    /// Photographs taken.
+    /// The number of photographs taken.
     pub photographs: usize,
 }
 
-/// Calibrates a simulated display into `folder`: the four files of a calibration, `outcome.json`, pictures and
-/// drawings. `progress` hears of the photographs and rows done, of all.
+/// Calibrates a simulated display. Writes the four calibration files, `outcome.json`, pictures and charts to `folder`.
+/// `progress` receives the number of photographs and rows done, and their total.
 ///
 /// # Errors
-/// A display too small for marks or whose sub-hologram does not fit; files that cannot be written.
+/// Returns an error if the display is too small for marks, if its sub-hologram does not fit, or if a file cannot be
+/// written.
 pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)) -> Result<Outcome> {
     let display = &rehearsal.display;
     let stage = Stage {
@@ -86,7 +86,7 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
         simulated: SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
         progress,
     };
-    // The search for aberrations comes last and would fail there.
+    // The search for aberrations comes last and would otherwise fail only there.
     for colour in 0..COLOURS.len() {
         spot::levels(&Target::from(display), colour, rehearsal.spot_z_m, MIDDLE, &[0.0; 5])?;
     }
@@ -123,7 +123,7 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
     Ok(outcome)
 }
 
-/// What is calibrated, where to, and who hears of it.
+/// The settings, the output folder and the progress callback of a run.
 struct Stage<'a> {
     rehearsal: &'a Rehearsal,
     folder: &'a Path,
@@ -132,16 +132,16 @@ struct Stage<'a> {
     progress: &'a dyn Fn(usize, usize),
 }
 
-/// What the search for aberrations found.
+/// The result of the search for aberrations.
 struct Aberrations {
     truth: [Coefficients; 3],
     found: [Coefficients; 3],
-    /// The green spot without a correction and with the one that was found.
+    /// The green spot without a correction and with the one found.
     spots: [Photograph; 2],
     photographs: usize,
 }
 
-/// What a calibration is worth, by the simulation's own truth.
+/// The quality of a calibration, measured against the simulation's true values.
 struct Worth {
     phase_error_rad: BeforeAfter,
     black_db: BeforeAfter,
@@ -149,19 +149,19 @@ struct Worth {
 }
 
 impl Stage<'_> {
-    /// Photographs and rows before the search for aberrations, and of all.
+    /// Returns the number of photographs and rows before the search for aberrations, and in total.
     fn work(&self) -> [usize; 2] {
         let before = 3 * (PATTERNS + self.rehearsal.display.height());
         [before, before + 3 * spot::ROUNDS * TRIALS]
     }
 
-    /// Where the photographs of a colour are kept, if they are.
+    /// Returns the folder for the photographs of a colour, if they are kept.
     fn captures(&self, colour: usize) -> Option<PathBuf> {
         let kept = self.rehearsal.keep_captures;
         kept.then(|| self.folder.join("captures").join(COLOURS[colour]))
     }
 
-    /// From 256 photographs a colour, focused on the modulator.
+    /// Measures the curves from 256 photographs per colour, focused on the modulator.
     fn curves(&self) -> Result<[lut::Curves; 3]> {
         let modulator_z_m = self.rehearsal.display.offset_m();
         let [_, work] = self.work();
@@ -189,7 +189,7 @@ impl Stage<'_> {
         curves.try_into().map_err(|_| Error::Input("three colours".into()))
     }
 
-    /// The laser's light, from a photograph of a diffuser a colour.
+    /// Measures the laser's amplitude from one photograph of a diffuser per colour.
     fn laser_map(&self) -> Result<Array3<f32>> {
         let display = &self.rehearsal.display;
         let shape = (display.height(), display.width());
@@ -210,7 +210,8 @@ impl Stage<'_> {
         Ok(map)
     }
 
-    /// Searched on a focused spot: of the same lens for all colours, as path; its phase goes with 1/λ.
+    /// Searches for aberrations with a focused spot. The simulated lens has the same optical path for all colours, so
+    /// its phase is proportional to 1/λ.
     fn aberrations(&self, calibrated: &Response) -> Result<Aberrations> {
         let Rehearsal {
             display, spot_z_m: z_m, ..
@@ -255,7 +256,7 @@ impl Stage<'_> {
         })
     }
 
-    /// A colour's search to its end, with the Strehl ratio after each round.
+    /// Runs one colour's search to its end and records the Strehl ratio after each round.
     fn search(
         &self,
         colour: usize,
@@ -348,9 +349,9 @@ fn apart(a: &Coefficients, b: &Coefficients) -> Coefficients {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// The display's file, which refers to the others.
+/// Writes the display file, which refers to the others.
 fn write_display(path: &Path, display: &Display) -> Result<()> {
-    // Numbers and lists of them are written alike in JSON and TOML.
+    // JSON and TOML have the same syntax for numbers and for lists of them.
     let values = serde_json::to_value(display).map_err(|e| Error::file(path, e))?;
     let mut text = String::new();
     for (key, value) in values.as_object().into_iter().flatten() {
@@ -360,7 +361,7 @@ fn write_display(path: &Path, display: &Display) -> Result<()> {
     output::write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// The root mean square of what `response` leaves of the phases it is asked for where curves reach, by the true curves.
+/// Computes the RMS phase error of `response` over all reachable phases, according to the true curves.
 pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> f64 {
     let (h, w) = (simulated.display().height(), simulated.display().width());
     let (mut square, mut count) = (0.0, 0.0);
@@ -382,7 +383,7 @@ pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: us
     f64::sqrt(square / count)
 }
 
-/// Levels, (H, W), of a double phase of `half` and −`half`.
+/// Returns the levels, (H, W), of a double phase of `half` and −`half`.
 fn checkerboard(simulated: &SimulatedDisplay, response: &Response, colour: usize, half: f32) -> Array2<u8> {
     let (h, w) = (simulated.display().height(), simulated.display().width());
     Array2::from_shape_fn((h, w), |(y, x)| {
@@ -395,10 +396,10 @@ fn checkerboard(simulated: &SimulatedDisplay, response: &Response, colour: usize
     })
 }
 
-/// The light of double-phase black against that of white, away from the rim, dB: Fig. 11.
+/// Returns the light of double-phase black relative to white, away from the border, in dB (Fig. 11).
 ///
 /// # Errors
-/// None that a simulated display meets.
+/// Never returns an error for a simulated display.
 pub fn black_level(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> Result<f64> {
     let z_m = simulated.display().offset_m();
     let mean = |half: f32| -> Result<f64> {
@@ -408,12 +409,12 @@ pub fn black_level(simulated: &SimulatedDisplay, response: &Response, colour: us
         let inner = light.slice(s![16.min(h / 4)..h - 16.min(h / 4), 16.min(w / 4)..w - 16.min(w / 4)]);
         Ok(f64::from(inner.mean().unwrap_or(0.0)))
     };
-    // A phase of 0 exactly would be 2π for the one half.
+    // A phase of exactly 0 would become 2π in one of the halves.
     Ok(10.0 * (mean(std::f32::consts::FRAC_PI_2)? / mean(1e-3)?).log10())
 }
 
-/// Photographs of black side by side, by the factory's table and by the calibrated one, ten times as bright as white is
-/// shown.
+/// Creates photographs of black side by side, with the factory's table and with the calibrated one, ten times as bright
+/// as white is displayed.
 fn black_pictures(
     simulated: &SimulatedDisplay,
     factory: &Response,
@@ -434,11 +435,11 @@ fn black_pictures(
     write_pair(&folder.join("black.png"), &photos?)
 }
 
-/// How much the light of a flat half grey differs over the frame, away from the rim: its standard deviation over its
-/// mean.
+/// Returns the variation of the light of a flat half grey over the frame, away from the border: its standard deviation
+/// divided by its mean.
 fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Result<f64> {
     let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
-    // Where the laser is weakest the modulator must be able to make up for it.
+    // Where the laser is weakest, the modulator must be able to compensate.
     let options = EncoderOptions {
         brightness: Brightness::Fixed(1.0),
         ..Encoding::DoublePhase.into()
@@ -458,7 +459,7 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
     Ok(inner.std(0.0) / inner.mean().unwrap_or(1.0))
 }
 
-/// The laser's map and what it is off the truth.
+/// Draws the laser's map and its error.
 fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) -> Result<()> {
     let (_, rows, columns) = map.dim();
     let (h, w) = (simulated.display().height(), simulated.display().width());
@@ -488,7 +489,7 @@ fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) ->
     chart::write_maps(&folder.join("laser.svg"), &all, 3)
 }
 
-/// The middle of a photograph.
+/// Returns the middle of a photograph.
 fn crop(photo: &Photograph, side: usize) -> Photograph {
     let side = side.min(photo.height).min(photo.width);
     let (top, left) = ((photo.height - side) / 2, (photo.width - side) / 2);
@@ -504,7 +505,7 @@ fn crop(photo: &Photograph, side: usize) -> Photograph {
     }
 }
 
-/// Two photographs of one size side by side.
+/// Writes two photographs of the same size side by side.
 fn write_pair(path: &Path, photos: &[Photograph]) -> Result<()> {
     const GAP: usize = 6;
     let (height, width) = (photos[0].height, photos[0].width);

@@ -1,10 +1,10 @@
-//! A display with the flaws of a real one, and a camera before it: it takes levels and returns a photograph.
-//! Calibration is tested on it and rehearsed with it.
+//! A simulated display with the flaws of a real one, and a camera in front of it. It takes levels and returns a
+//! photograph. The tests and rehearsals of the calibration use it.
 //!
-//! Light falls on the modulator as a Gaussian beam; each pixel turns its phase by a curve of its own; the
-//! Fourier aperture lets the first order pass and the optics bend it (an aberration, in the pupil); the camera
-//! focuses at a z, stands askew, and answers with shot noise, noise of its own, and a limited number of bits.
-//! A seed means the same on every machine but for the last bits of its arithmetic.
+//! The modulator is lit by a Gaussian beam, and each pixel has its own phase curve. The Fourier aperture passes the
+//! first order, and the optics add an aberration in the pupil. The camera focuses at a z, is slightly rotated, and has
+//! shot noise, read noise and a limited number of bits. A seed gives the same results on every machine, except for the
+//! last bits of floating-point arithmetic.
 
 use crate::camera::homography::Homography;
 use crate::camera::photograph::Photograph;
@@ -23,60 +23,61 @@ use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// How a pixel turns the phase: level/255 = v to 2π·range·(v − steepness·sin(2πv)/2π + bend·v(1 − v)), where
-/// range differs over the panel.
+/// The phase curves of pixels: level/255 = v gives 2π·range·(v − steepness·sin(2πv)/2π + bend·v(1 − v)), where range
+/// varies over the panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curves {
-    /// What level 255 turns in red, green, blue, in units of 2π, in the mean of the panel.
+    /// The mean phase of level 255 over the panel for red, green and blue, in units of 2π.
     pub range: [f64; 3],
-    /// By how much of itself the range differs over the panel, at most.
+    /// The maximum relative variation of the range over the panel.
     pub unevenness: f64,
-    /// S shape, 0 straight, below 1.
+    /// The S shape: 0 for straight, below 1.
     pub steepness: f64,
-    /// Bow, 0 straight, within ±0.4 for steepness up to ½.
+    /// The bow: 0 for straight, within ±0.4 for steepness up to ½.
     pub bend: f64,
 }
 
-/// A camera and where it stands.
+/// A camera and its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// (H, W) of a photograph.
+    /// The size of a photograph, (H, W).
     pub shape: (usize, usize),
-    /// Where the modulator's corners fall in the photograph, pixels: top left, top right, bottom left, bottom right.
+    /// The positions of the modulator's corners in the photograph, in pixels: top left, top right, bottom left, bottom
+    /// right.
     pub corners: [[f64; 2]; 4],
-    /// The part of the sensor's range that full light fills.
+    /// The fraction of the sensor's range that full light fills.
     pub exposure: f64,
-    /// Electrons of a full pixel: shot noise is the root of how many there are.
+    /// The number of electrons of a full pixel. Shot noise is the square root of the number of electrons.
     pub full_well: f64,
-    /// Electrons of noise in the dark.
+    /// The read noise, in electrons.
     pub read_noise: f64,
-    /// Light that is always there, as a part of full light.
+    /// The constant stray light, as a fraction of full light.
     pub stray: f64,
-    /// Bits of a value, 8 to 16; over 8 they fill the upper end of a word of 16.
+    /// The bits of a value, 8 to 16. Values of more than 8 bits use the upper bits of a 16-bit word.
     pub bits: u32,
 }
 
-/// A display with its flaws. Deterministic by its seed.
+/// A display with flaws, determined by its seed.
 #[derive(Debug, Clone)]
 pub struct SimulatedDisplay {
     display: Display,
     seed: u64,
     curves: Curves,
-    /// The smooth map, within ±1, by which curves differ: waves over the panel.
+    /// The waves of the smooth map, within ±1, by which the curves vary over the panel.
     waves: Vec<[f64; 5]>,
-    /// Centre x, y and 1/e² radius of intensity, in parts of the panel's width.
+    /// The centre x and y and the 1/e² intensity radius of the beam, as fractions of the panel's width.
     beam: [f64; 3],
     aberration: Aberration,
     camera: Camera,
 }
 
 impl SimulatedDisplay {
-    /// A display of the physics of `display`, whose flaws follow from `seed`: curves that leave the factory's linear
-    /// table wrong by more than 0.3 rad, a beam off its middle, a camera a little askew that sees each pixel of the
-    /// modulator with `zoom` of its own; no aberration, see [`Self::with_aberration`].
+    /// Creates a display with the physical parameters of `display` and flaws that depend on `seed`: curves that differ
+    /// from the factory's linear table by more than 0.3 rad, an off-centre beam, and a slightly rotated camera with
+    /// `zoom` pixels per modulator pixel. It has no aberration; see [`Self::with_aberration`].
     ///
     /// # Errors
-    /// A camera over 2³⁰ pixels, or a zoom below 1.
+    /// Returns an error if the camera has more than 2³⁰ pixels or the zoom is below 1.
     pub fn new(display: &Display, zoom: f64, seed: u64) -> Result<Self> {
         let mut dice = Dice::new(seed ^ 0x0044_4953_504c_4159);
         let waves = (0..4)
@@ -131,41 +132,40 @@ impl SimulatedDisplay {
         })
     }
 
-    /// The same with an aberration: what would *correct* it is `correction`.
+    /// Adds the aberration that `correction` *corrects*.
     pub fn with_aberration(mut self, correction: Aberration) -> Self {
         self.aberration = correction;
         self
     }
 
-    /// The same with other curves.
+    /// Replaces the curves.
     pub fn with_curves(mut self, curves: Curves) -> Self {
         self.curves = curves;
         self
     }
 
-    /// The same before another camera.
+    /// Replaces the camera.
     pub fn with_camera(mut self, camera: Camera) -> Self {
         self.camera = camera;
         self
     }
 
-    /// The physics.
+    /// Returns the physical parameters of the display.
     pub fn display(&self) -> &Display {
         &self.display
     }
 
-    /// The camera.
+    /// Returns the camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The curves.
+    /// Returns the curves.
     pub fn curves(&self) -> &Curves {
         &self.curves
     }
 
-    /// How far level `level` of pixel (`x`, `y`) turns the phase against level 0, radians: the truth that a calibration
-    /// seeks.
+    /// Returns the true phase of level `level` at pixel (`x`, `y`) relative to level 0, in radians.
     pub fn phase(&self, colour: usize, y: usize, x: usize, level: f64) -> f64 {
         let u = (x as f64 + 0.5) / self.display.width() as f64;
         let v = (y as f64 + 0.5) / self.display.height() as f64;
@@ -182,11 +182,11 @@ impl SimulatedDisplay {
         TAU * c.range[colour] * (1.0 + c.unevenness * uneven) * shape
     }
 
-    /// What a calibration without error would find: the table of the true curves, a node on every pixel of small
-    /// displays, 120 along the longer side of large ones.
+    /// Returns the response of a perfect calibration: the table of the true curves, with a node on every pixel of small
+    /// displays and 120 nodes along the longer side of large ones.
     ///
     /// # Errors
-    /// None that a display made by [`Self::new`] meets.
+    /// Never returns an error for a display made by [`Self::new`].
     pub fn response(&self) -> Result<Response> {
         let (height, width) = (self.display.height(), self.display.width());
         let spacing = height.max(width).div_ceil(120);
@@ -209,23 +209,23 @@ impl SimulatedDisplay {
         Ok(Response::PerPixel(table.into()))
     }
 
-    /// The laser's amplitude at pixel (`x`, `y`), 1 at its brightest.
+    /// Returns the laser's amplitude at pixel (`x`, `y`), which is 1 at its brightest.
     pub fn laser(&self, colour: usize, y: f64, x: f64) -> f64 {
         let w = self.display.width() as f64;
         let [cx, cy, radius] = self.beam;
-        // Three beams are never quite on one axis.
+        // Three beams are never perfectly coaxial.
         let cx = cx + 0.03 * (colour as f64 - 1.0);
         let dx = (x + 0.5) / w - cx;
         let dy = (y + 0.5 - cy * self.display.height() as f64) / w;
         (-(dx * dx + dy * dy) / (radius * radius)).exp()
     }
 
-    /// The intensity that an ideal camera focused at `z_m` would see of `levels`, (H, W), on a grid twice as fine,
-    /// (2H, 2W): its value (i, j) stands at ((j + 1)/2, (i + 1)/2) pixels of the modulator. 1 is what the brightest
-    /// light gives of a flat phase.
+    /// Computes the intensity that an ideal camera focused at `z_m` would see of `levels`, (H, W), on a grid twice as
+    /// fine, (2H, 2W). Value (i, j) lies at ((j + 1)/2, (i + 1)/2) in pixels of the modulator. The brightest light with
+    /// a flat phase gives 1.
     ///
     /// # Errors
-    /// Levels of another shape, or a z too far to propagate to.
+    /// Returns an error if the levels have another shape or if z is too far to propagate to.
     pub fn intensity(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64) -> Result<Array2<f32>> {
         let (height, width) = (self.display.height(), self.display.width());
         if levels.dim() != (height, width) {
@@ -270,7 +270,7 @@ impl SimulatedDisplay {
             },
             &mut scratch.work,
         );
-        // The same spectrum in a plane of twice the samples: band-limited interpolation.
+        // Zero padding of the spectrum to twice the samples gives band-limited interpolation.
         let wide = |k: usize, n: usize| if 2 * k < n { k } else { k + n };
         let mut columns = vec![Complex32::ZERO; 4 * ph * pw];
         for (kx, column) in scratch.columns.chunks_exact(ph).enumerate() {
@@ -288,11 +288,11 @@ impl SimulatedDisplay {
         }))
     }
 
-    /// A photograph of `levels`, (H, W), lit in one colour, the camera focused at `z_m`. `shot` tells photographs
-    /// apart: their noise follows from it.
+    /// Takes a photograph of `levels`, (H, W), lit in one colour, with the camera focused at `z_m`. `shot` seeds the
+    /// noise of the photograph.
     ///
     /// # Errors
-    /// As [`Self::intensity`].
+    /// Returns the errors of [`Self::intensity`].
     pub fn photograph(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64, shot: u64) -> Result<Photograph> {
         let fine = self.intensity(levels, colour, z_m)?;
         let (rows, columns) = fine.dim();
@@ -311,11 +311,11 @@ impl SimulatedDisplay {
         })
     }
 
-    /// A photograph of a diffuser in the modulator's place, lit in one colour: the beam, grainy with speckle, with
-    /// specks of dust.
+    /// Takes a photograph of a diffuser in the modulator's place, lit in one colour: the beam with speckle and specks
+    /// of dust.
     ///
     /// # Errors
-    /// None that a display made by [`Self::new`] meets.
+    /// Never returns an error for a display made by [`Self::new`].
     pub fn photograph_diffuser(&self, colour: usize, shot: u64) -> Result<Photograph> {
         let (height, width) = (self.display.height(), self.display.width());
         let mut dice = Dice::new(self.seed ^ 0x4455_5354);
@@ -332,7 +332,7 @@ impl SimulatedDisplay {
         })
     }
 
-    /// The camera's answer to an intensity over the modulator, `light`(x, y), pixels from its top left corner.
+    /// Converts an intensity over the modulator, `light`(x, y), in pixels from its top left corner, to a photograph.
     fn expose(&self, colour: usize, shot: u64, light: impl Fn(f64, f64) -> f64 + Sync) -> Result<Photograph> {
         let camera = &self.camera;
         let (height, width) = camera.shape;
@@ -350,7 +350,7 @@ impl SimulatedDisplay {
             for (column, value) in values.iter_mut().enumerate() {
                 let [x, y] = back.map([column as f64 + 0.5, row as f64 + 0.5]);
                 let electrons = (light(x, y) + camera.stray) * camera.exposure * camera.full_well;
-                // Shot noise and the camera's own, as one normal number: there are many electrons.
+                // Shot noise and read noise are one normal random number, because there are many electrons.
                 let noise = (electrons + camera.read_noise.powi(2)).sqrt();
                 let counted = electrons + noise * normal(&mut dice);
                 let code = (counted / camera.full_well * end).round().clamp(0.0, end);
@@ -366,7 +366,7 @@ impl SimulatedDisplay {
     }
 }
 
-/// A standard normal number (Box and Muller, 1958).
+/// Returns a standard normal random number (Box and Muller, 1958).
 fn normal(dice: &mut Dice) -> f64 {
     let radius = (-2.0 * (1.0 - dice.unit()).ln()).sqrt();
     radius * (2.0 * PI * dice.unit()).cos()
@@ -410,13 +410,13 @@ mod tests {
         assert!(rms > 0.3, "{rms}");
     }
 
-    /// At the modulator, without noise, the fine grid between two samples of the filtered field is that field.
+    /// At the modulator and without noise, the fine grid between two samples of the filtered field equals that field.
     #[test]
     fn the_intensity_is_that_of_the_filtered_field() {
         let display = small();
         let levels = Array2::from_shape_fn((40, 48), |(y, x)| if (x + y) % 2 == 0 { 90 } else { 0 });
         let fine = display.intensity(levels.view(), 1, 0.0).unwrap();
-        // Away from the rim, where padding with darkness and a periodic plane agree.
+        // Away from the border, zero padding and a periodic plane agree.
         let mut plane: Vec<_> = (0..40 * 48)
             .map(|i| {
                 let (y, x) = (i / 48, i % 48);

@@ -1,5 +1,5 @@
-//! Calibration against what is known of a simulated display: noise, a camera askew, curves that differ from pixel to
-//! pixel.
+//! Calibration of a simulated display, compared with its true values, with noise, a rotated camera, and curves that
+//! differ from pixel to pixel.
 #![allow(clippy::unwrap_used)]
 
 use ndarray::{Array2, Array3};
@@ -46,7 +46,7 @@ fn measured_by(simulated: &SimulatedDisplay, colour: usize, pattern: Pattern) ->
     lut::measure(&pattern, colour, &shoot, dir.path(), &|_, _| {}).unwrap()
 }
 
-/// By the display's true curves.
+/// Computes the phase error according to the display's true curves.
 fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> f64 {
     rehearse::phase_error(simulated, response, colour)
 }
@@ -101,7 +101,7 @@ fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
         let table = Response::PerPixel(lut::compact(&all).unwrap().into());
         let error = phase_error(&simulated, &table, 1);
         assert!(error < 0.06, "{range}: {error}");
-        // What lies out of reach gets the nearer end.
+        // Phases out of reach get the nearer end.
         let at = (SIZE.0 + 40) * SIZE.1 + 70;
         let turn = (1.0 + simulated.phase(1, 40, 70, 255.0) / TAU) / 2.0 * TAU;
         assert_eq!(table.level((turn - 0.1) as f32, at), 255);
@@ -109,7 +109,7 @@ fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
     }
 }
 
-/// What [`lut::measure`] says of photographs of which `change` makes bad ones.
+/// Returns the problems that [`lut::measure`] reports for photographs that `change` spoils.
 fn told(change: impl Fn(usize, Photograph) -> Result<Photograph, What>) -> Vec<Problem> {
     let simulated = simulated();
     let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
@@ -145,7 +145,7 @@ fn bad_captures_are_told_one_by_one() {
                 let from = (x + 30) % photo.width;
                 *value = photo.values[y * photo.width + from];
             }
-            // The modulator must stay in the picture.
+            // The modulator must stay inside the picture.
             Ok(shifted)
         }
         130 => {
@@ -186,7 +186,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     let simulated = simulated();
     let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    // A speck of dust on the optics: dark in every photograph.
+    // A speck of dust on the optics is dark in every photograph.
     let shoot = |k: usize| {
         let levels = pattern.frame(k as u8);
         let mut photo = simulated.photograph(levels.view(), 1, 0.0, k as u64).unwrap();
@@ -206,7 +206,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     let table = lut::compact(&[curves.clone(), curves.clone(), curves]).unwrap();
     let error = phase_error(&simulated, &Response::PerPixel(table.into()), 1);
     assert!(error < 0.05, "{error}");
-    // A display that does not answer at all is refused.
+    // A display that does not respond at all is refused.
     let flat = |k: usize| {
         let levels = pattern.frame(0).mapv(|_| 0);
         let mut photo = simulated.photograph(levels.view(), 1, 0.0, k as u64).unwrap();
@@ -225,9 +225,9 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     }
 }
 
-/// Fig. 8: what a cylinder of 200 mm before an eyepiece of 21 mm does to the wave, by the correction for it. The
-/// eyepiece brings frequency µ to λfµ in its pupil, where the cylinder bends by −kx²/2f; so along x alone it is as if z
-/// were another by f²/f₁ = 2.2 mm.
+/// Returns the correction of the wave change in Fig. 8, caused by a cylinder of 200 mm before an eyepiece of 21 mm. The
+/// eyepiece maps frequency µ to λfµ in its pupil, where the cylinder adds a phase of −kx²/2f. Along x alone, this is
+/// equivalent to a shift of z by f²/f₁ = 2.2 mm.
 fn cylinder() -> Aberration {
     let display = Display::default();
     let shift_m = 21e-3 * 21e-3 / 200e-3;
@@ -239,16 +239,15 @@ fn cylinder() -> Aberration {
     Aberration::new(coefficients.collect::<Vec<_>>()).unwrap()
 }
 
-/// Three boards behind one another, each with soft bars of its own, upright ones, lying ones and slanted ones, six to
-/// nine pixels wide: what a double phase shows well, and what a cylinder washes out, as in the test pattern of the
-/// paper's figure.
+/// Creates three boards one behind the other with soft upright, horizontal and slanted bars, six to nine pixels wide. A
+/// double phase displays them well and a cylinder blurs them, as in the test pattern of the paper's figure.
 fn boards((h, w): (usize, usize), planes: usize, in_focus: [usize; 3]) -> Ldi {
     let board = |x: usize| 3 * x / w;
     let depth = |k: usize| (k as f32 + 0.5) / planes as f32;
     let rgb = Array3::from_shape_fn((3, h, w), |(c, y, x)| {
         let (x, y, c) = (x as f32, y as f32, c as f32);
         let wave = |fx: f32, fy: f32| (std::f32::consts::TAU * (fx * x + fy * y) + c).cos();
-        // Fading between boards, so that no board's edge stands out.
+        // The fade between boards avoids visible edges.
         let middle = (3.0 * x / w as f32).fract() - 0.5;
         let fade = (std::f32::consts::PI * middle).cos().powi(2);
         let bars = if y < h as f32 / 2.0 {
@@ -278,8 +277,8 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
         aberration: Some(AberrationFile::Uniform(all)),
         ..bare.clone()
     };
-    // The same light for both: by its largest amplitude the corrected field, which has higher peaks, would be dimmer by
-    // a quarter.
+    // Both use the same light. If each were scaled by its largest amplitude, the corrected field, which has higher
+    // peaks, would be dimmer by a quarter.
     let fixed = |options: EncoderOptions| EncoderOptions {
         brightness: Brightness::Fixed(1.0),
         ..options
@@ -315,7 +314,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let truth = Hologram::Complex(plain.clone(), info).views(&z_m).unwrap();
     let quality = |(levels, info): (Array3<u8>, HologramInfo), file: &DisplayFile| -> f64 {
         let views = Hologram::PhaseOnly(levels, info).views_on(file, &z_m).unwrap();
-        // Away from the rim, over which the cylinder spreads light out of the frame.
+        // The comparison excludes the border, where the cylinder spreads light out of the frame.
         let inner = ndarray::s![.., 16..h - 16, 16..w - 16];
         let psnr = (views.iter().zip(&truth)).map(|(view, truth)| {
             metrics::compare(view.slice(inner), truth.slice(inner))
@@ -339,7 +338,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     assert!(by_layers > without - 1.0, "{without} {by_layers}");
     assert!(by_offset > without - 1.0, "{without} {by_offset}");
     assert!(uncorrected < without - 5.0, "{without} {uncorrected}");
-    // What is drawn and corrected besides never costs.
+    // Additional layers and an offset never cost quality.
     let [_, _, layers_too, offset_too] = each(&fixed(Encoding::ANTI_ALIAS.into()));
     assert!(
         layers_too > by_layers && offset_too > by_offset,

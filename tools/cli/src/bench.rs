@@ -1,5 +1,5 @@
-//! How fast a frame is on this machine: every stage of the pipeline, medians of many frames, beside the
-//! machine's own peak measured in the same run.
+//! Measurements of the time of a frame on this machine: the median of each stage of the pipeline over many frames, and
+//! the machine's own peak, measured in the same run.
 
 pub mod gpu;
 pub mod random;
@@ -16,75 +16,75 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long the peak is measured.
+/// The time for which the peak is measured.
 const PEAK_TIME: Duration = Duration::from_millis(200);
 
-/// One combination that is measured.
+/// A combination to measure.
 #[derive(Debug, Clone)]
 pub struct Case<'a> {
-    /// What makes the hologram.
+    /// The method that makes the hologram.
     pub method: &'a Method,
-    /// Width and height, pixels.
+    /// The width and height in pixels.
     pub size: (usize, usize),
-    /// Threads of the pool.
+    /// The number of threads in the pool.
     pub threads: usize,
-    /// How its field becomes levels, at one brightness.
+    /// The encoding of the field into levels, at one brightness.
     pub encoder: &'a EncoderOptions,
 }
 
-/// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
+/// The measurements of one [`Case`]. Times are medians over frames, in milliseconds.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// `network`, `sweep` or `seeded`, which is also the name of its stage.
+    /// The method: `network`, `sweep` or `seeded`. Its stage has the same name.
     pub method: &'static str,
-    /// Convolution layers; 0 without a network.
+    /// The number of convolution layers; 0 without a network.
     pub layers: usize,
-    /// `f32` or `int8`.
+    /// The precision: `f32` or `int8`.
     pub precision: String,
-    /// Always `cpu`.
+    /// The backend: always `cpu`.
     pub backend: &'static str,
     /// The kernels that ran.
     pub kernels: String,
-    /// Pixels.
+    /// The width in pixels.
     pub width: usize,
-    /// Pixels.
+    /// The height in pixels.
     pub height: usize,
-    /// Threads of the pool.
+    /// The number of threads in the pool.
     pub threads: usize,
-    /// z of the modulator against the midpoint, mm.
+    /// z of the modulator from the midpoint, in mm.
     pub offset_mm: f64,
-    /// Each stage's median.
+    /// The median time of each stage.
     pub stage_ms: BTreeMap<&'static str, f64>,
-    /// The median of whole frames.
+    /// The median time of whole frames.
     pub total_ms: f64,
-    /// The fastest and the slowest frame.
+    /// The times of the fastest and the slowest frame.
     pub spread_ms: [f64; 2],
-    /// What encoding through the per-pixel table takes longer than through none, of the whole frame, where there is
-    /// one.
+    /// The extra time of encoding through the per-pixel table, in percent of the whole frame, if there is a table.
     pub table_percent: Option<f64>,
-    /// Frames that were measured.
+    /// The number of measured frames.
     pub frames: usize,
-    /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
+    /// The network's multiply-adds per second at its median time, in units of 10⁹, if its stage does nothing else.
     pub gmac_per_s: Option<f64>,
-    /// That, of what these kernels' instructions do here from registers alone, on as many threads.
+    /// The rate of the network in percent of the peak that these kernels' instructions reach here from registers alone,
+    /// on as many threads.
     pub peak_percent: Option<f64>,
-    /// The most memory this process held, where the system tells.
+    /// The peak memory of this process in MB, if the system reports it.
     pub peak_memory_mb: Option<f64>,
 }
 
-/// The machine that was measured.
+/// The measured machine.
 #[derive(Debug, Clone, Serialize)]
 pub struct Machine {
-    /// The processor's name, where the system tells.
+    /// The processor's name, or its architecture if the system does not report the name.
     pub cpu: String,
-    /// Its logical cores.
+    /// The number of logical cores.
     pub cores: usize,
-    /// Version of this program.
+    /// The version of this program.
     pub version: &'static str,
 }
 
 impl Machine {
-    /// This machine.
+    /// Describes this machine.
     pub fn this() -> Self {
         let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let name = info.lines().find_map(|line| {
@@ -99,11 +99,11 @@ impl Machine {
     }
 }
 
-/// Measures one case on `target`: frames until `budget` is spent, five at least, after one that is not counted. Where
-/// its modulator has a table for each pixel, each frame is encoded once more, through it.
+/// Measures one case on `target`: processes frames until `budget` is spent, at least five, after one warm-up frame. If
+/// the modulator has a table for each pixel, each frame is encoded a second time through it.
 ///
 /// # Errors
-/// A case that cannot be planned.
+/// Returns an error if the case cannot be planned.
 pub fn measure(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(case.threads)
@@ -112,7 +112,7 @@ pub fn measure(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row
     pool.install(|| measure_here(case, target, budget))
 }
 
-/// A method's name, which is also that of its stage, and its network.
+/// Returns a method's name, which is also the name of its stage, and its network.
 fn named(method: &Method) -> (&'static str, Option<&Arc<Network>>) {
     match method {
         Method::Network(network) => ("network", Some(network)),
@@ -172,7 +172,7 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
     })
 }
 
-/// `encoder` at one brightness.
+/// Returns `encoder` with a fixed brightness.
 fn full_light(encoder: &EncoderOptions) -> EncoderOptions {
     EncoderOptions {
         brightness: Brightness::Fixed(1.0),
@@ -180,16 +180,16 @@ fn full_light(encoder: &EncoderOptions) -> EncoderOptions {
     }
 }
 
-/// Times of frames, milliseconds.
+/// The times of frames, in milliseconds.
 #[derive(Default)]
 struct Times {
     stages: BTreeMap<&'static str, Vec<f64>>,
     totals: Vec<f64>,
-    /// Of encoding through the table.
+    /// The times of encoding through the table.
     table_encode: Vec<f64>,
 }
 
-/// Frames until `budget` is spent, five at least, after one that is not counted.
+/// Times frames until `budget` is spent, at least five, after one warm-up frame.
 fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Duration) -> Result<Times> {
     let (width, height) = case.size;
     let (name, _) = named(case.method);
@@ -224,8 +224,8 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
     Ok(times)
 }
 
-/// A frame with colour everywhere, and with the depths of a typical scene: a floor up to a wall, and balls before it.
-/// What is in it does not change what a network costs; a sweep costs more the more depths are near each other.
+/// Makes a frame with colour everywhere and the depths of a typical scene: ground up to a wall, and balls in front. The
+/// content does not change the cost of a network. A sweep costs more the closer together the depths are.
 fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
     let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
     let depth = |y: usize, x: usize| {
@@ -246,15 +246,15 @@ fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
     )?)
 }
 
-/// Sorts `values`, which are not empty, and gives the middle one.
+/// Sorts `values`, which must not be empty, and returns the middle one.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values[values.len() / 2]
 }
 
-/// Linux counts a process's most memory from here on.
+/// Restarts Linux's count of the peak memory of this process.
 fn forget_peak_memory() {
-    // Where this is not Linux there is nothing to forget.
+    // This fails on other systems, which have nothing to restart.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 

@@ -1,4 +1,4 @@
-//! The commands of `phasefront`: one file a command, with its flags and what it does.
+//! The commands of `phasefront`. Each file holds one command with its flags.
 
 mod bench;
 mod calibrate;
@@ -21,14 +21,14 @@ use phasefront_command::start::Common;
 use phasefront_io::Result;
 use std::num::NonZeroUsize;
 
-/// The rule for what outputs replace.
+/// The rules for replacing output files.
 const FILES: &str = "\
 Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
 folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \
 or empty, and what `calibrate`, `video` and `hologram` with folders made is kept, unless --overwrite is \
 given. `video --resume` and `hologram --resume` complete what an earlier run began. All this is checked before any work.";
 
-/// RGB-D images to phase-only 3D holograms: make them, look at them, show them on a modulator, calibrate it.
+/// Make phase-only 3D holograms from RGB-D images, look at them, show them on a modulator, and calibrate it.
 #[derive(Parser)]
 #[command(name = "phasefront", version, max_term_width = 100, after_help = FILES)]
 pub(crate) struct Phasefront {

@@ -1,9 +1,9 @@
-//! Depth of any photo by a network that the user brings: an ONNX file that takes one picture and gives one plane of
-//! relative inverse depth, on any scale, run by tract.
+//! Depth of any photo from a network that the user supplies. The network is an ONNX file, run by tract, that takes one
+//! picture and returns one plane of relative inverse depth on any scale.
 //!
-//! The file's own input says what it takes: its numbers' type, the place of its three colours (NCHW or NHWC), its size.
-//! Where the size is left open, the picture nearly keeps its proportions at about [`DEFAULT_SIDE`], in multiples of
-//! [`MULTIPLE`].
+//! The file's own input defines its number type, the axis of its three colours (NCHW or NHWC) and its size. If the size
+//! is open, the picture nearly keeps its proportions: its shorter side is about [`DEFAULT_SIDE`], and both sides are
+//! multiples of [`MULTIPLE`].
 
 mod bounds;
 
@@ -19,17 +19,18 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::infer::Factoid;
 use tract_onnx::tract_hir::internal::DimLike;
 
-/// The shorter side of a picture for a network that leaves it open, pixels.
+/// The shorter side of a picture, in pixels, for a network that takes any size.
 pub const DEFAULT_SIDE: usize = 448;
-/// What its sides are multiples of: of 14 and 32, the patches and strides of common networks.
+/// The number that divides both sides of a picture for a network that takes any size. It is a multiple of 14 and 32,
+/// the patches and strides of common networks.
 pub const MULTIPLE: usize = 224;
-/// The most pixels that a network takes.
+/// The largest number of pixels that a network may take.
 const MOST_PIXELS: usize = 1 << 24;
 
-/// What a network wants a colour's number from 0 to 1 to be.
+/// The scaling that a network expects for colour values from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colours {
-    /// With the mean and the spread of ImageNet taken out, as MiDaS, DPT and Depth Anything were trained.
+    /// Normalized by the mean and the spread of ImageNet, as in the training of MiDaS, DPT and Depth Anything.
     Imagenet,
     /// From 0 to 1.
     Unit,
@@ -39,7 +40,7 @@ pub enum Colours {
 
 impl Colours {
     fn number(self, colour: usize, value: f32) -> f32 {
-        // Of the ImageNet data set, as torchvision states them.
+        // The values for the ImageNet data set from torchvision.
         const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
         const SPREAD: [f32; 3] = [0.229, 0.224, 0.225];
         match self {
@@ -50,9 +51,9 @@ impl Colours {
     }
 }
 
-/// What the file's input says.
+/// The input that the file defines.
 struct Input {
-    /// Colours are the last axis.
+    /// Whether colours are the last axis.
     interleaved: bool,
     bytes: bool,
     height: usize,
@@ -60,7 +61,7 @@ struct Input {
 }
 
 impl Input {
-    /// For a picture of (H, W) = `picture`.
+    /// Reads the input of `model` for a picture of (H, W) = `picture`.
     fn read(model: &InferenceModel, picture: (usize, usize)) -> std::result::Result<Self, String> {
         let inputs = model.inputs.len();
         if inputs != 1 {
@@ -154,7 +155,7 @@ impl Input {
     }
 }
 
-/// (H, W) for a network that takes any.
+/// Returns (H, W) for a network that takes any size.
 fn open_sides((height, width): (usize, usize)) -> [usize; 2] {
     let scale = DEFAULT_SIDE as f64 / height.min(width) as f64;
     [height, width].map(|side| {
@@ -163,7 +164,7 @@ fn open_sides((height, width): (usize, usize)) -> [usize; 2] {
     })
 }
 
-/// A network that sees depth, ready for pictures of one shape.
+/// A network that estimates depth, ready for pictures of one shape.
 pub struct DepthNetwork {
     path: PathBuf,
     input: Input,
@@ -171,10 +172,10 @@ pub struct DepthNetwork {
 }
 
 impl DepthNetwork {
-    /// Reads the ONNX file at `path`, for pictures of (H, W) = `picture`.
+    /// Reads the ONNX file at `path` for pictures of (H, W) = `picture`.
     ///
     /// # Errors
-    /// A file that is no such network, or one that would take too much memory or time.
+    /// Returns an error if the file is not a depth network, or if it would take too much memory or time.
     pub fn open(path: &Path, picture: (usize, usize)) -> Result<Self> {
         output::reading(path)?;
         let refuse = |why: String| Error::file(path, why);
@@ -184,7 +185,7 @@ impl DepthNetwork {
             ));
         }
         let file = input::bytes(path, MOST_DEPTH_NETWORK)?;
-        // tract panics on what it did not expect.
+        // tract panics on files that it does not expect.
         let planned = quiet::caught(|| {
             let proto = bounds::messages(&file, path)?;
             plan(&proto, path, picture)
@@ -197,11 +198,11 @@ impl DepthNetwork {
         })
     }
 
-    /// The relative inverse depth of `rgb`, (3, H, W) in 0..=1: (h, w) of the network's own size, larger where it is
-    /// nearer, on its own scale.
+    /// Estimates the relative inverse depth of `rgb`, (3, H, W) in 0..=1. The result is (h, w) in the network's own
+    /// size and on its own scale, larger where the picture is nearer.
     ///
     /// # Errors
-    /// Colours that it does not run on, or an output that is no plane.
+    /// Returns an error if the network does not run on these colours, or if its output is not one plane.
     pub fn see(&self, rgb: ArrayView3<'_, f32>, colours: Colours) -> Result<Array2<f32>> {
         let refuse = |why: String| Error::file(&self.path, why);
         let run = || -> TractResult<Tensor> {
@@ -252,7 +253,7 @@ fn panicked(why: String) -> String {
     format!("tract does not run it: it fails with: {why}")
 }
 
-/// The one plane of `output`, whose other axes must have length 1.
+/// Returns the single plane of `output`, whose other axes must have length 1.
 fn plane(output: &Tensor) -> std::result::Result<Array2<f32>, String> {
     let shape = output.shape();
     let sides: Vec<usize> = shape.iter().copied().filter(|n| *n != 1).collect();

@@ -1,5 +1,5 @@
-//! What a machine offers, and whether it computes as it should: small frames on what the default runs beside the
-//! oracles and the portable kernels.
+//! A report of what a machine offers, and a self-test. The self-test computes small frames with the default code and
+//! compares them with the oracles and the portable kernels.
 
 use ndarray::{Array2, Array3};
 use num_complex::{Complex32, Complex64};
@@ -16,42 +16,42 @@ use phasefront_models::{Precision, network};
 use serde::Serialize;
 use std::sync::Arc;
 
-/// What the machine offers.
+/// The hardware and system of a machine.
 #[derive(Debug, Clone, Serialize)]
 pub struct Machine {
-    /// The operating system and its version, as far as it tells.
+    /// The operating system and its version, as far as the system reports them.
     pub system: String,
-    /// The processor's name, or its architecture.
+    /// The processor's name, or its architecture if the name is unknown.
     pub cpu: String,
-    /// Cores that this process may use.
+    /// The number of cores that this process may use.
     pub cores: usize,
-    /// Memory of the machine, MiB, where the system tells.
+    /// The machine's memory in MiB, if the system reports it.
     pub memory_mib: Option<u64>,
-    /// What this process may use of it at most, MiB, where it is less.
+    /// The memory limit of this process in MiB, if it is less than the machine's memory.
     pub memory_limit_mib: Option<u64>,
-    /// Kernels of int8 networks that the processor runs, the fastest first.
+    /// The kernels for int8 networks that the processor runs, fastest first.
     pub int8_kernels: Vec<&'static str>,
-    /// Kernels of f32 networks that the processor runs, the fastest first.
+    /// The kernels for f32 networks that the processor runs, fastest first.
     pub f32_kernels: Vec<&'static str>,
-    /// GPUs, as their drivers tell.
+    /// The GPUs that drivers report.
     pub gpus: Vec<Gpu>,
 }
 
-/// A GPU that a driver answers for.
+/// A GPU that a driver reports.
 #[derive(Debug, Clone, Serialize)]
 pub struct Gpu {
-    /// Its name.
+    /// The GPU's name.
     pub name: String,
-    /// How it is spoken to: Vulkan, Metal, Dx12.
+    /// The graphics API: Vulkan, Metal or Dx12.
     pub backend: String,
-    /// The driver and its version, as far as it tells.
+    /// The driver and its version, as far as the driver reports them.
     pub driver: String,
-    /// Whether it is a driver in software, which is taken by name only.
+    /// Whether the driver runs in software. The command uses it only if a flag names it.
     pub software: bool,
 }
 
 impl Machine {
-    /// This one.
+    /// Describes this machine.
     pub fn this() -> Self {
         let names = |isas: Vec<Isa>| isas.into_iter().map(Isa::name).collect();
         let crate::bench::Machine { cpu, cores, .. } = crate::bench::Machine::this();
@@ -89,7 +89,7 @@ fn memory_mib() -> Option<u64> {
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? >> 10)
 }
 
-/// What the control group of this process allows, of either version.
+/// Returns the memory limit of this process's control group, version 1 or 2.
 fn memory_limit_mib() -> Option<u64> {
     let files = [
         "/sys/fs/cgroup/memory.max",
@@ -114,14 +114,14 @@ fn gpus() -> Vec<Gpu> {
     adapters.into_iter().map(gpu).collect()
 }
 
-/// What one part of the self-test found.
+/// The result of one part of the self-test.
 #[derive(Debug, Clone, Serialize)]
 pub struct Check {
-    /// What was tested.
+    /// The name of the tested part.
     pub name: &'static str,
-    /// Whether it is as it should be; None where it could not be tested.
+    /// Whether the part passed, or `None` if it could not be tested.
     pub passed: Option<bool>,
-    /// What was seen, and what would be right.
+    /// The result, and the expected one.
     pub says: String,
 }
 
@@ -135,18 +135,18 @@ impl Check {
     }
 }
 
-/// (H, W) of the frames that are computed twice: odd, and more than a strip of any kernel.
+/// (H, W) of the test frames: odd, and larger than a strip of any kernel.
 const SIZE: (usize, usize) = (45, 67);
 
-/// Tests what the CPU computes.
+/// Tests the CPU's results.
 ///
 /// # Errors
-/// A network that is not bundled, or what cannot be planned.
+/// Returns an error if the network is not bundled or a test cannot be planned.
 pub fn self_test() -> Result<Vec<Check>> {
     Ok(vec![int8()?, f32()?, sweep()?, propagation()?, frame()?])
 }
 
-/// Compares a small default frame on the GPU that `open` gives with the CPU's.
+/// Compares a small default frame on the GPU that `open` selects with the CPU's.
 pub fn test_gpu(open: &phasefront_gpu::DeviceOptions) -> Check {
     let compare = || {
         let device = Arc::new(Device::open(open)?);
@@ -165,10 +165,10 @@ pub fn test_gpu(open: &phasefront_gpu::DeviceOptions) -> Check {
     }
 }
 
-/// What the checks say together.
+/// Combines the results of the checks.
 ///
 /// # Errors
-/// One that failed.
+/// Returns an error that names the failed checks.
 pub fn verdict(checks: &[Check]) -> Result<()> {
     let failed = checks.iter().filter(|check| check.passed == Some(false));
     let failed: Vec<_> = failed.map(|check| check.name).collect();
@@ -186,7 +186,7 @@ fn coming_along(precision: Precision) -> phasefront::Result<Arc<Network>> {
     network("rgbd-8", precision).ok_or_else(missing)
 }
 
-/// The network's output on one instruction set.
+/// Runs the network on one instruction set.
 fn run_on(network: &Network, isa: Isa, input: &[f32]) -> Result<Vec<f32>> {
     let plan = network.plan_on(isa, SIZE.0, SIZE.1)?;
     let mut output = vec![0.0; 6 * SIZE.0 * SIZE.1];
@@ -194,7 +194,7 @@ fn run_on(network: &Network, isa: Isa, input: &[f32]) -> Result<Vec<f32>> {
     Ok(output)
 }
 
-/// Waves of several lengths, as networks take them: around 0.
+/// Makes waves of several lengths around 0, as networks expect.
 fn waves() -> Vec<f32> {
     let (height, width) = SIZE;
     (0..4 * height * width)
@@ -234,12 +234,12 @@ fn f32() -> Result<Check> {
     Ok(apart("f32 network", worst, 1e-4))
 }
 
-/// The larger, NaN being the largest.
+/// Returns the larger value, where NaN is the largest.
 fn worse(a: f32, b: f32) -> f32 {
     if b.is_nan() { f32::INFINITY } else { a.max(b) }
 }
 
-/// A check of how far a fast path is from its oracle.
+/// Makes a check of the largest difference `worst` between a fast path and its oracle.
 fn apart(name: &'static str, worst: f32, most: f32) -> Check {
     let says = format!("at most {worst:.1e} from the naive sums; {most:.0e} is right");
     Check::new(name, worst <= most, says)
@@ -288,10 +288,11 @@ fn propagation() -> Result<Check> {
     Ok(apart("propagation", worst, 1e-3))
 }
 
-/// PSNR of what the whole default frame shows against its picture, dB, that is surely reached.
+/// The PSNR in dB that the displayed image of the default frame must reach against its picture.
 const SHOWN_DB: f64 = 20.0;
 
-/// A whole frame through the default, from a picture at one depth to what is seen of its levels there.
+/// Makes a hologram of a picture at one depth with the default pipeline, and compares the displayed image with the
+/// picture.
 fn frame() -> Result<Check> {
     let ((height, width), target) = (SIZE, Target::from(Display::default()));
     let rgb = picture()?.rgb().to_owned();

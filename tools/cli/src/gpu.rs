@@ -1,11 +1,11 @@
-//! GPUs for the command: which one, and what was compiled for it, kept from run to run.
+//! GPUs for the command: selects a device and keeps its compiled programs between runs.
 
 use phasefront_core::runtime::file;
 use phasefront_gpu::{Device, DeviceOptions};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// The GPU whose name has `name` in it, or the fastest, with the programs of earlier runs.
+/// Returns options for the GPU whose name contains `name`, or for the fastest GPU, with the programs of earlier runs.
 pub fn options(name: Option<&str>) -> DeviceOptions {
     DeviceOptions {
         name: name.map(str::to_owned),
@@ -13,7 +13,7 @@ pub fn options(name: Option<&str>) -> DeviceOptions {
     }
 }
 
-/// Keeps what was compiled for the next run. A cache that cannot be written costs time and nothing else.
+/// Saves the compiled programs for the next run. A failure to write this cache only costs time.
 pub fn keep_programs(device: &Device) {
     if let Some(why) = device.programs_refused() {
         log::info!("the programs of earlier runs were not taken: {why}");
@@ -33,7 +33,7 @@ pub fn keep_programs(device: &Device) {
     }
 }
 
-/// Where compiled programs are kept.
+/// Returns the path of the saved programs.
 fn programs() -> Option<PathBuf> {
     let of = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let folder = of("XDG_CACHE_HOME").or_else(|| Some(of("HOME")?.join(".cache")))?;

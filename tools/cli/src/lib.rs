@@ -1,4 +1,4 @@
-//! What the command `phasefront` does besides making holograms: pages and screens to look at them on, links to
+//! The parts of the command `phasefront` other than making holograms: pages and screens that show them, links to
 //! modulators, time multiplexing, depth from a network, and measurements of a machine.
 
 pub mod bench;

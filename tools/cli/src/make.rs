@@ -1,5 +1,5 @@
-//! Makes a hologram: from a request to the levels of the modulator. [`HologramRequest::make`] chooses the CPU or a GPU.
-//! `hologram`, `view` and `judge` make theirs here.
+//! Makes holograms, from a request to the levels of the modulator. [`HologramRequest::make`] chooses the CPU or a GPU.
+//! `hologram`, `view` and `judge` use it.
 
 mod cpu;
 mod gpu;
@@ -68,7 +68,7 @@ impl HologramRequest {
         }
     }
 
-    /// Chooses what suits the frame: the sweep if depth is clean, or if no network is for the display.
+    /// Chooses the method for the frame: the sweep if depth is clean or no network suits the display, else the network.
     fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || default_network(display).is_some();
         Ok(match trained && !sharpness::measure(frame).is_clean() {
@@ -78,22 +78,22 @@ impl HologramRequest {
     }
 }
 
-/// A field at the modulator, its levels, and how long each stage took.
+/// A field at the modulator, its levels, and the time of each stage.
 pub(crate) struct HologramResult {
     pub(crate) method: &'static str,
     pub(crate) field: Option<Array3<Complex32>>,
     pub(crate) levels: Array3<u8>,
-    /// Of over 8 bits, of which `levels` are then the upper ones.
+    /// The full levels if they have over 8 bits. `levels` then holds their upper 8 bits.
     pub(crate) words: Option<Array3<u16>>,
     pub(crate) encoder: Encoder,
     pub(crate) scale: f32,
-    /// The last is the encoder's.
+    /// The stages and their times. The last stage is the encoder.
     pub(crate) stages: Vec<(&'static str, Duration)>,
     pub(crate) engine: Option<String>,
 }
 
 impl HologramResult {
-    /// The levels with all their bits.
+    /// Returns the hologram with all bits of its levels.
     pub(crate) fn hologram(&self, info: HologramInfo) -> hologram::Hologram {
         match &self.words {
             Some(words) => hologram::Hologram::Words(words.clone(), info),
@@ -102,7 +102,7 @@ impl HologramResult {
     }
 }
 
-/// What files of the levels and of the field say.
+/// Returns the metadata for files of the levels and of the field.
 pub(crate) fn infos(display: &DisplayFile, made: &HologramResult) -> (HologramInfo, HologramInfo) {
     let levels = HologramInfo {
         calibrated: display.calibrated(true),

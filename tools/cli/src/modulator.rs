@@ -1,4 +1,4 @@
-//! Modulators at a desktop: frames on a screen, the pattern that tests the link to it, and several maps of one wave.
+//! Modulators on a desktop: frames on a screen, a test pattern for the link, and several maps of one wave.
 
 pub mod link;
 pub mod multiplex;

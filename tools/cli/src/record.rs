@@ -1,4 +1,4 @@
-//! The record of a folder of holograms: all flags that decide what its files hold. It lies beside them, so that
+//! The record of a folder of holograms. It holds all flags that affect the folder's files and lies beside them, so that
 //! --resume does not mix the holograms of two requests.
 
 use clap::ValueEnum;
@@ -12,19 +12,19 @@ use std::fs::{File, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// The file of the record in its folder.
+/// The name of the record's file in its folder.
 pub(crate) const FILE: &str = "request.json";
-/// Most bytes of the file: flags are short.
+/// The largest size of the record's file in bytes. Flags are short.
 const MOST_BYTES: u64 = 1 << 20;
-/// The key of the version that wrote a record, by which the file is recognised.
+/// The key of the version that wrote a record. It identifies the file as a record.
 const VERSION: &str = "phasefront";
 
-/// Flags by name, and what they are set to: a text, or whether a switch is given; null is a flag's default.
+/// Flags by name, and their values: a text, or whether a switch is given. Null stands for a flag's default.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RunRecord(BTreeMap<String, Value>);
 
 impl RunRecord {
-    /// Of `command`, without flags.
+    /// Creates a record of `command` without flags.
     pub(crate) fn new(command: &str) -> Self {
         let mut record = RunRecord(BTreeMap::new());
         record.set(VERSION, Some(env!("CARGO_PKG_VERSION")));
@@ -33,7 +33,7 @@ impl RunRecord {
     }
 
     pub(crate) fn set(&mut self, flag: &str, value: Option<impl Display>) {
-        // Text, for numbers that are written and read may differ in their last bit.
+        // Stored as text, because numbers may change in their last bit when they are written and read.
         let value = value.map(|value| value.to_string());
         self.0.insert(flag.to_owned(), value.into());
     }
@@ -47,7 +47,7 @@ impl RunRecord {
         self.set(flag, name.as_ref().map(|name| name.get_name()));
     }
 
-    /// The display of --display, and the files that it is in.
+    /// Records the display of --display and the files that define it.
     pub(crate) fn display(&mut self, name: Option<&str>, display: &phasefront::Display) -> Result<()> {
         self.set("--display", name.filter(|name| display::display_path(name).is_none()));
         let values = serde_json::to_value(display).map_err(|e| Error::Input(e.to_string()))?;
@@ -61,14 +61,14 @@ impl RunRecord {
         Ok(())
     }
 
-    /// A file: its name without folders, and its content.
+    /// Records a file: its name without folders, and its content.
     pub(crate) fn file(&mut self, flag: &str, path: Option<&Path>) -> Result<()> {
         let value = path.map(described).transpose()?;
         self.set(flag, value);
         Ok(())
     }
 
-    /// A name that a file may stand for, as --network has it.
+    /// Records a value that is a name or a file, as --network takes.
     pub(crate) fn name_or_file(&mut self, flag: &str, name: Option<&str>) -> Result<()> {
         match name.map(Path::new).filter(|path| path.is_file()) {
             Some(path) => self.file(flag, Some(path)),
@@ -79,7 +79,7 @@ impl RunRecord {
         }
     }
 
-    /// By what holograms of this record are recognised.
+    /// Returns the fingerprint that identifies holograms of this record.
     pub(crate) fn fingerprint(&self) -> Fingerprint {
         Fingerprint::of(self.text().as_bytes())
     }
@@ -93,7 +93,7 @@ impl RunRecord {
         values.contains_key(VERSION).then_some(RunRecord(values))
     }
 
-    /// What differs first between `earlier` and this record, said of both.
+    /// Returns the first difference between `earlier` and this record, described for each of them.
     fn difference(&self, earlier: &Self) -> Option<[String; 2]> {
         let flags = self.0.keys().chain(earlier.0.keys());
         let differing = flags
@@ -103,7 +103,7 @@ impl RunRecord {
     }
 }
 
-/// A flag as the command line has it.
+/// Formats a flag as on the command line.
 fn said(flag: &str, value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null | Value::Bool(false)) => format!("no {flag}"),
@@ -121,7 +121,7 @@ fn described(path: &Path) -> Result<String> {
     ))
 }
 
-/// The files of a display: its TOML, and those that it names.
+/// Describes the files of a display: its TOML file, and those that it names.
 fn display_files(name: &str) -> Result<BTreeMap<String, String>> {
     let mut all = BTreeMap::new();
     let Some(path) = display::display_path(name) else {
@@ -143,12 +143,12 @@ fn display_files(name: &str) -> Result<BTreeMap<String, String>> {
     Ok(all)
 }
 
-/// What becomes of the holograms that lie in a folder already.
+/// The treatment of holograms that already exist in a folder.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Before {
     /// The command stops.
     Refuse,
-    /// They stay, and what is missing is made.
+    /// They stay, and the command makes the missing ones.
     Resume,
     /// They are replaced.
     Overwrite,
@@ -163,7 +163,7 @@ impl Before {
         }
     }
 
-    /// What the folder may hold that is filled.
+    /// Returns which files the output folder may hold.
     pub(crate) fn holding(self) -> Holding<'static> {
         match self {
             Before::Overwrite => Holding::Anything,
@@ -172,19 +172,20 @@ impl Before {
     }
 }
 
-/// A folder that one run at a time writes into.
+/// A folder that only one run at a time writes to.
 pub(crate) struct Claim {
-    /// Locked as long as the run lasts; a killed run's lock goes with it.
+    /// The record's file, locked for the whole run. The system releases the lock of a killed run.
     _request: File,
-    /// Whether an earlier run of the same record is resumed.
+    /// Whether this run resumes an earlier run of the same record.
     pub(crate) resumes: bool,
 }
 
 impl Claim {
-    /// Makes `folder`, and keeps other runs out of it. `is_made` knows the names of what a run makes there.
+    /// Makes `folder` and keeps other runs out of it. `is_made` checks whether a run makes a file of that name there.
     ///
     /// # Errors
-    /// Another run in the folder; files of an earlier one, unless `before` allows them and the record is the same.
+    /// Returns an error if another run uses the folder. Returns an error if files of an earlier run exist, unless
+    /// `before` allows them and the record is the same.
     pub(crate) fn new(
         folder: &Path,
         record: &RunRecord,
@@ -207,7 +208,7 @@ impl Claim {
             .truncate(false)
             .open(&path)
             .map_err(refuse)?;
-        // A file system without locks lets every run in.
+        // A file system without locks keeps no run out.
         if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(Error::file(
                 folder,
@@ -223,7 +224,7 @@ impl Claim {
                 "is no request of phasefront; give another folder, or remove the file",
             ));
         }
-        // Not before the lock: another run may just have ended.
+        // Checked after taking the lock, because another run may just have ended.
         let made = names_of(folder)?.iter().any(|name| is_made(name));
         let resumes = before == Before::Resume && made;
         match before {
@@ -242,7 +243,7 @@ impl Claim {
     }
 }
 
-/// Files that are there already.
+/// Makes the error for files that already exist.
 pub(crate) fn already(path: &Path) -> Error {
     Error::file(
         path,
@@ -268,7 +269,7 @@ fn check(folder: &Path, record: &RunRecord, earlier: Option<&RunRecord>) -> Resu
     }
 }
 
-/// The names of the files in `folder`.
+/// Returns the names of the files in `folder`.
 pub(crate) fn names_of(folder: &Path) -> Result<Vec<String>> {
     let refuse = |e: std::io::Error| Error::file(folder, format!("cannot be read: {e}"));
     let entries = std::fs::read_dir(folder).map_err(refuse)?;

@@ -1,7 +1,7 @@
-//! One HTML file to look at holograms in: a stack of views, the wanted field beside the displayed image, phases,
+//! One HTML file that shows holograms: a stack of views, the wanted field beside the displayed image, phases and
 //! figures. It needs no server, no network and no other file.
 //!
-//! A page carries its [`Scene`]s as JSON, pictures in it as WebP, so that pages can be read again and joined to one.
+//! A page holds its [`Scene`]s as JSON with WebP pictures, so that pages can be read again and joined into one.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -19,12 +19,12 @@ const PAGE: &str = include_str!("viewer/page.html");
 const SCENES_FROM: &str = r#"<script type="application/json" id="scenes">"#;
 const SCENES_TO: &str = "</script>";
 const PLACE: &str = "__SCENES__";
-/// How a picture of a page begins.
+/// The prefix of each picture in a page.
 const PICTURE: &str = "data:image/webp;base64,";
 
-/// The widest that a view is packed.
+/// The largest width of a view in a page.
 const WIDEST: u32 = 1280;
-/// Widths and qualities of WebP that are tried, the best first.
+/// The widths and WebP qualities to try, best first.
 const SIZES: [(u32, f32); 9] = [
     (WIDEST, 85.0),
     (WIDEST, 75.0),
@@ -36,66 +36,67 @@ const SIZES: [(u32, f32); 9] = [
     (320, 50.0),
     (240, 40.0),
 ];
-/// Bytes of base64 for 3 bytes.
+/// The bytes of base64 for 3 bytes.
 const BASE64: usize = 4;
-/// Width of what a click looks its depth up in, pixels.
+/// The width of the depth map for clicks, in pixels.
 const DEPTH_WIDTH: usize = 240;
-/// Pixels of a modulator that are shown as they are: width and height, from the middle.
+/// The width and height of the part of a modulator, in its middle, that a page shows pixel for pixel.
 const WINDOW: (u32, u32) = (240, 160);
-/// Width of the phases as a whole.
+/// The width of the picture of all phases.
 const PHASE_WIDTH: u32 = 720;
 
-/// One hologram, or one video of holograms, to look at.
+/// A hologram, or a video of holograms, on a page.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scene {
-    /// What it is called.
+    /// The scene's title.
     pub title: String,
-    /// Pixels of the modulator.
+    /// The modulator's width in pixels.
     pub width: usize,
-    /// Pixels of the modulator.
+    /// The modulator's height in pixels.
     pub height: usize,
-    /// Where the views of a frame are focused, nearest first.
+    /// The distances at which the views of a frame are focused, nearest first.
     pub z_mm: Vec<f64>,
-    /// Frames of a video; 1 for a still.
+    /// The number of frames of a video; 1 for a still.
     pub frames: usize,
     /// All displayed views of each frame, as data URLs.
     pub shown: Vec<String>,
-    /// The wanted field in the same order, or none.
+    /// The views of the wanted field in the same order, or none.
     pub field: Vec<String>,
-    /// The modulator's phases of the first frame.
+    /// The modulator's phases in the first frame.
     pub phase: Option<Phase>,
-    /// Where a click focuses.
+    /// The map that tells where a click focuses.
     pub depth: Depth,
-    /// Names and values of what there is to know.
+    /// The names and values of the scene's figures.
     pub figures: Vec<(String, String)>,
 }
 
 /// A modulator's phases as pictures.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Phase {
-    /// All of them, made smaller: a data URL.
+    /// All phases at a reduced size, as a data URL.
     pub all: String,
-    /// Some as they are: a data URL.
+    /// The phases in `window` at full size, as a data URL.
     pub pixels: String,
-    /// Which: left, top, width, height in the modulator's pixels.
+    /// The left, top, width and height of the window in the modulator's pixels.
     pub window: [u32; 4],
 }
 
-/// Which view is focused on what is seen at a place.
+/// A map from each place in an image to the view that is focused there.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Depth {
-    /// Places in a row.
+    /// The number of places in a row.
     pub width: usize,
-    /// Rows of a frame.
+    /// The number of rows per frame.
     pub height: usize,
-    /// Bytes in base64, row by row, frame by frame: the index of the view.
+    /// The index of the view at each place, row by row and frame by frame, as bytes in base64.
     pub slices: String,
-    /// Whether the image's depth says so, rather than which view is sharpest.
+    /// Whether the map comes from the image's depth and not from the sharpness of the views.
     pub known: bool,
 }
 
 impl Depth {
-    /// Of normalized depth, (H, W), by `slice_of`, the index of the view that is focused at a depth.
+    /// Makes the map from normalized depth, (H, W). `slice_of` returns the index of the view that is focused at a
+    /// depth.
     pub fn known(depth: &Array2<f32>, slice_of: impl Fn(f32) -> u8) -> Self {
         let (rows, columns) = depth.dim();
         let width = columns.min(DEPTH_WIDTH);
@@ -111,8 +112,8 @@ impl Depth {
         }
     }
 
-    /// Of each of `frames`' views the one that is sharpest at a place: where colours differ most from their
-    /// neighbours'.
+    /// Makes the map from the views in `frames`. At each place, it takes the sharpest view, in which colours differ
+    /// most from their neighbours'.
     pub fn from_focus(frames: &[Vec<RgbImage>]) -> Self {
         let mut size = (0, 0);
         let mut slices = Vec::new();
@@ -134,7 +135,7 @@ impl Depth {
     }
 }
 
-/// How much each place of a view differs from its neighbours, over an area that noise does not decide.
+/// Measures how much each place of a view differs from its neighbours, averaged over an area to suppress noise.
 fn sharpness(view: &RgbImage) -> Array2<f32> {
     let small = export::at_width(view.clone(), DEPTH_WIDTH as u32);
     let (width, height) = (small.width() as usize, small.height() as usize);
@@ -150,10 +151,10 @@ fn sharpness(view: &RgbImage) -> Array2<f32> {
 }
 
 impl Phase {
-    /// Of levels, (C, H, W).
+    /// Makes the pictures of levels, (C, H, W).
     ///
     /// # Errors
-    /// A modulator too large for a picture.
+    /// Returns an error if the modulator is too large for a picture.
     pub fn new(levels: ArrayView3<'_, u8>) -> Result<Self> {
         let (_, height, width) = levels.dim();
         let levels = picture::as_rgb(&levels);
@@ -175,15 +176,15 @@ fn url(webp: &[u8]) -> String {
     format!("{PICTURE}{}", STANDARD.encode(webp))
 }
 
-/// The picture of a view's amplitudes, (C, H, W), no wider than pages show them.
+/// Makes a picture of a view's amplitudes, (C, H, W), no wider than pages show it.
 pub fn picture(view: ArrayView3<'_, f32>) -> RgbImage {
     export::at_width(export::of_amplitude(view), WIDEST)
 }
 
-/// `views` as data URLs that together have at most `most` bytes, as large and as good as that allows.
+/// Encodes `views` as data URLs that together have at most `most` bytes, at the best size and quality that fit.
 ///
 /// # Errors
-/// A budget that not even the smallest pictures keep.
+/// Returns an error if not even the smallest pictures fit.
 pub fn pack(views: &[RgbImage], most: usize) -> Result<Vec<String>> {
     let Some(middle) = views.get(views.len() / 2) else {
         return Ok(Vec::new());
@@ -206,37 +207,37 @@ pub fn pack(views: &[RgbImage], most: usize) -> Result<Vec<String>> {
     )))
 }
 
-/// The page of `scenes`.
+/// Makes the page of `scenes`.
 ///
 /// # Errors
-/// No scene at all.
+/// Returns an error if there is no scene.
 pub fn page(scenes: &[Scene]) -> Result<String> {
     if scenes.is_empty() {
         return Err(Error::Input("a page needs a hologram to show; there is none".into()));
     }
-    // A title with `</script>` in it would end the data.
+    // A title that contains `</script>` would end the data.
     let json = serde_json::to_string(scenes)
         .map_err(|e| Error::Input(format!("the page's data: {e}")))?
         .replace('<', "\\u003c");
     Ok(PAGE.replace(PLACE, &json))
 }
 
-/// Writes the [`page`] of `scenes`; gives its bytes.
+/// Writes the [`page`] of `scenes` and returns its size in bytes.
 ///
 /// # Errors
-/// As [`page`]; a file that cannot be written.
+/// Returns the errors of [`page`], or an error if the file cannot be written.
 pub fn write(path: &Path, scenes: &[Scene]) -> Result<usize> {
     let page = page(scenes)?;
     output::write_atomically(path, |file| file.write_all(page.as_bytes()))?;
     Ok(page.len())
 }
 
-/// The scenes of a page that [`write()`] made. Whoever sent it may have changed it: nothing but its data is taken, and
-/// that is checked.
+/// Reads the scenes of a page that [`write()`] made. The page may have been changed since, so only its data is read,
+/// and the data is checked.
 ///
 /// # Errors
-/// A file that is missing or another page; one without scenes, or with scenes that [`write()`] never makes, as with
-/// pictures that are elsewhere.
+/// Returns an error if the file is missing, is another page or has no scenes, or if its scenes differ from what
+/// [`write()`] makes, for example because pictures are elsewhere.
 pub fn read(path: &Path) -> Result<Vec<Scene>> {
     let page = String::from_utf8(input::bytes(path, MOST_ARRAY)?)
         .map_err(|_| Error::file(path, "is no page that `phasefront view` made"))?;
@@ -257,7 +258,7 @@ pub fn read(path: &Path) -> Result<Vec<Scene>> {
     Ok(scenes)
 }
 
-/// Checks that `url` is a picture as [`write()`] puts it into a page, which no browser fetches from elsewhere.
+/// Checks that `url` is a picture inside the page, as [`write()`] makes it, which no browser fetches from elsewhere.
 fn check_picture(url: &str) -> std::result::Result<(), String> {
     let data = url.strip_prefix(PICTURE);
     match data.is_some_and(|data| STANDARD.decode(data).is_ok()) {
@@ -270,7 +271,7 @@ fn check_picture(url: &str) -> std::result::Result<(), String> {
 }
 
 impl Scene {
-    /// Checks what a page's script relies on.
+    /// Checks the properties that a page's script relies on.
     fn check(&self) -> std::result::Result<(), String> {
         let views = self.z_mm.len().checked_mul(self.frames).filter(|views| *views > 0);
         if views != Some(self.shown.len()) || !(self.field.is_empty() || self.field.len() == self.shown.len()) {

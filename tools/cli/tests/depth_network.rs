@@ -1,4 +1,4 @@
-//! Depth networks that would take all memory, never end, or make tract panic: each is refused in one line.
+//! Tests depth networks that would exhaust memory, run forever, or make tract panic. Each is refused with one line.
 #![allow(clippy::unwrap_used)]
 
 use ndarray::Array3;
@@ -79,7 +79,8 @@ fn floats(name: &str, dims: &[i64], values: &[f32]) -> TensorProto {
     }
 }
 
-/// A file of these nodes over `picture`, (1, 3, 16, 24), and `seen`, its mean over the colours; it gives `output`.
+/// Encodes a network of these nodes that returns `output`. The nodes may read `picture`, (1, 3, 16, 24), and `seen`,
+/// its mean over the colours.
 fn file(output: &str, nodes: Vec<NodeProto>, initializer: Vec<TensorProto>) -> Vec<u8> {
     let see = node("Conv", &["picture", "weights"], "seen", vec![]);
     let weights = floats("weights", &[1, 3, 1, 1], &[0.5, 0.25, 0.25]);
@@ -108,7 +109,7 @@ fn run(path: &Path) -> phasefront_io::Result<(usize, usize)> {
     Ok(seen.dim())
 }
 
-/// What makes tract panic, in 0.23.
+/// Returns networks that make tract 0.23 panic.
 fn broken() -> Vec<(&'static str, Vec<u8>)> {
     let of = |op: &str, attributes| file("out", vec![node(op, &["seen"], "out", attributes)], vec![]);
     let strided = node("Conv", &["picture", "weights"], "out", vec![ints("strides", &[0, 0])]);
@@ -141,7 +142,7 @@ fn broken() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// What would take more memory than there is, or more time than anybody has.
+/// Returns networks that would need more memory or time than available.
 fn huge() -> Vec<(&'static str, Vec<u8>)> {
     let large = [1i64, 1, 1 << 20, 1 << 20];
     let shape = || numbers("shape", &[4], &large);
@@ -168,7 +169,7 @@ fn huge() -> Vec<(&'static str, Vec<u8>)> {
             floats("row", &[1, 1 << 16], &column),
         ]
     };
-    // Each is twice the one before.
+    // Each tensor is twice as large as the one before.
     let doubled: Vec<_> = (0..40)
         .map(|i| {
             let name = |i: usize| if i == 0 { "one".into() } else { format!("c{i}") };
@@ -190,7 +191,7 @@ fn huge() -> Vec<(&'static str, Vec<u8>)> {
             node("Relu", &[&from], &to, vec![])
         })
         .collect();
-    // Few bytes, and over 2^44 products.
+    // The file is small but needs more than 2^44 multiplications.
     let half = numbers("shape", &[2], &[1 << 13, 1 << 13]);
     let square = node("ConstantOfShape", &["shape"], "square", vec![]);
     let add = node("Add", &["seen", "zero"], "a", vec![]);
@@ -225,7 +226,7 @@ fn huge() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// The most memory that this process has held, in bytes.
+/// Returns the peak memory of this process, in bytes.
 #[cfg(target_os = "linux")]
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();

@@ -1,4 +1,4 @@
-//! Flags that commands of both programs have.
+//! Flags that commands of both programs share.
 
 use crate::networks::Precision;
 use clap::builder::PossibleValue;
@@ -12,27 +12,27 @@ use std::sync::{Arc, LazyLock};
 /// The display that a hologram is for.
 #[derive(Clone, Args)]
 pub struct DisplayFlags {
-    /// TOML file of the display, or a modulator's name as `phasefront devices` lists them [default: 1920×1080, 8 µm,
+    /// TOML file of the display, or the name of a modulator that `phasefront devices` lists [default: 1920×1080, 8 µm,
     /// 638/520/450 nm, 6 mm]
     #[arg(long, value_name = "FILE|NAME")]
     display: Option<String>,
-    /// z of the hologram against the middle of the volume, mm, positive toward the viewer
+    /// z of the hologram from the middle of the volume, mm, positive toward the viewer
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     offset_mm: Option<f64>,
 }
 
 impl DisplayFlags {
-    /// Whether a display is asked for.
+    /// Checks whether a display is given.
     pub fn is_given(&self) -> bool {
         self.display.is_some()
     }
 
-    /// The display's file or the modulator's name, if one is given.
+    /// Returns the display's file or the modulator's name, if one is given.
     pub fn name(&self) -> Option<&str> {
         self.display.as_deref()
     }
 
-    /// Of a command that knows red, green and blue alone, and no offset.
+    /// Reads the display for a command that supports only red, green and blue, and no offset.
     pub fn read_of_midpoint(&self) -> Result<DisplayFile> {
         check_used(&[(
             "--offset-mm",
@@ -43,7 +43,7 @@ impl DisplayFlags {
         self.read_of_three()
     }
 
-    /// Of a command that knows red, green and blue alone.
+    /// Reads the display for a command that supports only red, green and blue.
     pub fn read_of_three(&self) -> Result<DisplayFile> {
         let file = self.read()?;
         match file.target.display.colours() {
@@ -54,7 +54,7 @@ impl DisplayFlags {
         }
     }
 
-    /// Of a command that needs none.
+    /// Reads the display for a command that does not need one. Returns `None` if no display is given.
     pub fn read_if_given(&self) -> Result<Option<DisplayFile>> {
         match (&self.display, self.offset_mm) {
             (Some(_), _) => Ok(Some(self.read()?)),
@@ -65,10 +65,10 @@ impl DisplayFlags {
         }
     }
 
-    /// The display, or the default one, at the offset that is asked for.
+    /// Reads the display, or takes the default one, and applies the given offset.
     ///
     /// # Errors
-    /// A display that cannot be read; an offset too far away.
+    /// Returns an error if the display cannot be read or the offset is too large.
     pub fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(name) => display::find_display(name)?,
@@ -91,17 +91,18 @@ impl DisplayFlags {
     }
 }
 
-/// The part of a turn that levels of these phases do not reach, where it is wider than what they leave out elsewhere.
+/// Returns the part of a turn that levels with these phases do not reach, if it is wider than 1.5 times the largest
+/// step between levels.
 fn gap(turns: &[f64]) -> Option<f64> {
     let widest = turns.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
     let gap = 1.0 - turns.last()?;
     (gap > 1.5 * widest).then_some(gap)
 }
 
-/// What the encoding with a pre-filter is called.
+/// The name of the encoding with a pre-filter.
 const DEEP: &str = "deep";
 
-/// The name of an encoder: one of the core's, or [`Self::DEEP`].
+/// The name of an encoder: one of the core's encoders, or [`Self::DEEP`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EncoderName(&'static str);
 
@@ -126,17 +127,18 @@ impl ValueEnum for EncoderName {
 impl EncoderName {
     /// The encoding with a pre-filter.
     pub const DEEP: Self = EncoderName(DEEP);
-    /// The default of fields that no pre-filter was trained for.
+    /// The default encoding for fields without a trained pre-filter.
     pub const ANTI_ALIAS: Self = EncoderName("anti-alias");
 
     fn known(self) -> Option<&'static (&'static str, &'static str, Encoding)> {
         Encoding::BY_NAME.iter().find(|(name, ..)| *name == self.0)
     }
 
-    /// The encoding, with its `prefilter` if it has one.
+    /// Returns the encoding, with its `prefilter` if it has one.
     ///
     /// # Errors
-    /// A pre-filter for an encoding without one, or none for one that needs it.
+    /// Returns an error if a pre-filter is given for an encoding without one, or none is given for an encoding that
+    /// needs one.
     pub fn encoding(self, prefilter: Option<Arc<Network>>) -> Result<Encoding> {
         Ok(match (self.known(), prefilter) {
             (Some((.., encoding)), None) => encoding.clone(),
@@ -152,14 +154,14 @@ impl EncoderName {
         })
     }
 
-    /// The name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         self.0
     }
 }
 
-/// Refuses a flag that changes nothing: of each its name, whether it is given, whether it is used, and what it goes
-/// with.
+/// Refuses a flag that changes nothing. Each entry holds the flag's name, whether it is given, whether it is used, and
+/// what it goes with.
 pub fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
     match flags.iter().find(|(_, given, used, _)| *given && !*used) {
         None => Ok(()),
@@ -169,27 +171,28 @@ pub fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
     }
 }
 
-/// What becomes of files that an output's place holds already.
+/// The flag that allows a command to replace existing output files.
 #[derive(Default, Args)]
 pub struct OverwriteFlag {
-    /// Replace what an earlier run made; without it an output folder must be new or empty, a calibration's file absent
+    /// Replace files of an earlier run; without it, an output folder must be new or empty, and a calibration file must
+    /// not exist
     #[arg(long)]
     overwrite: bool,
 }
 
 impl OverwriteFlag {
-    /// Whether --overwrite is given.
+    /// Checks whether --overwrite is given.
     pub fn is_given(&self) -> bool {
         self.overwrite
     }
 
-    /// What an output folder may hold.
+    /// Returns which files an output folder may hold.
     pub fn holding(&self) -> Holding<'static> {
         Holding::by_flag(self.overwrite)
     }
 }
 
-/// Width and height as 1920x1080.
+/// Parses a width and height such as 1920x1080.
 pub fn parse_size(text: &str) -> std::result::Result<(usize, usize), String> {
     let parsed = text
         .split_once(['x', '×'])
@@ -200,18 +203,18 @@ pub fn parse_size(text: &str) -> std::result::Result<(usize, usize), String> {
     }
 }
 
-/// The numbers of a network.
+/// The number type of a network.
 #[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 pub enum PrecisionName {
     #[default]
-    /// Whole numbers of 8 bits: the fastest
+    /// 8-bit integers, the fastest
     Int8,
-    /// Floating point
+    /// 32-bit floating point
     F32,
 }
 
 impl PrecisionName {
-    /// The precision of this name.
+    /// Returns the precision with this name.
     pub fn precision(self) -> Precision {
         match self {
             PrecisionName::Int8 => Precision::Int8,
@@ -220,7 +223,7 @@ impl PrecisionName {
     }
 }
 
-/// The sweep that suits `display`, with these planes and taps where given.
+/// Returns the sweep that suits `display`, with `planes` and `taps` if they are given.
 pub fn sweep_for(display: &Display, planes: Option<usize>, taps: Option<usize>) -> Sweep {
     let default = match planes {
         Some(planes) => Sweep::of_planes(display, planes),

@@ -1,8 +1,8 @@
-//! What the commands `phasefront` and `phasefront-lab` share: how they start, print and trace, networks by name, and
-//! the flags that both have.
+//! The parts that the commands `phasefront` and `phasefront-lab` share: start, output, trace, networks by name, and
+//! common flags.
 //!
-//! This is a crate of its own because the two commands do not depend on each other, and reading files needs no command
-//! line.
+//! This is a separate crate because the two commands do not depend on each other, and the crate that reads files needs
+//! no command line.
 
 pub mod flags;
 pub mod networks;

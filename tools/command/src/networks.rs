@@ -1,4 +1,4 @@
-//! The networks of `--network`: the bundled ones, by name, and those of files.
+//! The networks of `--network`: bundled ones by name, and files.
 
 use phasefront::Network;
 use phasefront_core::runtime::file;
@@ -8,11 +8,11 @@ pub use phasefront_models::Precision;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The name of the bundled pairs of a network and its pre-filter, for the deep double phase method: the one for the
-/// offset is meant.
+/// The name of the bundled pairs of a network and its pre-filter for the deep double phase method. The display's offset
+/// selects the pair.
 pub const DEEP: &str = "ddpm-8";
 
-/// The networks that are files of the source tree's `models`, not bundled, by name.
+/// The names of the networks in the source tree's `models` folder that are not bundled.
 const FILES: [&str; 8] = [
     "ddpm-8-12mm",
     "ddpm-8-6mm",
@@ -24,7 +24,7 @@ const FILES: [&str; 8] = [
     "seeded-8-80",
 ];
 
-/// The full name that `name` is or is short for.
+/// Returns the full name for `name`, which may be short.
 fn full_name(name: &str) -> String {
     match name {
         "8" | "15" => format!("rgbd-{name}"),
@@ -32,17 +32,17 @@ fn full_name(name: &str) -> String {
     }
 }
 
-/// Whether `name` is a bundled network's rather than a file's.
+/// Checks whether `name` is the name of a bundled network and not of a file.
 pub fn is_bundled(name: &str) -> bool {
     let full = full_name(name);
     NETWORKS.iter().any(|model| model.name == full)
 }
 
-/// The bundled network called `name`, `8` and `15` being short for `rgbd-8` and `rgbd-15`, in `precision`, by default
-/// int8; or that of an ONNX file, whose precision is its own.
+/// Returns the bundled network called `name` in `precision` (int8 by default), or the network in an ONNX file, which
+/// has its own precision. `8` and `15` are short for `rgbd-8` and `rgbd-15`.
 ///
 /// # Errors
-/// A name that is neither, a file that is no hologram network, or a precision for a file.
+/// Returns an error if `name` is neither, if the file holds no hologram network, or if a precision is given for a file.
 pub fn network(name: &str, precision: Option<Precision>) -> Result<Arc<Network>> {
     if let Some(network) = phasefront_models::network(&full_name(name), precision.unwrap_or_default()) {
         return Ok(network);
@@ -60,7 +60,7 @@ pub fn network(name: &str, precision: Option<Precision>) -> Result<Arc<Network>>
     Ok(Arc::new(network))
 }
 
-/// That `name` is no network, and which there are.
+/// Makes the error for an unknown network, which lists the known ones.
 fn unknown(path: &Path, name: &str, why: &std::io::Error) -> Error {
     let bundled: Vec<_> = NETWORKS.iter().map(|model| model.name).chain([DEEP]).collect();
     let bundled = bundled.join(", ");

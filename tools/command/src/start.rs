@@ -1,4 +1,4 @@
-//! How a command starts: its threads, its log, its trace, and the exit code.
+//! The start of a command: its threads, log, trace and exit code.
 
 use crate::trace;
 use clap::Args;
@@ -12,30 +12,30 @@ use std::process::ExitCode;
 /// The flags of every command.
 #[derive(Debug, Args)]
 pub struct Common {
-    /// Threads to compute with; all cores if not given.
+    /// Number of threads to compute with; all cores if not given.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print the result as JSON on stdout.
     #[arg(long, global = true)]
     pub json: bool,
-    /// Write when each stage began and ended, for Perfetto (ui.perfetto.dev) or chrome://tracing.
+    /// Write a trace of when each stage began and ended, for Perfetto (ui.perfetto.dev) or chrome://tracing.
     #[arg(long, global = true, value_name = "FILE.json")]
     trace: Option<PathBuf>,
 }
 
 impl Common {
-    /// The threads that are asked for.
+    /// Returns the number of threads, if given.
     pub fn threads(&self) -> Option<NonZeroUsize> {
         NonZeroUsize::new(self.threads?.into())
     }
 
-    /// Runs `command` with these flags, on the thread that calls this: a system opens windows on the main thread only.
+    /// Runs `command` with these flags on the calling thread, because systems open windows only on the main thread.
     pub fn run(&self, command: impl FnOnce() -> Result<()>) -> ExitCode {
         log_to_stderr();
         match self.traced(command) {
             Ok(()) => ExitCode::SUCCESS,
             Err(e) => {
-                // If even this cannot be printed, the exit code reports the failure.
+                // If the message cannot be printed, the exit code still reports the failure.
                 let _ = writeln!(std::io::stderr(), "error: {e}");
                 ExitCode::FAILURE
             }

@@ -1,17 +1,17 @@
-//! What commands print: results, names of files and progress.
+//! The output of commands: results, file names and progress.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use phasefront_core::runtime::error::Line;
 use std::io::Write;
 use std::path::Path;
 
-/// A file's name in a line of text: without characters that control the terminal.
+/// Returns a file's name without characters that control the terminal.
 pub fn name(path: &Path) -> String {
     Line(&path.display().to_string()).to_string()
 }
 
-/// Prints a command's result: `json` in one line, or `text`, whose control characters other than newlines are replaced:
-/// names of files, networks and scenes may have any.
+/// Prints a command's result: `value` on one line if `json` is set, else `text`. Replaces control characters in `text`
+/// other than newlines, because names of files, networks and scenes may contain any.
 pub fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display) {
     let mut out = std::io::stdout().lock();
     let printed = match json {
@@ -23,7 +23,7 @@ pub fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display
     };
     match printed.and_then(|()| out.flush()) {
         Ok(()) => {}
-        // Whoever read has read enough: as other programs do, end without a word.
+        // The reader closed the pipe: exit silently, as other programs do.
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
         Err(e) => {
             let _ = writeln!(std::io::stderr(), "error: the result cannot be printed: {e}");
@@ -32,13 +32,13 @@ pub fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display
     }
 }
 
-/// A count on stderr of what has no known end.
+/// Makes a counter on stderr for work of unknown length.
 pub fn progress_count(what: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {pos} {elapsed}, {per_sec}").expect("a well-formed template");
     ProgressBar::no_length().with_style(style).with_message(what.to_owned())
 }
 
-/// A progress bar on stderr, with the time left, where stderr is a terminal.
+/// Makes a progress bar that shows the time left, on stderr if that is a terminal.
 pub fn progress_bar(total: u64, what: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {elapsed} {eta} left")
         .expect("a well-formed template");

@@ -1,4 +1,4 @@
-//! Traces: when each stage of each frame began and ended, on which thread, as files that Perfetto and Chrome show.
+//! Traces of when each stage of each frame began and ended, and on which thread, as files for Perfetto and Chrome.
 
 use phasefront_io::Result;
 use phasefront_io::output::{self, write_atomically};
@@ -10,7 +10,7 @@ use tracing_subscriber::Layer;
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::layer::SubscriberExt;
 
-/// Memory that the thread which writes a trace shares with us.
+/// The memory that the trace writer's thread shares with the caller.
 #[derive(Clone, Default)]
 struct Kept(Arc<Mutex<Vec<u8>>>);
 
@@ -24,19 +24,19 @@ impl Write for Kept {
     }
 }
 
-/// Does `work`, and writes to `path` the trace of its stages in Chrome's format: about 3 kB a frame, which stay in
-/// memory till the end. Spans are those of the core; each has its name, its thread and microseconds since the start.
-/// Work that fails leaves no trace.
+/// Does `work` and writes a trace of its stages to `path` in Chrome's format. The trace takes about 3 kB per frame and
+/// stays in memory until the end. Its spans are those of the core; each has its name, its thread and the microseconds
+/// since the start. Work that fails leaves no trace.
 ///
 /// # Errors
-/// Those of `work`, or a place that cannot be written.
+/// Returns the error of `work`, or an error if the file cannot be written.
 pub(crate) fn traced<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
     output::file(path, &["json"])?;
     let kept = Kept::default();
     let builder = ChromeLayerBuilder::new().writer(kept.clone());
     let (layer, written) = builder.include_args(true).include_locations(false).build();
     let layer = layer.with_filter(filter_fn(|span| span.target() == "phasefront"));
-    // Of all threads: stages run on those of sessions and pools. One process traces once.
+    // Set for all threads, because stages run on threads of sessions and pools. A process traces only once.
     let _ = tracing::subscriber::set_global_default(tracing_subscriber::registry().with(layer));
     let result = work()?;
     drop(written);

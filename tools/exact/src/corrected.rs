@@ -1,16 +1,16 @@
-//! SM-LBM with aberration correction, Eq. 5: the content of each plane goes through the silhouettes of
-//! all planes before it, back to where it started, through a correction kernel Φ of its depth in
-//! the Fourier domain, and on to z = 0.
+//! SM-LBM with aberration correction, Eq. 5. The content of each plane passes the silhouettes of all planes in front of
+//! it, goes back to its own plane, is multiplied by a correction kernel Φ for its depth in the Fourier domain, and
+//! propagates to z = 0.
 //!
 //! # Cost
-//! Taken literally that is a sweep for each plane, N²/2 propagations. But Φ is interpolated piecewise
-//! linearly between M calibrated distances, Φ(z) = Σ wᵢ(z)·Φᵢ, and everything else is linear in the content:
-//! so one sweep for each calibrated distance, its contents weighted by wᵢ, gives the same sum with
-//! N·M propagations at most, and N²/2 only where every plane has a kernel of its own. The way back
-//! to the start and on to z = 0 is one propagation, from the front plane to z = 0.
+//! Computed literally, Eq. 5 needs a sweep for each plane: N²/2 propagations. But Φ is interpolated piecewise linearly
+//! between M calibrated distances, Φ(z) = Σ wᵢ(z)·Φᵢ, and every other step is linear in the content. One sweep for each
+//! calibrated distance, with contents weighted by wᵢ, therefore gives the same sum with at most N·M propagations. It
+//! needs N²/2 only if every plane has its own kernel. The way back to the plane and on to z = 0 is a single
+//! propagation, from the front plane to z = 0.
 //!
-//! Kernels come from the calibrated coefficients of a display, [`Correction::of_aberrations`], or are taken as they
-//! are. What differs over the frame is [`spatial`]'s.
+//! Kernels come from the calibrated coefficients of a display, [`Correction::of_aberrations`], or from the caller. The
+//! module [`spatial`] corrects aberrations that differ over the frame.
 
 pub mod spatial;
 
@@ -27,31 +27,32 @@ use rayon::prelude::*;
 use std::cell::Cell;
 use std::ops::Range;
 
-/// The most propagations of one colour: those of 512 planes with a kernel each.
+/// The most propagations for one colour: those of 512 planes with a kernel each.
 pub const MAX_PROPAGATIONS: usize = 512 * 512 / 2;
 
-/// What neighbouring kernels may differ by, radians: between two of unit magnitude the mean has cos(BLEND/2).
+/// The largest phase difference between neighbouring kernels, in radians. The mean of two kernels of unit magnitude has
+/// the magnitude cos(BLEND/2).
 pub const BLEND: f64 = 0.28;
 
-/// Correction kernels at calibrated distances; between two they are interpolated linearly, beyond the
-/// ends the last one holds.
+/// Correction kernels at calibrated distances. Kernels between two distances are interpolated linearly; beyond the
+/// first and the last distance the kernel stays constant.
 pub struct Correction {
     z_m: Vec<f64>,
-    /// For each distance (C, W', H'): transposed, as spectra are kept.
+    /// For each distance the kernels, (C, W', H'): transposed, in the layout of the spectra.
     kernels: Vec<Array3<Complex32>>,
 }
 
 impl Correction {
-    /// Takes, for each of `z_m` (ascending, metres against z = 0, positive toward the viewer), the kernels of the
-    /// colours, (C, H', W'): a factor for each frequency of the padded plane in the order of the
-    /// discrete Fourier transform, zero first; 1 leaves it as it is.
+    /// Makes a correction from kernels, (C, H', W'), for each of `z_m` (ascending, metres from z = 0, positive toward
+    /// the viewer). A kernel has a factor for each frequency of the padded plane in the order of the discrete Fourier
+    /// transform, zero first. A factor of 1 leaves the frequency unchanged.
     ///
-    /// The padded plane of a scene must be at least [`padded_shape`]; a kernel that moves light by more pixels
-    /// than it spreads over the volume needs as many more.
+    /// The padded plane of a scene must be at least [`padded_shape`]. A kernel that moves light by more pixels than the
+    /// light spreads over the volume needs as many pixels more.
     ///
     /// # Errors
-    /// No distances, or ones that do not ascend; kernels of different shapes or with values that are not
-    /// finite.
+    /// Returns an error if there are no distances or they do not ascend, or if kernels differ in shape or have values
+    /// that are not finite.
     pub fn new(z_m: Vec<f64>, kernels: Vec<Array3<Complex32>>) -> Result<Self> {
         let refuse = |reason: String| Err(Error::Input(format!("correction: {reason}")));
         if z_m.is_empty() || z_m.len() != kernels.len() {
@@ -86,11 +87,11 @@ impl Correction {
         })
     }
 
-    /// The same from a function of z, wavelength and the frequencies µ and ν (cycles a metre, along x and y),
-    /// sampled for a padded plane of `shape`, (H', W').
+    /// Makes a correction from a function of z, the wavelength and the frequencies µ and ν (cycles per metre, along x
+    /// and y). The function is sampled for a padded plane of `shape`, (H', W').
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// Returns an error if [`Self::new`] does.
     pub fn sampled(
         z_m: Vec<f64>,
         shape: (usize, usize),
@@ -113,14 +114,14 @@ impl Correction {
         Self::new(z_m, kernels)
     }
 
-    /// The kernels Φ = exp(i·terms) of `aberrations` for frames of (`height`, `width`) cut into `planes`. Coefficients
-    /// run piecewise linearly over z, kernels between neighbours here; so where coefficients change, distances are put
-    /// between the calibrated ones until neighbours differ by at most [`BLEND`] rad, which costs 1 % of the light at
-    /// most.
+    /// Makes the kernels Φ = exp(i·terms) of `aberrations` for frames of (`height`, `width`) with `planes` planes.
+    /// Coefficients are piecewise linear over z, but the kernels are interpolated linearly between neighbours. Where
+    /// coefficients change, further distances are therefore inserted between the calibrated ones until neighbours
+    /// differ by at most [`BLEND`] rad, which costs at most 1 % of the light.
     ///
     /// # Errors
-    /// No planes or too many, a volume whose reach, or light that the correction moves so far that it, cannot be
-    /// padded.
+    /// Returns an error if there are no planes or too many, or if the reach of the volume, or the distance by which the
+    /// correction moves light, is too large to pad.
     pub fn of_aberrations(
         aberrations: &Aberrations,
         (height, width): (usize, usize),
@@ -137,7 +138,7 @@ impl Correction {
         for end in ends.filter(|_| !one) {
             let begin = z_m[z_m.len() - 1];
             let (a, b) = (aberrations.at(begin), aberrations.at(end));
-            // The terms' largest values over the square of frequencies.
+            // The largest values of the terms over the square of frequencies.
             let most = [3.0, 1.0, 2.0, 4.0, 4.0];
             let apart = (a.coefficients().iter().zip(b.coefficients()))
                 .map(|(a, b)| (0..5).map(|j| most[j] * (a[j] - b[j]).abs()).sum::<f64>())
@@ -146,7 +147,7 @@ impl Correction {
             z_m.extend((1..=steps).map(|i| begin + (end - begin) * i as f64 / steps as f64));
         }
         if z_m.len() > planes {
-            // Every plane has its own kernel then.
+            // Every plane gets its own kernel.
             z_m = (0..planes).rev().map(|k| plane_z_m(k, planes, display)).collect();
         }
         let reach_m = (aberrations.calibrated().iter())
@@ -170,13 +171,13 @@ impl Correction {
         Self::new(z_m, kernels)
     }
 
-    /// (H', W').
+    /// Returns the shape of the padded plane, (H', W').
     pub fn shape(&self) -> (usize, usize) {
         let (_, width, height) = self.kernels[0].dim();
         (height, width)
     }
 
-    /// How much of the kernel of distance `i` is in Φ(z).
+    /// Returns the weight of the kernel of distance `i` in Φ(z).
     fn weight(&self, i: usize, z_m: f64) -> f32 {
         let at = |j: usize| self.z_m[j];
         let last = self.z_m.len() - 1;
@@ -190,15 +191,15 @@ impl Correction {
     }
 }
 
-/// The least padded plane, (H', W'), for scenes of (`height`, `width`): that of the plain SM-LBM.
+/// Returns the smallest padded plane, (H', W'), for scenes of (`height`, `width`), which is that of plain SM-LBM.
 ///
 /// # Errors
-/// A volume whose reach cannot be padded.
+/// Returns an error if the reach of the volume cannot be padded.
 pub fn padded_shape(height: usize, width: usize, display: &Display) -> Result<(usize, usize)> {
     padded_shape_with(height, width, display, 0.0)
 }
 
-/// [`padded_shape`] with room for light that a correction moves by up to `reach_m`.
+/// Returns [`padded_shape`] with extra pixels for light that a correction moves by up to `reach_m`.
 fn padded_shape_with(height: usize, width: usize, display: &Display, reach_m: f64) -> Result<(usize, usize)> {
     let more = (reach_m / display.pitch_m()).ceil() as usize;
     Ok(asm::padded_shape(
@@ -211,13 +212,14 @@ fn padded_shape_with(height: usize, width: usize, display: &Display, reach_m: f6
     )?)
 }
 
-/// The corrected complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` hears of
-/// the propagations done, of all.
+/// Returns the corrected complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress`
+/// receives the number of finished propagations and their total.
 ///
-/// Memory: five buffers of (H', W') complex numbers beside the kernels, and 20 bytes a point.
+/// Memory: five buffers of (H', W') complex numbers besides the kernels, and 20 bytes per point.
 ///
 /// # Errors
-/// No planes, a padded plane too small for the scene, or more propagations than [`MAX_PROPAGATIONS`] a colour.
+/// Returns an error if there are no planes, if the padded plane is too small for the scene, or if a colour needs more
+/// propagations than [`MAX_PROPAGATIONS`].
 pub fn hologram(
     ldi: &Ldi,
     display: &Display,
@@ -276,7 +278,7 @@ pub fn hologram(
             points: &scene.points,
             neighbour: transfer(step_m),
             across: &|steps| transfer(steps as f64 * step_m),
-            // To the start of each content and on to z = 0 is −z of the front plane for all.
+            // The way back to the plane of a content and on to z = 0 covers −z of the front plane for every content.
             home: transfer(-z(front)),
             done: &|| {
                 done.set(done.get() + 1);
@@ -287,7 +289,7 @@ pub fn hologram(
         for (i, swept) in &sweeps {
             let content = |k: usize, rgb: &[f32; 3]| Complex32::from(correction.weight(*i, z(k)) * rgb[colour]);
             wave.sweep(swept, &content, &mut plane, &mut scratch);
-            // Φ on the way.
+            // Applies Φ.
             let kernel = correction.kernels[*i].index_axis(Axis(0), colour);
             let kernel = kernel.to_slice().expect("standard layout");
             add_product(&mut sum, &scratch.columns, kernel, padded_height);
@@ -300,7 +302,7 @@ pub fn hologram(
     Ok(hologram)
 }
 
-/// Adds `values` times `factors`, by runs of `length`.
+/// Adds the products of `values` and `factors` to `sum`, in parallel blocks of `length`.
 fn add_product(sum: &mut [Complex32], values: &[Complex32], factors: &[Complex32], length: usize) {
     sum.par_chunks_exact_mut(length)
         .zip(values.par_chunks_exact(length))
@@ -316,19 +318,19 @@ fn add_product(sum: &mut [Complex32], values: &[Complex32], factors: &[Complex32
 struct Wave<'a> {
     fft: &'a Fft2,
     points: &'a [Point],
-    /// From one plane to the next.
+    /// The transfer from one plane to the next.
     neighbour: Transfer,
-    /// Over so many planes.
+    /// Makes the transfer over the given number of planes.
     across: &'a dyn Fn(usize) -> Transfer,
-    /// From the front plane to z = 0.
+    /// The transfer from the front plane to z = 0.
     home: Transfer,
-    /// Told of each propagation.
+    /// Called after each propagation.
     done: &'a dyn Fn(),
 }
 
 impl Wave<'_> {
-    /// The spectrum at z = 0, in the scratch's columns, of what `content` gives for the points of the planes `swept`,
-    /// back first; `plane` is room for one plane.
+    /// Sweeps the points of the planes `swept`, back first, with the values that `content` gives them. Leaves their
+    /// spectrum at z = 0 in the columns of `scratch`; `plane` is a buffer for one plane.
     fn sweep(
         &self,
         swept: &[(usize, Range<usize>)],
@@ -353,7 +355,7 @@ impl Wave<'_> {
                     &across
                 }
             };
-            // Content that this kernel does not correct is weighted 0: its silhouette still blocks.
+            // A content that this kernel does not correct has weight 0, but its silhouette still blocks.
             cross(fft, scratch, transfer, points, |point| content(*k, &point.rgb));
             at = *k;
             (self.done)();

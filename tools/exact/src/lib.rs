@@ -1,8 +1,8 @@
-//! Exact waves of layered depth images: silhouette-mask layers, with aberrations corrected, and single points; and what
-//! a hologram is worth beside them.
+//! Computes exact waves of layered depth images and compares holograms with them. The waves come from silhouette-mask
+//! layers, with or without aberration correction, or from single points.
 //!
-//! The crate stands below both commands: `phasefront` corrects aberrations that change over depth with it and judges
-//! holograms by it, `phasefront-lab` makes data sets and studies with it.
+//! Both commands use the crate: `phasefront` corrects aberrations that change over depth and evaluates holograms with
+//! it, and `phasefront-lab` makes data sets and runs studies with it.
 
 pub mod corrected;
 pub mod point_based;

@@ -1,33 +1,31 @@
-//! The point-based method (Maimone, Georgiou and Kollin, ACM TOG 36(4), 85, 2017): the hologram of a
-//! layered depth image as the sum of its points' sub-holograms at z = 0.
+//! The point-based method (Maimone, Georgiou and Kollin, ACM TOG 36(4), 85, 2017). It computes the hologram of a
+//! layered depth image as the sum of the sub-holograms of its points at z = 0.
 //!
 //! # The sub-hologram
-//! A point of amplitude A at z lights the pixels of z = 0 that lie within the diffraction cone of
-//! the pitch, R = |z|·tan(asin(λ/2p)) around it, by the Fresnel zone pattern
+//! A point of amplitude A at z lights the pixels of z = 0 within the diffraction cone of the pitch, whose radius is R =
+//! |z|·tan(asin(λ/2p)). Its light there is the Fresnel zone pattern
 //!
 //! A·w(r)·exp(−i·sgn(z)·2π(√(r² + z²) − |z|)/λ)/n, w(r) = 1 − r²/R².
 //!
-//! The carrier is left out and the initial phase 2πz/λ of Eq. 1 with it, as everywhere in this
-//! project. The complex n(z, λ) is the sum of the pattern over its pixels, so that a plane of
-//! constant depth and amplitude A gives A at z = 0 and, refocused, A at z: the normalization that
-//! amplitudes ask for. (It holds the factor p²/(iλ·(−z)) of the Fresnel integral but for what the cone
-//! cuts off.) The weight w takes the cone's hard edge away: with it the amplitude of a plane would
-//! swing between 0 and 2 over z, as the wave that the edge diffracts meets the direct one on the
-//! axis. Within a pixel of z = 0 (R < p) a point lights its own pixel only.
+//! The pattern omits the carrier, and with it the initial phase 2πz/λ of Eq. 1, as everywhere in this project. The
+//! complex n(z, λ) is the sum of the pattern over its pixels. With this normalization a plane of constant depth and
+//! amplitude A gives A at z = 0 and, refocused, A at z. (Except for the light that the cone cuts off, n contains the
+//! factor p²/(iλ·(−z)) of the Fresnel integral.) The weight w removes the hard edge of the cone. With a hard edge, the
+//! amplitude of a plane would oscillate between 0 and 2 over z, because the wave diffracted at the edge interferes with
+//! the direct wave on the axis. Within a pixel of z = 0 (R < p), a point lights only its own pixel.
 //!
 //! # Occlusion
-//! See [`Occlusion`]. A ray from a point through a pixel of its sub-hologram runs on to the front of
-//! the volume; it is blocked where it meets a pixel-wide surface point on a nearer plane. For a
-//! point in front of z = 0 the ray starts away from the pixel, as its light does.
+//! [`Occlusion`] lists the choices. A ray from a point through a pixel of its sub-hologram continues to the front of
+//! the volume. A pixel-wide surface point on a nearer plane blocks the ray if the ray meets it. For a point in front of
+//! z = 0 the ray leaves in the direction away from the pixel, as the point's light does.
 //!
-//! # How
-//! Depths fall on the planes of SM-LBM ([`sm_lbm::plane_z_m`]); each plane that holds points has a table
-//! a colour. Bands of rows are added up in parallel and then joined in order, so that the number of
-//! threads does not change a bit. Occlusion is cast backwards, from each surface point to the rays
-//! that it blocks, in whole numbers: plane centres are odd multiples of half a plane, so a ray's
-//! position is a fraction.
+//! # Implementation
+//! Depths are rounded to the planes of SM-LBM ([`sm_lbm::plane_z_m`]). Each plane that holds points has one table per
+//! colour. Bands of rows are summed in parallel and joined in order, so the number of threads does not change a bit of
+//! the result. Occlusion is computed backwards, from each surface point to the rays that it blocks, in integers: plane
+//! centres are odd multiples of half a plane, so the position of a ray is a fraction.
 //!
-//! [`mod@reference`] is the same without tables, in f64.
+//! [`mod@reference`] computes the same hologram without tables, in f64.
 
 pub mod reference;
 
@@ -43,30 +41,30 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Rows of points that are added up at a time.
+/// The number of rows of points that are summed at a time.
 const BAND_ROWS: usize = 32;
 
-/// The most values that all tables may hold: 1 GiB.
+/// The most values that all tables together may hold: 1 GiB.
 const MAX_TABLE_VALUES: usize = 1 << 27;
 
-/// What keeps light from where it should not go.
+/// The way in which surfaces block light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Occlusion {
-    /// Nothing: all points of all layers light their whole sub-hologram.
+    /// Nothing blocks light: all points of all layers light their whole sub-hologram.
     None,
-    /// The image alone: only layer 0, what the viewer sees, has points.
+    /// Only layer 0, the layer that the viewer sees, has points.
     Input,
-    /// Rays: all points of all layers, each pixel of a sub-hologram only where its ray is free.
+    /// Rays decide: all points of all layers light the pixels of their sub-hologram to which the ray is free.
     Geometric,
 }
 
-/// Half the width of the sub-hologram of a point at `z_m`, pixels; 0 within a pixel of z = 0.
+/// Returns half the width, in pixels, of the sub-hologram of a point at `z_m`: 0 within a pixel of z = 0.
 fn radius_px(z_m: f64, wavelength_m: f64, pitch_m: f64) -> usize {
     (asm::reach_m(z_m, wavelength_m, pitch_m) / pitch_m) as usize
 }
 
-/// The sub-hologram at z = 0 of a point of amplitude 1 at `z_m`, (2R + 1, 2R + 1), the point in the middle;
-/// see the [module](self).
+/// Returns the sub-hologram at z = 0 of a point of amplitude 1 at `z_m`: (2R + 1, 2R + 1), with the point in the
+/// middle. See the [module](self).
 pub fn sub_hologram(z_m: f64, wavelength_m: f64, pitch_m: f64) -> Array2<Complex64> {
     let radius = radius_px(z_m, wavelength_m, pitch_m);
     if radius == 0 {
@@ -77,7 +75,7 @@ pub fn sub_hologram(z_m: f64, wavelength_m: f64, pitch_m: f64) -> Array2<Complex
         let across = |i: usize| (i as f64 - radius as f64) * pitch_m;
         let r2 = across(y).powi(2) + across(x).powi(2);
         let weight = (1.0 - r2 / (cone_m * cone_m)).max(0.0);
-        // √(r² + z²) − |z| without the loss of digits.
+        // This form of √(r² + z²) − |z| avoids cancellation.
         let detour_m = r2 / ((r2 + z_m * z_m).sqrt() + z_m.abs());
         Complex64::from_polar(weight, -z_m.signum() * 2.0 * PI * detour_m / wavelength_m)
     });
@@ -85,10 +83,10 @@ pub fn sub_hologram(z_m: f64, wavelength_m: f64, pitch_m: f64) -> Array2<Complex
     pattern / sum
 }
 
-/// A sub-hologram as it is added: by rows, without the corners that the cone leaves dark.
+/// A sub-hologram in the form in which it is added: by rows, without the dark corners outside the cone.
 struct Table {
     radius: usize,
-    /// For each |dy|: half the width of the lit part, and where its 2·half + 1 values begin.
+    /// For each |dy|: half the width of the lit part, and the index of the first of its 2·half + 1 values.
     rows: Vec<(usize, usize)>,
     values: Vec<Complex32>,
 }
@@ -112,8 +110,8 @@ impl Table {
         Table { radius, rows, values }
     }
 
-    /// Adds `amplitude` times the sub-hologram of a point at (`y`, `x`) to `plane`, rows `rows` of a frame of `width`,
-    /// where `open` lets it.
+    /// Adds `amplitude` times the sub-hologram of a point at (`y`, `x`) to `plane`, which holds the rows `rows` of a
+    /// frame of `width`. A mask in `open` limits the sum to the pixels that the point reaches.
     fn add(
         &self,
         plane: &mut [Complex32],
@@ -155,15 +153,15 @@ struct Hit {
     rgb: [f32; 3],
 }
 
-/// The points of a scene by pixels, each line of sight front first, one a plane.
+/// The points of a scene, grouped by pixel, front first, with at most one point per plane.
 struct Points {
     height: usize,
     width: usize,
     planes: usize,
-    /// Where each pixel's hits begin; one more at the end.
+    /// The index of each pixel's first hit, followed by the number of hits.
     starts: Vec<usize>,
     hits: Vec<Hit>,
-    /// The plane of each pixel's front hit, `u32::MAX` where there is none.
+    /// The plane of each pixel's front hit, or `u32::MAX` for a pixel without hits.
     nearest: Vec<u32>,
 }
 
@@ -187,7 +185,7 @@ impl Points {
                         continue;
                     }
                     let plane = sm_lbm::plane_of_depth(d, planes) as u32;
-                    // Of two hits on one plane the front one is the point, as in SM-LBM.
+                    // Of two hits on one plane, the front one is the point, as in SM-LBM.
                     if front < Some(plane) {
                         front = Some(plane);
                         hits.push(Hit {
@@ -211,20 +209,20 @@ impl Points {
         }
     }
 
-    /// The hits of a pixel, front first.
+    /// Returns the hits of a pixel, front first.
     fn at(&self, y: usize, x: usize) -> &[Hit] {
         let pixel = y * self.width + x;
         &self.hits[self.starts[pixel]..self.starts[pixel + 1]]
     }
 }
 
-/// Which pixels of a sub-hologram a point reaches: 1 where its ray is free, 0 where it is blocked.
+/// The pixels of a sub-hologram that a point reaches: 1 if the ray is free, 0 if it is blocked.
 struct Mask {
     radius: usize,
-    /// (2R + 1, 2R + 1).
+    /// The mask, (2R + 1, 2R + 1).
     open: Vec<f32>,
-    /// For each distance in pixels between a surface point and the point: the last plane from which it
-    /// can block a ray; −1 if none.
+    /// For each distance in pixels between a surface point and the point: the last plane from which the surface point
+    /// can block a ray, or −1 if there is none.
     last_plane: Vec<i64>,
 }
 
@@ -237,28 +235,29 @@ impl Mask {
         }
     }
 
-    /// The row of pixel row `py` for a point in row `y`.
+    /// Returns the mask's values for pixel row `py` and a point in row `y`.
     fn row(&self, py: usize, y: usize) -> &[f32] {
         let width = 2 * self.radius + 1;
         &self.open[(py + self.radius - y) * width..][..width]
     }
 
-    /// Casts the rays of the point at (`y`, `x`) on `plane` to the pixels within `radius`. Whether any is blocked.
+    /// Casts the rays of the point at (`y`, `x`) on `plane` to the pixels within `radius`. Returns whether any ray is
+    /// blocked.
     ///
-    /// In half planes the point lies 2k + 1 − N behind z = 0 and a surface point on plane j lies 2(k − j) before
-    /// the point. A ray to the pixel dx beside the point is there dx·2(k − j)/(2k + 1 − N) beside it, and
-    /// meets the surface point cx beside it if that rounds to cx.
+    /// In units of half a plane, the point lies 2k + 1 − N behind z = 0, and a surface point on plane j lies 2(k − j)
+    /// in front of the point. There, the ray to the pixel at distance dx from the point is at distance dx·2(k − j)/(2k
+    /// + 1 − N) from the point. It meets the surface point at distance cx if the ray's distance rounds to cx.
     fn cast(&mut self, points: &Points, (y, x): (usize, usize), plane: u32, radius: usize) -> bool {
         let k = i64::from(plane);
         let behind = 2 * k + 1 - points.planes as i64;
-        // On z = 0 there is but the ray straight ahead.
+        // On z = 0 the only ray is the one straight ahead.
         let distance = behind.abs().max(1);
         let sign = if behind < 0 { -1 } else { 1 };
         let reach = radius as i64;
         let blocks_from = |c: i64| match c {
             0 => k - 1,
             _ if reach == 0 => -1,
-            // (2c − 1)·distance ≤ 2·reach·2(k − j)
+            // Solves (2c − 1)·distance ≤ 2·reach·2(k − j) for j.
             _ => k - ((2 * c - 1) * distance + 4 * reach - 1) / (4 * reach),
         };
         self.last_plane.clear();
@@ -309,18 +308,19 @@ impl Mask {
     }
 }
 
-/// ⌈a/b⌉ for b > 0.
+/// Returns ⌈a/b⌉ for b > 0.
 fn ceil_div(a: i64, b: i64) -> i64 {
     -(-a).div_euclid(b)
 }
 
-/// The complex midpoint hologram of `ldi`, (C, H, W), at z = 0, its depths on `planes` planes. `progress` hears of
-/// the rows of points done, of all.
+/// Returns the complex midpoint hologram of `ldi`, (C, H, W), at z = 0, with its depths rounded to `planes` planes.
+/// `progress` receives the number of finished rows of points and their total.
 ///
-/// Memory: some 100 bytes a pixel, and the tables.
+/// Memory: about 100 bytes per pixel, and the tables.
 ///
 /// # Errors
-/// No planes or over [`sm_lbm::MOST_PLANES`], or sub-holograms so large that their tables do not fit.
+/// Returns an error if there are no planes or more than [`sm_lbm::MOST_PLANES`], or if the tables of the sub-holograms
+/// do not fit.
 pub fn hologram(
     ldi: &Ldi,
     display: &Display,
@@ -382,7 +382,7 @@ pub fn hologram(
     Ok(hologram)
 }
 
-/// For each plane that holds points, the table of each colour.
+/// Makes the tables of all colours for each plane that holds points.
 fn tables(points: &Points, display: &Display) -> Result<Vec<Option<Vec<Table>>>> {
     let mut occupied = vec![false; points.planes];
     for hit in &points.hits {
@@ -390,7 +390,7 @@ fn tables(points: &Points, display: &Display) -> Result<Vec<Option<Vec<Table>>>>
     }
     let pitch_m = display.pitch_m();
     let z = |plane| sm_lbm::plane_z_m(plane, points.planes, display);
-    // Half of a square for each colour.
+    // Each colour needs half of a square.
     let values: f64 = (occupied.iter().enumerate())
         .filter(|(_, occupied)| **occupied)
         .flat_map(|(plane, _)| display.wavelengths_m().iter().map(move |lambda| (plane, lambda)))
@@ -422,7 +422,7 @@ mod tests {
 
     #[test]
     fn a_point_near_the_hologram_is_its_pixel() {
-        // 1 px of reach: 8 µm / tan(asin(638 nm/16 µm)) = 200.5 µm for red.
+        // The reach is 1 px at 8 µm / tan(asin(638 nm/16 µm)) = 200.5 µm for red.
         assert_eq!(radius_px(200.4e-6, 638e-9, 8e-6), 0);
         assert_eq!(radius_px(-200.6e-6, 638e-9, 8e-6), 1);
         assert_eq!(sub_hologram(0.0, 638e-9, 8e-6)[(0, 0)], Complex64::ONE);

@@ -1,17 +1,15 @@
-//! The silhouette-mask layer-based method (SM-LBM), Eq. 1–4: the hologram of a layered depth image
-//! by waves, plane by plane from the back to the front, each plane's silhouette blocking what
-//! comes from behind it.
+//! The silhouette-mask layer-based method (SM-LBM), Eq. 1–4. It computes the hologram of a layered depth image with
+//! waves, plane by plane from the back to the front. The silhouette of each plane blocks the light from behind it.
 //!
-//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a point of depth d belongs to plane
-//! min(⌊d·N⌋, N − 1). The frame is padded once by the reach of light through the whole volume and
-//! periodic inside. Fields leave the carrier out, so a point's phase 2πz/λ (Eq. 1) is zero here,
-//! and the result at z = 0 is the paper's.
+//! Plane k of N lies at z = V/2 − V·(k + ½)/N. A point of depth d belongs to plane min(⌊d·N⌋, N − 1). The frame is
+//! padded once, by the reach of light through the whole volume, and the padded plane is periodic. Fields omit the
+//! carrier, so a point's phase 2πz/λ (Eq. 1) is zero here, and the result at z = 0 equals the paper's.
 //!
-//! What makes it cheap: a plane without points costs nothing, as two steps through empty space are
-//! one; a row without points stays in the frequency domain across its plane; and the field never
-//! leaves two buffers of (H', W').
+//! Three properties keep the cost low. A plane without points costs nothing, because two steps through empty space are
+//! one step. A row without points stays in the frequency domain across its plane. The field needs only two buffers of
+//! (H', W').
 //!
-//! The silhouette (Eq. 3) is where the LDI has a hit, so that black surfaces occlude too.
+//! The silhouette (Eq. 3) consists of the pixels at which the LDI has a hit, so black surfaces occlude too.
 
 use ndarray::{Array3, ArrayView1, ArrayViewMut2, Axis};
 use num_complex::Complex32;
@@ -30,20 +28,22 @@ pub(crate) struct Point {
     pub(crate) rgb: [f32; 3],
 }
 
-/// A scene cut into planes.
+/// A scene divided into planes.
 pub(crate) struct Planes {
-    /// All points: those of a plane together, by rows, and of two hits in one place the front one
-    /// last, so that it wins.
+    /// All points, grouped by plane and sorted by row. Of two hits at one position the front one comes last and
+    /// therefore wins.
     pub(crate) points: Vec<Point>,
-    /// The planes that hold points, back first: the index k, and where its points lie.
+    /// The planes that hold points, back first: the index k and the range of its points.
     pub(crate) occupied: Vec<(usize, Range<usize>)>,
 }
 
-/// Most planes that a scene is cut into. Planes take memory also where they are empty.
+/// The most planes of a scene. Empty planes take memory too.
 pub const MOST_PLANES: usize = 1_000_000;
 
+/// Checks the number of planes.
+///
 /// # Errors
-/// No planes, or more than [`MOST_PLANES`].
+/// Returns an error if there are no planes, or more than [`MOST_PLANES`].
 pub(crate) fn check_planes(planes: usize) -> Result<()> {
     if !(1..=MOST_PLANES).contains(&planes) {
         return Err(phasefront::Error::Setting(format!(
@@ -54,18 +54,18 @@ pub(crate) fn check_planes(planes: usize) -> Result<()> {
     Ok(())
 }
 
-/// The plane of a point of depth `d` among `planes`.
+/// Returns the index, among `planes`, of the plane of a point of depth `d`.
 pub fn plane_of_depth(d: f32, planes: usize) -> usize {
     ((f64::from(d) * planes as f64) as usize).min(planes - 1)
 }
 
-/// z of plane `k` among `planes`, metres.
+/// Returns z of plane `k` among `planes`, in metres.
 pub fn plane_z_m(k: usize, planes: usize, display: &Display) -> f64 {
     display.z_of_depth((k as f64 + 0.5) / planes as f64)
 }
 
 impl Planes {
-    /// By counting, so that no point is held twice.
+    /// Sorts the points by counting, so that no point is stored twice.
     pub(crate) fn of(ldi: &Ldi, planes: usize) -> Self {
         let mut next = vec![0; planes];
         for d in ldi.layers.iter().flat_map(|layer| &layer.depth) {
@@ -110,15 +110,15 @@ impl Planes {
     }
 }
 
-/// The points of row `y` among the `points` of a plane.
+/// Returns the points of row `y` among the `points` of a plane.
 fn row_of(points: &[Point], y: usize) -> &[Point] {
     let start = points.partition_point(|p| (p.y as usize) < y);
     let length = points[start..].partition_point(|p| p.y as usize == y);
     &points[start..start + length]
 }
 
-/// One step of the wave, whose transformed rows `scratch` holds: over `transfer`'s distance to a plane of
-/// `points`, where it is replaced by what they are (Eq. 3 and 4).
+/// Propagates the wave, whose transformed rows are in `scratch`, by `transfer` to the plane of `points`, and replaces
+/// it at the points by `content` (Eq. 3 and 4).
 pub(crate) fn cross(
     fft: &Fft2,
     scratch: &mut Scratch,
@@ -145,7 +145,7 @@ pub(crate) fn cross(
     );
 }
 
-/// `points` alone on a plane whose rows have `width` values.
+/// Fills `plane`, whose rows have `width` values, with the contents of `points` and zeros elsewhere.
 pub(crate) fn place(points: &[Point], plane: &mut [Complex32], width: usize, content: impl Fn(&Point) -> Complex32) {
     plane.fill(Complex32::ZERO);
     for point in points {
@@ -153,7 +153,7 @@ pub(crate) fn place(points: &[Point], plane: &mut [Complex32], width: usize, con
     }
 }
 
-/// The frame's part of padded `rows` of `width` values.
+/// Copies the frame's part of padded `rows` of `width` values to `frame`.
 pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_, Complex32>) {
     let columns = frame.ncols();
     for (mut out, row) in frame.rows_mut().into_iter().zip(rows.chunks_exact(width)) {
@@ -161,14 +161,15 @@ pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_
     }
 }
 
-/// The complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` hears of
-/// the planes done, of all those that hold points in all colours.
+/// Returns the complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` receives the
+/// number of finished planes and the total number of planes that hold points, over all colours.
 ///
-/// Memory: two buffers of (H', W') complex numbers, 20 bytes a point, 8 bytes a plane, and the
-/// transfer functions, a quarter of a buffer each: one for neighbours, one for a wider gap.
+/// Memory: two buffers of (H', W') complex numbers, 20 bytes per point, 8 bytes per plane, and two transfer functions
+/// of a quarter of a buffer each: one for neighbouring planes, one for a wider gap.
 ///
 /// # Errors
-/// No planes or over [`MOST_PLANES`], or a volume whose reach cannot be padded.
+/// Returns an error if there are no planes or more than [`MOST_PLANES`], or if the reach of the volume cannot be
+/// padded.
 pub fn hologram(
     ldi: &Ldi,
     display: &Display,
@@ -199,7 +200,7 @@ pub fn hologram(
         let Some((back, points)) = scene.occupied.first() else {
             break;
         };
-        // The columns are not in use yet: their buffer holds the farthest plane.
+        // The columns are not in use yet, so their buffer holds the farthest plane.
         let plane = &mut scratch.columns;
         let content = |point: &Point| Complex32::from(point.rgb[colour]);
         place(&scene.points[points.clone()], plane, padded_width, content);

@@ -1,5 +1,5 @@
-//! What a hologram is compared with, and how close it comes: the surfaces of a layered depth image, those that the
-//! sweep finds behind an RGB-D frame, and figures of views against the views of the exact wave.
+//! The reference images that holograms are compared with, and the measures of the comparison. The references are the
+//! surfaces of a layered depth image, or those that the sweep finds behind an RGB-D frame.
 
 use ndarray::{Array2, Array3};
 use phasefront::{Display, RgbdFrame};
@@ -9,7 +9,7 @@ use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Result, metrics};
 use serde::Serialize;
 
-/// The front layer's amplitudes, black where nothing is.
+/// Returns the amplitudes of the front layer. Pixels without a surface are black.
 pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     let front = &ldi.layers[0];
     Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| match front.depth[(y, x)].is_nan() {
@@ -18,19 +18,19 @@ pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     })
 }
 
-/// The front layer as a frame for `display`: black and farthest where nothing is.
+/// Returns the front layer as a frame for `display`. Pixels without a surface are black and farthest.
 ///
 /// # Errors
-/// Numbers that are no frame's.
+/// Returns an error if the layer's values are not valid for a frame.
 pub fn visible_frame(ldi: &Ldi, display: &Display) -> Result<RgbdFrame> {
     let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     Ok(RgbdFrame::new(visible_rgb(ldi), depth)?.for_display(display))
 }
 
-/// `frame` with its hidden surfaces, as the sweep finds them.
+/// Returns `frame` with the hidden surfaces that the sweep finds.
 ///
 /// # Errors
-/// Never, for the layers are of one shape.
+/// Never returns an error, because all layers have the same shape.
 pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
     let (height, width) = frame.shape();
     let size = height * width;
@@ -57,24 +57,25 @@ pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
     Ldi::new(std::iter::once(front).chain(behind).collect())
 }
 
-/// How close one scene's hologram comes to the truth.
+/// The measures of one scene's hologram against the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Figures {
-    /// Of the midpoint's amplitude, dB; infinite where it is the truth.
+    /// The PSNR of the midpoint's amplitude, in dB. Infinite if it equals the truth.
     pub amplitude_psnr: f64,
-    /// Of the midpoint's amplitude.
+    /// The SSIM of the midpoint's amplitude.
     pub amplitude_ssim: f64,
-    /// Mean over the focal stack, dB.
+    /// The mean PSNR over the focal stack, in dB.
     pub focal_psnr: f64,
-    /// Mean over the focal stack.
+    /// The mean SSIM over the focal stack.
     pub focal_ssim: f64,
-    /// Mean amplitude at the midpoint over the truth's.
+    /// The mean amplitude at the midpoint divided by that of the truth.
     pub brightness: f64,
-    /// Share of the modulator's light that passes the aperture; 1 for a complex field.
+    /// The share of the modulator's light that passes the aperture. 1 for a complex field.
     pub light: f64,
 }
 
-/// z of what one hologram for `display` is judged by, metres: the midpoint, and a stack of four depths.
+/// Returns the z positions, in metres, at which a hologram for `display` is evaluated: the midpoint and a stack of four
+/// depths.
 pub fn judged_z_m(display: &Display) -> Vec<f64> {
     let depths = (0..4).map(|i| (f64::from(i) + 0.5) / 4.0);
     std::iter::once(0.0)
@@ -82,11 +83,11 @@ pub fn judged_z_m(display: &Display) -> Vec<f64> {
         .collect()
 }
 
-/// How close `views` come to `truth`, all light counted as shown: (C, H, W) each, the midpoint first, the focal stack
-/// after it, `margin` pixels at the border left out.
+/// Compares `views` with `truth`, counting all light as displayed. Each view is (C, H, W); the midpoint comes first and
+/// the focal stack follows. `margin` pixels at the border do not count.
 ///
 /// # Errors
-/// Views of different shapes.
+/// Returns an error if the views differ in shape.
 pub fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
     let (_, height, width) = truth[0].dim();
     let inner = ndarray::s![.., margin..height - margin, margin..width - margin];

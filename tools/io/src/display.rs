@@ -1,4 +1,4 @@
-//! Display files: the TOML of a display, and the files that it names.
+//! Display files: the TOML file of a display and the files that it refers to.
 
 pub mod calibration;
 mod panel;
@@ -14,16 +14,16 @@ use phasefront_core::runtime::keys;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A display file and what it refers to.
+/// A display file and the contents of the files that it refers to.
 #[derive(Debug, Clone)]
 pub struct DisplayFile {
-    /// What it says but for aberrations.
+    /// The display settings without aberrations.
     pub target: Target,
-    /// The modulator, and how its input takes a hologram.
+    /// The modulator and its input layout.
     pub device: ModulatorSpec,
-    /// The modulator's table, where it is calibrated as a whole.
+    /// The modulator's look-up table, if the modulator is calibrated as a whole.
     pub lut: Option<[u8; 256]>,
-    /// What corrects the display's aberrations.
+    /// The correction of the display's aberrations.
     pub aberration: Option<AberrationFile>,
 }
 
@@ -39,11 +39,10 @@ impl From<Display> for DisplayFile {
 }
 
 impl DisplayFile {
-    /// The target with the correction that is one for all depths and the whole frame, where there is something to
-    /// correct.
+    /// Returns the target with its correction, if the correction is the same for all depths and the whole frame.
     ///
     /// # Errors
-    /// Aberrations that change over depth or over the frame, which only SM-LBM corrects.
+    /// Returns an error if the aberrations change over depth or over the frame. Only SM-LBM corrects those.
     pub fn corrected(&self) -> Result<Target> {
         let correction = match &self.aberration {
             None => None,
@@ -60,7 +59,7 @@ impl DisplayFile {
         })
     }
 
-    /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
+    /// Returns the parts of the calibration that a hologram file does not store, by their keys in the display file.
     pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
         let keys = [
             ("per_pixel", phase_only && self.target.response.shape().is_some()),
@@ -76,11 +75,11 @@ impl DisplayFile {
     }
 }
 
-/// The display of a file, or the device of that name: a bundled one, or one of the user's, a file in
-/// `phasefront/devices` of the folder for configurations.
+/// Finds a display by the path of its file or by a device name. A device is bundled or is a file in
+/// `phasefront/devices` of the user's configuration folder.
 ///
 /// # Errors
-/// As [`read_display`]; neither a file nor a name.
+/// Returns the errors of [`read_display`], or an error if `name` is neither a file nor a device.
 pub fn find_display(name: &str) -> Result<DisplayFile> {
     if let Some(path) = display_path(name) {
         return read_display(&path);
@@ -95,7 +94,7 @@ pub fn find_display(name: &str) -> Result<DisplayFile> {
     })
 }
 
-/// The file that --display `name` reads, `None` where it is the name of a device that is no file.
+/// Returns the file that --display `name` reads, or `None` if `name` is a device without a file.
 pub fn display_path(name: &str) -> Option<PathBuf> {
     let path = Path::new(name);
     if path.exists() || has_extension(path, "toml") {
@@ -110,7 +109,7 @@ fn one_line_of(error: &phasefront::Error) -> String {
     error.to_string().trim_start_matches("display: ").to_owned()
 }
 
-/// The files of the user's own devices, sorted.
+/// Returns the files of the user's own devices, sorted.
 pub fn own_devices() -> Vec<PathBuf> {
     let folder = std::env::var_os("XDG_CONFIG_HOME")
         .map(PathBuf::from)
@@ -124,13 +123,13 @@ pub fn own_devices() -> Vec<PathBuf> {
     files
 }
 
-/// Keys of a display's file that name other files.
+/// The keys of a display file that name other files.
 const NAMED: [&str; 4] = ["lut", "per_pixel", "laser", "aberration"];
 
-/// Keys each of which says what phase the levels show: a file has one of them at most.
+/// The keys that define the phase of each level. A file has at most one of them.
 const PHASES: [&str; 4] = ["lut", "per_pixel", "levels_turns", "range_turns"];
 
-/// Checks the keys of the `table` of the display's file at `path`.
+/// Checks the keys in the `table` of the display file at `path`.
 fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
     let known = [&keys::DISPLAY[..], &keys::DEVICE, &NAMED, &panel::KEYS].concat();
     keys::check(table, &known).map_err(|e| Error::file(path, one_line_of(&e)))?;
@@ -147,12 +146,12 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
     }
 }
 
-/// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
-/// 256 levels, and those of [`crate::display::calibration`]. Others are those of [`ModulatorSpec`] and
-/// `crate::display::panel`.
+/// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser` and `aberration` name files relative to it: `lut`
+/// is a text file of 256 levels, and [`crate::display::calibration`] describes the others. [`ModulatorSpec`] and
+/// `crate::display::panel` describe the remaining keys.
 ///
 /// # Errors
-/// A file that is missing or says what cannot be.
+/// Returns an error if a file is missing or has invalid contents.
 pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let text = input::text(path)?;
     let mut table: toml::Table =
@@ -233,10 +232,10 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     })
 }
 
-/// The look-up table of these levels.
+/// Converts levels to a look-up table.
 ///
 /// # Errors
-/// Other than 256 entries.
+/// Returns an error if there are not exactly 256 entries.
 pub(crate) fn lut_of(levels: &[u8]) -> Result<[u8; 256]> {
     levels.try_into().map_err(|_| {
         Error::Input(format!(

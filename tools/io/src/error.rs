@@ -1,31 +1,31 @@
-//! The one error type of the tools. Each message is one line that names what is wrong and what would be right.
+//! The error type of the tools. Each message is one line that names the problem and the expected input.
 
 use phasefront_core::runtime::error::Line;
 use phasefront_gpu::GpuError;
 use std::path::PathBuf;
 
-/// Why a tool refused to go on.
+/// The reason why a tool failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file or folder that cannot be read, written or understood.
+    /// A file or folder cannot be read, written or parsed.
     #[error("{}: {}", Line(&path.display().to_string()), Line(reason))]
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it, and what would be right.
+        /// The problem, and the expected contents.
         reason: String,
     },
-    /// A value, shape or scene that cannot be used as asked.
+    /// A value, shape or scene cannot be used as requested.
     #[error("{}", Line(.0))]
     Input(String),
-    /// The core refused.
+    /// The core returned an error.
     #[error(transparent)]
     Core(#[from] phasefront::Error),
 }
 
 impl Error {
-    /// An error about one file or folder.
+    /// Creates an error about one file or folder.
     pub fn file(path: impl Into<PathBuf>, reason: impl std::fmt::Display) -> Self {
         Self::File {
             path: path.into(),
@@ -34,7 +34,7 @@ impl Error {
     }
 }
 
-/// A tool's result.
+/// The result type of the tools.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl From<GpuError> for Error {

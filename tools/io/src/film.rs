@@ -1,5 +1,4 @@
-//! Films (mp4 and all else that ffmpeg knows), by the `ffmpeg` that is installed: pictures out of one, pictures into
-//! one.
+//! Reading and writing films (mp4 and every other format of ffmpeg) with the installed `ffmpeg`.
 
 pub mod sequence;
 pub mod video;
@@ -11,31 +10,31 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::thread::JoinHandle;
 
-/// Endings of films' names.
+/// The file extensions of films.
 const ENDINGS: [&str; 6] = ["mp4", "mov", "mkv", "webm", "avi", "m4v"];
-/// What ffmpeg may open: the containers of [`ENDINGS`], each in one file. A text that lists other films, whatever its
-/// name, is none of them.
+/// The inputs that ffmpeg may open: the containers of [`ENDINGS`], each in one file. This excludes text files that list
+/// other films, whatever their name.
 const READS: [&str; 4] = ["-protocol_whitelist", "file", "-format_whitelist", "mov,matroska,avi"];
-/// How much is kept of what ffmpeg writes to stderr, in bytes.
+/// The number of bytes kept from ffmpeg's stderr.
 const MOST_SAID: usize = 4096;
 
-/// `path` as ffmpeg takes it: the name of a file, not an option or another protocol, as `-x.mp4` and `concat:x.mp4`
-/// are.
+/// Returns `path` as a file URL, so that ffmpeg does not take names such as `-x.mp4` and `concat:x.mp4` for an option
+/// or another protocol.
 fn url(path: &Path) -> OsString {
     let mut url = OsString::from("file:");
     url.push(path);
     url
 }
 
-/// Whether `path` is named as a film.
+/// Checks whether the extension of `path` is that of a film.
 pub fn is_film(path: &Path) -> bool {
     ENDINGS.iter().any(|ending| crate::output::has_extension(path, ending))
 }
 
-/// What ffmpeg is called for.
+/// Checks that ffmpeg, which `path` needs, is installed.
 ///
 /// # Errors
-/// No ffmpeg.
+/// Returns an error if ffmpeg is not installed.
 pub fn check(path: &Path) -> Result<()> {
     let found = Command::new("ffmpeg")
         .arg("-version")
@@ -51,16 +50,16 @@ pub fn check(path: &Path) -> Result<()> {
     }
 }
 
-/// What a film says of itself.
+/// The frame rate and length of a film.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct About {
-    /// Frames a second.
+    /// The frame rate in Hz.
     pub rate_hz: f64,
-    /// Frames in all, as far as it knows.
+    /// The total number of frames, as far as ffprobe can tell.
     pub frames: u64,
 }
 
-/// Asks `ffprobe`; None where it does not know.
+/// Asks `ffprobe` for the frame rate and length. Returns `None` if it cannot tell.
 pub fn about(path: &Path) -> Option<About> {
     let output = Command::new("ffprobe")
         .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
@@ -83,36 +82,39 @@ pub fn about(path: &Path) -> Option<About> {
     })
 }
 
-/// What pictures of a film are wanted as.
+/// The pixel format for decoding a film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pixels {
-    /// Red, green, blue, a byte each.
+    /// RGB with one byte per channel.
     Rgb,
-    /// Grey of 16 bits, big-endian.
+    /// Grey with 16 bits, big-endian.
     Grey,
 }
 
-/// The pictures of a film, one after the other, upright.
+/// A reader for the pictures of a film, in order and upright.
 pub struct Film {
     path: std::path::PathBuf,
     ffmpeg: Child,
     pictures: BufReader<ChildStdout>,
-    /// The end of what ffmpeg writes to stderr. A thread reads it all the while: a full pipe stops ffmpeg.
+    /// The thread that drains ffmpeg's stderr, because a full pipe would block ffmpeg. It returns the end of the
+    /// output.
     said: Option<JoinHandle<String>>,
 }
 
-/// One picture.
+/// One decoded picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// (H, W).
+    /// The height and width, (H, W).
     pub shape: (usize, usize),
-    /// Row by row, as asked.
+    /// The pixels row by row, in the requested format.
     pub bytes: Vec<u8>,
 }
 
 impl Film {
+    /// Opens a film.
+    ///
     /// # Errors
-    /// No ffmpeg, or no such file.
+    /// Returns an error if ffmpeg is not installed or the file does not exist.
     pub fn open(path: &Path, pixels: Pixels) -> Result<Self> {
         check(path)?;
         if !path.is_file() {
@@ -154,10 +156,10 @@ impl Film {
         })
     }
 
-    /// The next picture; None at the end.
+    /// Returns the next picture, or `None` at the end.
     ///
     /// # Errors
-    /// A film that ffmpeg cannot read.
+    /// Returns an error if ffmpeg cannot read the film.
     pub fn read(&mut self) -> Result<Option<Picture>> {
         let Some((shape, bytes)) = self.header()? else {
             return self.end().map(|()| None);
@@ -172,7 +174,8 @@ impl Film {
         }
     }
 
-    /// A portable anymap's header, "P6\n640 480\n255\n": its shape, and the bytes that follow.
+    /// Parses the header of a portable anymap, such as "P6\n640 480\n255\n". Returns the shape and the number of bytes
+    /// that follow.
     fn header(&mut self) -> Result<Option<((usize, usize), usize)>> {
         let mut lines = [const { String::new() }; 3];
         for line in &mut lines {
@@ -200,7 +203,7 @@ impl Film {
         }
     }
 
-    /// Ends as ffmpeg does. It may go on over damaged parts, of which nobody else would say a word.
+    /// Waits for ffmpeg and reports its errors. ffmpeg may continue past damaged parts, which this also reports.
     fn end(&mut self) -> Result<()> {
         let said = self.said.take().and_then(|thread| thread.join().ok());
         let Some(said) = said else { return Ok(()) };
@@ -219,7 +222,7 @@ impl Film {
     }
 }
 
-/// The last of all that `errors` gives, [`MOST_SAID`] bytes.
+/// Returns the last [`MOST_SAID`] bytes of `errors`.
 fn last_said(mut errors: impl Read) -> String {
     let (mut said, mut chunk) = (Vec::new(), [0; MOST_SAID]);
     loop {
@@ -238,32 +241,32 @@ fn last_said(mut errors: impl Read) -> String {
 
 impl Drop for Film {
     fn drop(&mut self) {
-        // Where the film was not read to its end.
+        // The film may not have been read to its end.
         let _ = self.ffmpeg.kill();
         let _ = self.ffmpeg.wait();
     }
 }
 
-/// How a film is stored.
+/// The encoding of a film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quality {
-    /// H.264 as every player shows it.
+    /// H.264 that every player supports.
     Seen,
-    /// H.264 in RGB without loss: every level stays what it is.
+    /// Lossless H.264 in RGB, which preserves every level.
     Lossless,
 }
 
-/// Makes the film at `path` of the pictures in `folder` whose names are `pattern`, as `preview_%06d.png`.
+/// Encodes the pictures in `folder` whose names match `pattern`, for example `preview_%06d.png`, as the film at `path`.
 ///
 /// # Errors
-/// No ffmpeg, or what it refuses.
+/// Returns an error if ffmpeg is not installed or fails.
 pub fn write(path: &Path, folder: &Path, pattern: &str, rate_hz: f64, quality: Quality) -> Result<()> {
     check(path)?;
     output::write_by_name(path, |half| {
         let half = std::path::absolute(half).map_err(|e| Error::file(path, e))?;
         let mut command = Command::new("ffmpeg");
         command
-            // In the folder, whose own name is then no part of the pattern.
+            // ffmpeg runs in the folder, so that the folder's name is not parsed as part of the pattern.
             .current_dir(folder)
             .args([
                 "-v",
@@ -278,7 +281,7 @@ pub fn write(path: &Path, folder: &Path, pattern: &str, rate_hz: f64, quality: Q
             .args(["-framerate", &rate_hz.to_string(), "-start_number", "0", "-i"])
             .arg(url(Path::new(pattern)));
         match quality {
-            // Sides must be even for the colours of common players.
+            // The chroma format of common players needs even sides.
             Quality::Seen => command
                 .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18"])
                 .args(["-pix_fmt", "yuv420p", "-movflags", "+faststart"]),

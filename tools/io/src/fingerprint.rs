@@ -1,6 +1,6 @@
-//! Fingerprints, by which data are recognised.
+//! Fingerprints that identify data.
 
-/// FNV-1a of 64 bits: the same on every machine. It tells data apart that differ by chance, not by intent.
+/// A 64-bit FNV-1a hash, the same on every machine. It does not protect against deliberate collisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fingerprint(u64);
 
@@ -11,28 +11,28 @@ impl Default for Fingerprint {
 }
 
 impl Fingerprint {
-    /// Of `bytes`.
+    /// Computes the fingerprint of `bytes`.
     pub fn of(bytes: &[u8]) -> Self {
         let mut all = Self::default();
         all.bytes(bytes);
         all
     }
 
-    /// Adds bytes.
+    /// Adds bytes to the fingerprint.
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.0 = bytes.iter().fold(self.0, |hash, byte| {
             (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
         });
     }
 
-    /// Adds numbers, 64 bits each, little-endian.
+    /// Adds numbers to the fingerprint, as 64 bits each, little-endian.
     pub fn numbers(&mut self, numbers: &[usize]) {
         for number in numbers {
             self.bytes(&(*number as u64).to_le_bytes());
         }
     }
 
-    /// The number itself.
+    /// Returns the hash value.
     pub fn value(self) -> u64 {
         self.0
     }

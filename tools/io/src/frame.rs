@@ -1,4 +1,4 @@
-//! An RGB-D frame from its files: colour and depth brought to one shape, depth normalized.
+//! Reading an RGB-D frame from files: colour and depth are brought to one shape, and depth is normalized.
 
 pub mod fit;
 
@@ -15,27 +15,27 @@ use phasefront_core::depth::DepthUnit;
 use phasefront_core::depth::refine::Refiner;
 use std::path::Path;
 
-/// How far the aspect ratios of colour and depth may lie apart, relative.
+/// The largest relative difference between the aspect ratios of colour and depth.
 const ASPECT_TOLERANCE: f64 = 0.01;
 
-/// Share of the depth that --near and --far clip, beyond which that is said.
+/// The fraction of depth clipped by --near and --far above which a warning is printed.
 pub const DOUBTFULLY_CLIPPED: f64 = 0.9;
 
-/// What a depth file's numbers mean.
+/// How the values of a depth file are interpreted.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthOptions {
-    /// Their unit.
+    /// The unit of the values.
     pub unit: DepthUnit,
-    /// Metres that become d = 0; the 1st percentile if absent.
+    /// The distance in metres that maps to d = 0. Defaults to the 1st percentile.
     pub near_m: Option<f32>,
-    /// Metres that become d = 1; the 99th percentile if absent.
+    /// The distance in metres that maps to d = 1. Defaults to the 99th percentile.
     pub far_m: Option<f32>,
 }
 
-/// Reads a frame. Depth of another shape but the same aspect ratio is resampled, with a warning.
+/// Reads a frame. Depth with another shape but the same aspect ratio is resampled, with a warning.
 ///
 /// # Errors
-/// Files that cannot be read, or that do not belong together.
+/// Returns an error if a file cannot be read or if the files do not match.
 pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result<RgbdFrame> {
     let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
     let rgb = picture::amplitudes(image);
@@ -94,17 +94,18 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     RgbdFrame::new(rgb, normalized.depth).map_err(|e| Error::file(rgb_path, e))
 }
 
-/// Whether two shapes, (H, W), are of one aspect ratio.
+/// Checks whether two shapes, (H, W), have the same aspect ratio.
 fn has_aspect((h, w): (usize, usize), (height, width): (usize, usize)) -> bool {
     let cross = |a: usize, b: usize| a as f64 * b as f64;
     let ratio = cross(width, h) / cross(height, w);
     (ratio - 1.0).abs() <= ASPECT_TOLERANCE
 }
 
-/// Whether Exif data turned colour of (H, W) = `shape` and not its depth, and both shapes fit all the same.
+/// Checks whether Exif data turned the colour image, (H, W) = `shape`, but not its depth, while both shapes still
+/// match.
 ///
 /// # Errors
-/// Depth that fits the colour only as it is stored.
+/// Returns an error if the depth matches the colour only as it is stored.
 pub(crate) fn is_turned_alone(
     depth_path: &Path,
     depth: &DepthFile,
@@ -128,11 +129,11 @@ pub(crate) fn is_turned_alone(
     Ok(fits)
 }
 
-/// What makes it doubtful that `depth` is normalized, if anything does.
+/// Returns the reason to doubt that `depth` is normalized, if there is one.
 fn doubt(depth: &Array2<f32>) -> Option<String> {
-    /// Depth that is stretched over its range reaches beyond this.
+    /// Normalized depth that uses its range exceeds this value.
     const LITTLE: f32 = 0.25;
-    /// Share of zeros that a near surface has seldom.
+    /// The fraction of zeros that is unlikely for a near surface.
     const MANY: f32 = 0.1;
     let most = depth.iter().copied().fold(0.0, f32::max);
     let zeros = depth.iter().filter(|d| **d == 0.0).count() as f32 / depth.len().max(1) as f32;
@@ -150,13 +151,13 @@ fn doubt(depth: &Array2<f32>) -> Option<String> {
     })
 }
 
-/// Normalized depth, (h, w), of `depth` on any scale on which farther is larger: between `near` and `far`, by default
-/// its 1st and 99th percentile.
+/// Normalizes depth, (h, w), of any scale on which farther is larger, to the range from `near` to `far`. The defaults
+/// are the 1st and 99th percentiles.
 ///
 /// # Errors
-/// No number at all, or a range that is no range.
+/// Returns an error if no value is finite or the range is empty.
 pub fn relative(depth: ArrayView2<'_, f32>, near: Option<f32>, far: Option<f32>) -> Result<Array2<f32>> {
-    // What metres are normalized by takes numbers above 0 for readings.
+    // The normalization of metres treats only values above 0 as readings.
     let least = depth.iter().copied().fold(f32::INFINITY, f32::min);
     let shift = if least > 0.0 { 0.0 } else { 1.0 - least };
     let shifted = depth.mapv(|d| d + shift);
@@ -164,11 +165,11 @@ pub fn relative(depth: ArrayView2<'_, f32>, near: Option<f32>, far: Option<f32>)
     Ok(depth::normalize(shifted.view(), DepthUnit::Metres, near, far)?.depth)
 }
 
-/// The frame of `rgb`, (3, H, W), and of noisy or incomplete `depth`, (h, w), normalized, placed on a modulator:
-/// refined along the colour's edges.
+/// Creates a frame from `rgb`, (3, H, W), and noisy or incomplete normalized `depth`, (h, w), placed on a modulator.
+/// The depth is refined along the edges of the colour image.
 ///
 /// # Errors
-/// Shapes that are empty or too large.
+/// Returns an error if a shape is empty or too large.
 pub fn refined(rgb: &Array3<f32>, depth: &Array2<f32>, placement: &Placement) -> Result<RgbdFrame> {
     let (_, height, width) = rgb.dim();
     let crop = placement.depth_crop(depth.dim(), (height, width));
@@ -187,7 +188,7 @@ pub fn refined(rgb: &Array3<f32>, depth: &Array2<f32>, placement: &Placement) ->
     placement.frame(colour, to)
 }
 
-/// The nearest sample: an average across an edge would be a depth where nothing is.
+/// Resamples to the nearest value, because an average across an edge would be a depth that no surface has.
 fn nearest(plane: &Array2<f32>, (height, width): (usize, usize)) -> Array2<f32> {
     let (h, w) = plane.dim();
     Array2::from_shape_fn((height, width), |(y, x)| {
@@ -211,7 +212,7 @@ mod tests {
     fn depth_that_is_hardly_normalized_is_doubted() {
         let plane = |value: &dyn Fn(usize) -> f32| Array2::from_shape_fn((10, 10), |(y, x)| value(10 * y + x));
         assert_eq!(doubt(&plane(&|i| i as f32 / 99.0)), None);
-        // Millimetres of a room in 16 bits.
+        // Depths of an indoor scene in millimetres, stored in 16 bits.
         assert!(doubt(&plane(&|i| (800.0 + 40.0 * i as f32) / 65535.0)).is_some_and(|d| d.contains("7.3 %")));
         assert!(doubt(&plane(&|i| if i % 5 == 0 { 0.0 } else { 0.9 })).is_some_and(|d| d.contains("20 % of it is 0")));
     }

@@ -1,5 +1,4 @@
-//! Hologram files: modulator levels in a PNG, or a complex field in a `.npy`, with what is needed to look at them
-//! again.
+//! Hologram files: modulator levels in a PNG, or a complex field in a `.npy`, with the data needed to view them again.
 
 pub mod packed;
 mod views;
@@ -23,51 +22,51 @@ use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Name of the PNG text chunk that holds a [`HologramInfo`].
+/// The keyword of the PNG text chunk that holds a [`HologramInfo`].
 const PNG_CHUNK: &str = "phasefront";
 
-/// Name of the PNG text chunk by which it is known what a hologram was made of ([`read_made_of`]).
+/// The keyword of the PNG text chunk that records the source of a hologram ([`read_made_of`]).
 const MADE_OF_CHUNK: &str = "phasefront-made-of";
 
-/// What is needed to look at a hologram again; it travels with the file.
+/// The data needed to view a hologram again, stored with the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HologramInfo {
-    /// The display it was made for; the hologram stands at its offset.
+    /// The display that the hologram was made for. The hologram plane lies at its offset.
     pub display: Display,
-    /// How the field became phases; absent for a complex hologram.
+    /// The encoder that converted the field to phases. Absent for a complex hologram.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder: Option<String>,
-    /// The amplitude that full light stands for; absent for a complex hologram.
+    /// The field amplitude that full brightness represents. Absent for a complex hologram.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f32>,
     /// The modulator's look-up table, if it is not linear: the level of each of 256 phase steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lut: Option<Vec<u8>>,
-    /// The phase that each of the modulator's levels shows, in turns of 2π, if they are not even over one turn.
+    /// The phase of each modulator level, in turns of 2π, if the phases are not evenly spaced over one turn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub levels_turns: Option<Vec<f64>>,
-    /// What else of a calibrated display it was made for, as the display's file names it: its view needs that file.
+    /// The keys of the display file that name other calibration files. Viewing the hologram needs the display file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibrated: Vec<String>,
 }
 
-/// What full light may stand for: an amplitude of a field that was made of amplitudes up to 1.
+/// The valid range of the scale: an amplitude of a field computed from amplitudes up to 1.
 const SCALES: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 
-/// Most characters of an encoder's name and of a key of a display's file.
+/// The maximum length, in characters, of an encoder name or a key of a display file.
 const MOST_NAME: usize = 64;
 
 impl HologramInfo {
-    /// The text chunk that a PNG carries of it.
+    /// Returns the PNG text chunk for this info.
     fn chunk(&self, path: &Path) -> Result<(&'static str, String)> {
         let text = serde_json::to_string(self).map_err(|e| Error::file(path, e))?;
         Ok((PNG_CHUNK, text))
     }
 
-    /// Checks what a file says.
+    /// Checks the values read from a file.
     ///
     /// # Errors
-    /// Values that no hologram of ours has.
+    /// Returns an error if a value is one that this software never writes.
     fn check(&self) -> Result<()> {
         let refuse = |why: String| Err(Error::Input(why));
         if let Some(scale) = self.scale
@@ -98,10 +97,10 @@ impl HologramInfo {
         Ok(())
     }
 
-    /// The display as far as this says it.
+    /// Returns the display, as far as this info describes it.
     ///
     /// # Errors
-    /// A table that has not 256 entries, or a hologram for a display whose calibration is in files of its own.
+    /// Returns an error if a table does not have 256 entries or if the display's calibration is in separate files.
     pub fn display_file(&self) -> Result<DisplayFile> {
         if !self.calibrated.is_empty() {
             return Err(Error::Input(format!(
@@ -127,17 +126,17 @@ impl HologramInfo {
     }
 }
 
-/// Levels of a modulator, (C, H, W).
+/// The levels of a modulator, (C, H, W).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Levels {
-    /// Of up to 8 bits.
+    /// Levels of up to 8 bits.
     Bytes(Array3<u8>),
-    /// Of more.
+    /// Levels of more than 8 bits.
     Words(Array3<u16>),
 }
 
 impl Levels {
-    /// (C, H, W).
+    /// Returns the shape, (C, H, W).
     pub fn dim(&self) -> (usize, usize, usize) {
         match self {
             Levels::Bytes(levels) => levels.dim(),
@@ -145,7 +144,7 @@ impl Levels {
         }
     }
 
-    /// The hologram of them that `info` is about.
+    /// Combines the levels with `info` into a hologram.
     pub fn hologram(self, info: HologramInfo) -> Hologram {
         match self {
             Levels::Bytes(levels) => Hologram::PhaseOnly(levels, info),
@@ -154,21 +153,21 @@ impl Levels {
     }
 }
 
-/// A hologram as a file holds it.
+/// A hologram as stored in a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hologram {
-    /// Modulator levels, (C, H, W).
+    /// Modulator levels of up to 8 bits, (C, H, W).
     PhaseOnly(Array3<u8>, HologramInfo),
-    /// Modulator levels of over 8 bits, (C, H, W).
+    /// Modulator levels of more than 8 bits, (C, H, W).
     Words(Array3<u16>, HologramInfo),
     /// A complex field, (C, H, W).
     Complex(Array3<Complex32>, HologramInfo),
 }
 
-/// Writes a phase-only hologram, (C, H, W), as an 8-bit PNG of levels that carries `info`: RGB, or grey for one laser.
+/// Writes a phase-only hologram, (C, H, W), as an 8-bit PNG of levels that contains `info`: RGB, or grey for one laser.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &HologramInfo) -> Result<()> {
     write_bytes(path, levels, &[info.chunk(path)?])
 }
@@ -179,11 +178,11 @@ fn write_bytes(path: &Path, levels: ArrayView3<'_, u8>, texts: &[(&str, String)]
     write_png_of(path, shape, &interleaved(levels, |v| v), texts)
 }
 
-/// Writes a phase-only hologram of over 8 bits, (C, H, W), as a 16-bit PNG of levels that carries `info`: RGB, or grey
-/// for one laser.
+/// Writes a phase-only hologram of more than 8 bits, (C, H, W), as a 16-bit PNG of levels that contains `info`: RGB, or
+/// grey for one laser.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_words(path: &Path, levels: ArrayView3<'_, u16>, info: &HologramInfo) -> Result<()> {
     write_words_of(path, levels, &[info.chunk(path)?])
 }
@@ -199,10 +198,10 @@ fn write_words_of(path: &Path, levels: ArrayView3<'_, u16>, texts: &[(&str, Stri
     write_png_of(path, shape, &bytes, texts)
 }
 
-/// Writes `hologram` to the file of its kind.
+/// Writes `hologram` in the file format of its kind.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
     match hologram {
         Hologram::PhaseOnly(levels, info) => write_phase_only(path, levels.view(), info),
@@ -211,10 +210,10 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
     }
 }
 
-/// Writes the levels of `hologram`, and what they were made of, which [`read_made_of`] gives back.
+/// Writes the levels of `hologram` with the description `made_of`, which [`read_made_of`] returns.
 ///
 /// # Errors
-/// A file that cannot be written; a complex field.
+/// Returns an error if the file cannot be written or the hologram is a complex field.
 pub fn write_made_of(path: &Path, hologram: &Hologram, made_of: &str) -> Result<()> {
     let texts = [hologram.info().chunk(path)?, (MADE_OF_CHUNK, made_of.to_owned())];
     match hologram {
@@ -224,10 +223,10 @@ pub fn write_made_of(path: &Path, hologram: &Hologram, made_of: &str) -> Result<
     }
 }
 
-/// Writes a complex hologram, (C, H, W), as a `.npy` of complex64 with `info` in `NAME.json` beside it.
+/// Writes a complex hologram, (C, H, W), as a `.npy` of complex64, and `info` in `NAME.json` beside it.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &HologramInfo) -> Result<()> {
     let beside = beside(path)?;
     let text = serde_json::to_string_pretty(info).map_err(|e| Error::file(&beside, e))?;
@@ -240,17 +239,18 @@ pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &Holog
 /// Declares the two files of a complex hologram as outputs.
 ///
 /// # Errors
-/// Those of [`output::file`]; a `NAME.json` that does not belong to a hologram.
+/// Returns the errors of [`output::file`], and an error if an existing `NAME.json` does not belong to a hologram.
 pub fn declare_complex(path: &Path) -> Result<()> {
     output::file(path, &["npy"])?;
     output::file(&beside(path)?, &[])
 }
 
-/// The `NAME.json` of a complex hologram; one that is there is a hologram's, as only those are replaced.
+/// Returns the path of the `NAME.json` of a complex hologram. An existing file must belong to a hologram, because only
+/// those may be replaced.
 fn beside(path: &Path) -> Result<PathBuf> {
     let beside = path.with_extension("json");
     if beside.is_file() {
-        // Ours has a table of 1024 entries at most.
+        // A valid file has a table of at most 1024 entries.
         let is_small = std::fs::metadata(&beside).is_ok_and(|about| about.len() < 1 << 20);
         let is_ours =
             is_small && file::read_text(&beside).is_ok_and(|text| serde_json::from_str::<HologramInfo>(&text).is_ok());
@@ -265,10 +265,10 @@ fn beside(path: &Path) -> Result<PathBuf> {
     Ok(beside)
 }
 
-/// Reads a hologram: a PNG of levels that carries its [`HologramInfo`], or a `.npy` with its `.json`.
+/// Reads a hologram: a PNG of levels that contains its [`HologramInfo`], or a `.npy` with its `.json`.
 ///
 /// # Errors
-/// A file that is missing or cut short, or an image that is no hologram of ours.
+/// Returns an error if the file is missing, truncated, or not a hologram.
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
         let field = npy::read::<Complex32, Ix3>(&input::bytes(path, MOST_ARRAY)?)
@@ -299,7 +299,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
         .map_err(|why| Error::file(path, why))
 }
 
-/// The levels that `image` holds.
+/// Returns the levels in `image`.
 fn levels_of(image: DynamicImage, info: &HologramInfo) -> std::result::Result<Levels, String> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let shape @ (colours, ..) = (info.display.colours(), height, width);
@@ -335,7 +335,7 @@ fn words_of(levels: Vec<u16>, shape: Place, at: impl Fn(Place) -> usize) -> Leve
     Levels::Words(Array3::from_shape_fn(shape, |place| levels[at(place)]))
 }
 
-/// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
+/// Reads the [`HologramInfo`] of a PNG. Returns `None` for other images.
 fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
     let Some(text) = read_text(path, PNG_CHUNK)? else {
         return Ok(None);
@@ -346,17 +346,18 @@ fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
         .map_err(|e| Error::file(path, format!("its `{PNG_CHUNK}` text chunk is broken: {e}")))
 }
 
-/// What [`write_made_of`] noted in a PNG, and the hologram's scale; `None` where it noted nothing.
+/// Returns the description that [`write_made_of`] stored in a PNG and the hologram's scale, or `None` without a
+/// description.
 ///
 /// # Errors
-/// A file that cannot be read.
+/// Returns an error if the file cannot be read.
 pub fn read_made_of(path: &Path) -> Result<Option<(String, Option<f32>)>> {
     let made_of = read_text(path, MADE_OF_CHUNK)?;
     let scale = read_info(path)?.and_then(|info| info.scale);
     Ok(made_of.map(|made_of| (made_of, scale)))
 }
 
-/// The text chunk called `name` of a PNG, `None` where it has none or is no PNG.
+/// Returns the text chunk called `name` of a PNG, or `None` if there is no such chunk or the file is not a PNG.
 fn read_text(path: &Path, name: &str) -> Result<Option<String>> {
     let file = input::open(path, MOST_PICTURE)?;
     let Ok(reader) = png::Decoder::new(file).read_info() else {
@@ -366,10 +367,10 @@ fn read_text(path: &Path, name: &str) -> Result<Option<String>> {
     Ok((chunks.iter().find(|chunk| chunk.keyword == name)).map(|chunk| chunk.text.clone()))
 }
 
-/// Whether `path` holds a hologram of ours rather than a picture.
+/// Checks whether `path` holds a hologram and not an ordinary picture.
 ///
 /// # Errors
-/// A file that cannot be read.
+/// Returns an error if the file cannot be read.
 pub fn is_hologram(path: &Path) -> Result<bool> {
     Ok(has_extension(path, "npy") || read_info(path)?.is_some())
 }

@@ -1,4 +1,4 @@
-//! Files that are read. All reading begins here or in [`decode`], which open only regular files, and only up to a size.
+//! Reading of files. All input is opened here or in [`decode`], which accept only regular files up to a maximum size.
 
 pub mod decode;
 pub mod npy;
@@ -10,37 +10,37 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Most bytes of a picture: a photograph of 200 megapixels without compression.
+/// The maximum size of a picture in bytes: a photograph of 200 megapixels without compression.
 pub(crate) const MOST_PICTURE: u64 = 1 << 31;
-/// Most bytes of arrays, tables and pages: a complex hologram of 2²⁶ pixels and three colours.
+/// The maximum size of arrays, tables and pages in bytes: a complex hologram of 2²⁶ pixels and three colours.
 pub const MOST_ARRAY: u64 = 1 << 31;
-/// Most bytes of a photo with depth inside.
+/// The maximum size in bytes of a photo with embedded depth.
 pub(crate) const MOST_PHOTO: u64 = 1 << 28;
-/// Most bytes of a depth network: what a message of protobuf can have.
+/// The maximum size of a depth network in bytes, which is the limit of a protobuf message.
 pub const MOST_DEPTH_NETWORK: u64 = 1 << 31;
 
 /// Opens a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// An output of this command; a file that is missing, not regular or larger.
+/// Returns an error if the file is an output of this command, is missing, is not regular, or is larger.
 pub(crate) fn open(path: &Path, most: u64) -> Result<BufReader<File>> {
     output::reading(path)?;
     (file::open(path, most).map(BufReader::new)).map_err(|e| unread(path, &e))
 }
 
-/// The bytes of a regular file of at most `most` bytes.
+/// Reads a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// As `open`.
+/// Returns the errors of `open`.
 pub fn bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     output::reading(path)?;
     file::read(path, most).map_err(|e| unread(path, &e))
 }
 
-/// The text of a regular file of at most 16 MiB.
+/// Reads the text of a regular file of at most 16 MiB.
 ///
 /// # Errors
-/// As `open`; bytes that are not UTF-8.
+/// Returns the errors of `open`, and an error if the text is not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     output::reading(path)?;
     file::read_text(path).map_err(|e| unread(path, &e))
@@ -50,10 +50,10 @@ fn unread(path: &Path, why: &std::io::Error) -> Error {
     Error::file(path, format!("cannot be read: {why}"))
 }
 
-/// The bytes of a regular file of at most 2 GiB.
+/// Reads a regular file of at most 2 GiB.
 ///
 /// # Errors
-/// An output of this command; a file that is missing, not regular or larger.
+/// Returns an error if the file is an output of this command, is missing, is not regular, or is larger.
 pub fn read_file(path: &Path) -> Result<Vec<u8>> {
     bytes(path, MOST_ARRAY)
 }

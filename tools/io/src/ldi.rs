@@ -1,5 +1,5 @@
-//! Layered depth images (LDI): per pixel, the front-facing surfaces that a line of sight meets, front first
-//! (paper, Fig. 1), and the folder that holds one: `layer_0.png, depth_0.png, layer_1.png …`.
+//! Layered depth images (LDI): for each pixel, the front-facing surfaces along the line of sight, front first (paper,
+//! Fig. 1), stored in a folder as `layer_0.png, depth_0.png, layer_1.png …`.
 
 use crate::output::{self, Pending};
 use crate::picture::open_image;
@@ -14,24 +14,24 @@ use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
 
-/// A layered depth image: at least one layer, front first, all of one shape.
+/// A layered depth image: at least one layer, front first, all with the same shape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ldi {
-    /// The layers; layer 0 is what the viewer sees.
+    /// The layers. Layer 0 is the surface that the viewer sees.
     pub layers: Vec<LdiLayer>,
 }
 
-/// One layer of an [`Ldi`]: colour and depth of one hit a pixel.
+/// One layer of an [`Ldi`]: the colour and depth of at most one hit per pixel.
 #[derive(Debug, Clone)]
 pub struct LdiLayer {
-    /// Amplitudes, (3, H, W) in [0, 1], R G B. What stands where there is no hit means nothing.
+    /// The amplitudes, (3, H, W) in [0, 1], in R, G, B order. Values without a hit are arbitrary.
     pub rgb: Array3<f32>,
-    /// Normalized depth, (H, W): 0 nearest, 1 farthest, NaN where there is no hit.
+    /// The normalized depth, (H, W): 0 is nearest, 1 is farthest, and NaN means no hit.
     pub depth: Array2<f32>,
 }
 
 impl From<&RgbdFrame> for LdiLayer {
-    /// What a frame shows; the amplitude of one laser is that of all three colours.
+    /// Converts a frame to one layer. The single amplitude of one laser is used for all three colours.
     fn from(frame: &RgbdFrame) -> Self {
         let (height, width) = frame.shape();
         let rgb = frame.rgb();
@@ -44,7 +44,7 @@ impl From<&RgbdFrame> for LdiLayer {
 }
 
 impl PartialEq for LdiLayer {
-    /// Equal to the bit, NaN included.
+    /// Compares bit by bit, including NaN.
     fn eq(&self, other: &Self) -> bool {
         let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
         self.rgb.dim() == other.rgb.dim()
@@ -54,8 +54,8 @@ impl PartialEq for LdiLayer {
     }
 }
 
-/// The planes of [`phasefront_core::method::network::InputKind::Ldi`]: red, green, blue and depth of each layer in
-/// turn, each minus ½; black and farthest where there is no hit, or no such layer.
+/// Provides the planes of [`phasefront_core::method::network::InputKind::Ldi`]: red, green, blue and depth of each
+/// layer in turn, each minus ½. Pixels without a hit and absent layers are black and farthest.
 impl Source for Ldi {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
         let Some(layer) = self.layers.get(plane / 4) else {
@@ -75,14 +75,14 @@ impl Source for Ldi {
 }
 
 impl Ldi {
-    /// Checks the layers: one at least, all of one shape, colours and depths in [0, 1] (a depth may be NaN: no hit),
-    /// and no hit in front of a hit of an earlier layer.
+    /// Creates an LDI. Checks that there is at least one layer, that all layers have the same shape, that colours and
+    /// depths are in [0, 1] (or NaN depth, for no hit), and that no hit lies in front of a hit of an earlier layer.
     pub fn new(layers: Vec<LdiLayer>) -> Result<Self> {
         check_layers(&layers).map_err(|(_, reason)| Error::Input(reason))?;
         Ok(Self { layers })
     }
 
-    /// What the lasers of `display` show of it: of one laser all three colours are the luminance
+    /// Converts the colours for the lasers of `display`: for one laser, all three colours become the luminance
     /// ([`RgbdFrame::for_display`]).
     pub fn for_display(&self, display: &Display) -> Cow<'_, Self> {
         if display.colours() == 3 {
@@ -105,13 +105,13 @@ impl Ldi {
         })
     }
 
-    /// Height and width in pixels.
+    /// Returns the height and width in pixels.
     pub fn shape(&self) -> (usize, usize) {
         self.layers[0].depth.dim()
     }
 
-    /// The same with every value rounded to what the PNGs of [`write`](Self::write) hold: colours to 8 bits, depths
-    /// to 16, black where there is no hit. A hologram of it equals the one of the folder.
+    /// Rounds every value to the precision of the PNGs of [`write`](Self::write): colours to 8 bits, depths to 16,
+    /// black without a hit. The result and the written folder give the same hologram.
     pub fn quantized(&self) -> Self {
         let layers = self.layers.iter().map(|layer| {
             let (rgba, depth) = to_codes(layer);
@@ -123,8 +123,8 @@ impl Ldi {
         }
     }
 
-    /// Reads the folder `dir`. Colour PNGs are taken as RGBA of 8 bits (no alpha channel: every pixel is a hit), depth
-    /// PNGs are grey of 16 or 8 bits, d = value / 65535 or value / 255.
+    /// Reads the folder `dir`. Colour PNGs are read as RGBA of 8 bits. Without an alpha channel, every pixel is a hit.
+    /// Depth PNGs are grey of 16 or 8 bits, with d = value / 65535 or value / 255.
     pub fn read(dir: &Path) -> Result<Self> {
         output::reading(dir)?;
         let count = count_layers(dir)?;
@@ -136,9 +136,9 @@ impl Ldi {
         Ok(Self { layers })
     }
 
-    /// Writes the folder `dir`, made if it is absent; its parent must exist. All files are complete before the first
-    /// takes its place. In a folder that is there already, layers of an earlier LDI are replaced or removed and other
-    /// files are left alone.
+    /// Writes the folder `dir`, which is created if it is absent. Its parent must exist. All files are complete before
+    /// the first takes its place. In an existing folder, layers of an earlier LDI are replaced or removed and other
+    /// files stay.
     pub fn write(&self, dir: &Path) -> Result<()> {
         let is_new = !dir.is_dir();
         if is_new {
@@ -146,7 +146,7 @@ impl Ldi {
         }
         let written = self.write_into(dir);
         if is_new && written.is_err() {
-            // Only where nothing is in it.
+            // This removes the folder only if it is empty.
             let _ = fs::remove_dir(dir);
         }
         written
@@ -157,7 +157,7 @@ impl Ldi {
         for (index, layer) in self.layers.iter().enumerate() {
             files.push(write_layer(dir, index, layer)?);
         }
-        // Without its first layer a folder is no LDI: what a run that is killed here leaves is refused, not misread.
+        // A folder without its first layer is not a valid LDI, so readers reject the remains of an interrupted run.
         remove_layer(dir, 0)?;
         for index in stored_layers(dir)? {
             if index >= self.layers.len() {
@@ -190,7 +190,7 @@ fn depth_name(index: usize) -> String {
     format!("depth_{index}.png")
 }
 
-/// What is wrong with the layers, if anything, and with which.
+/// Checks the layers. The error holds the index of the invalid layer and the reason.
 fn check_layers(layers: &[LdiLayer]) -> std::result::Result<(), (usize, String)> {
     let Some(first) = layers.first() else {
         return Err((0, "a layered depth image needs at least one layer".into()));
@@ -227,7 +227,8 @@ fn check_layers(layers: &[LdiLayer]) -> std::result::Result<(), (usize, String)>
     Ok(())
 }
 
-/// The layer's RGBA (H, W, 4) in 8 bits and depth (H, W) in 16. No hit: all zero, depth farthest.
+/// Returns the layer's RGBA, (H, W, 4), in 8 bits and its depth, (H, W), in 16 bits. Without a hit, colours and alpha
+/// are zero and the depth is farthest.
 fn to_codes(layer: &LdiLayer) -> (Vec<u8>, Vec<u16>) {
     let (height, width) = layer.depth.dim();
     let mut rgba = Vec::with_capacity(height * width * 4);
@@ -245,12 +246,12 @@ fn to_codes(layer: &LdiLayer) -> (Vec<u8>, Vec<u16>) {
     (rgba, depth)
 }
 
-/// The depth that 16 bits of a file stand for.
+/// Converts a 16-bit depth code of a file to normalized depth.
 pub fn depth_of_code(code: u16) -> f32 {
     f32::from(code) / 65535.0
 }
 
-/// The inverse of [`to_codes`], with the depths already decoded.
+/// Inverts [`to_codes`], with the depths already decoded.
 fn from_codes((height, width): (usize, usize), rgba: &[u8], depths: &[f32]) -> LdiLayer {
     let hit = |pixel: usize| rgba[4 * pixel + 3] > 0;
     LdiLayer {
@@ -269,7 +270,7 @@ fn from_codes((height, width): (usize, usize), rgba: &[u8], depths: &[f32]) -> L
     }
 }
 
-/// The indices of the layers that the folder holds, ascending.
+/// Returns the layer indices in the folder, ascending.
 fn stored_layers(dir: &Path) -> Result<Vec<usize>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(dir).map_err(|e| Error::file(dir, e))? {
@@ -290,7 +291,7 @@ fn stored_layers(dir: &Path) -> Result<Vec<usize>> {
     Ok(found)
 }
 
-/// How many layers the folder holds, numbered without a gap.
+/// Returns the number of layers in the folder. Their numbers must have no gap.
 fn count_layers(dir: &Path) -> Result<usize> {
     let found = stored_layers(dir)?;
     if found.is_empty() {
@@ -338,7 +339,7 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
     Ok(from_codes((height as usize, width as usize), colour.as_raw(), &depths))
 }
 
-/// The layer's two files, which are not in their places yet.
+/// Writes the layer's two files, without putting them in place yet.
 fn write_layer(dir: &Path, index: usize, layer: &LdiLayer) -> Result<(Pending, Pending)> {
     let (height, width) = layer.depth.dim();
     let (rgba, depth) = to_codes(layer);
@@ -370,7 +371,7 @@ mod tests {
 
     use super::*;
 
-    /// Two layers of 7x5 with values that do not fall on codes, and holes.
+    /// Creates two layers of 7×5 pixels with holes and with values that lie between codes.
     fn sample() -> Ldi {
         let layer = |base: f32, hole: usize| LdiLayer {
             rgb: Array3::from_shape_fn((3, 5, 7), |(c, y, x)| ((c * 35 + y * 7 + x) as f32 * 0.618) % 1.0),
@@ -478,7 +479,7 @@ mod tests {
         );
     }
 
-    /// The error names the file `name` and says `reason`.
+    /// Asserts that reading fails with an error that names the file `name` and contains `reason`.
     fn assert_refused(dir: &Path, name: &str, reason: &str) {
         let message = Ldi::read(dir).unwrap_err().to_string();
         assert!(message.contains(name) && message.contains(reason), "{message}");

@@ -1,31 +1,31 @@
-//! PSNR and SSIM of amplitudes, the paper's measures: peak 1, each colour on its own and overall.
+//! PSNR and SSIM of amplitudes, as in the paper: with a peak of 1, for each colour and overall.
 
 use crate::{Error, Result};
 use ndarray::{Array2, ArrayView2, ArrayView3, Axis, Zip};
 use serde::Serialize;
 
-/// Standard deviation of SSIM's window, pixels (Wang et al., IEEE TIP 13, 600, 2004).
+/// The standard deviation of SSIM's window, in pixels (Wang et al., IEEE TIP 13, 600, 2004).
 const SSIM_SIGMA: f64 = 1.5;
-/// Its half width: 11×11.
+/// The half width of SSIM's window, which has 11×11 pixels.
 const SSIM_HALF: usize = 5;
 
-/// How alike two stacks of amplitudes are.
+/// The similarity of two stacks of amplitudes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Of each colour, dB.
+    /// The PSNR of each colour, in dB.
     pub psnr: Vec<f64>,
-    /// Over all values of all colours, dB.
+    /// The PSNR over all values of all colours, in dB.
     pub psnr_overall: f64,
-    /// Of each colour.
+    /// The SSIM of each colour.
     pub ssim: Vec<f64>,
-    /// The mean of the colours.
+    /// The mean SSIM of the colours.
     pub ssim_overall: f64,
 }
 
 /// Compares `a` with `b`, both (C, H, W).
 ///
 /// # Errors
-/// Shapes that differ.
+/// Returns an error if the shapes differ.
 pub fn compare(a: ArrayView3<'_, f32>, b: ArrayView3<'_, f32>) -> Result<Comparison> {
     let ((ca, ha, wa), (cb, hb, wb)) = (a.dim(), b.dim());
     if (ha, wa) != (hb, wb) {
@@ -50,7 +50,7 @@ pub fn compare(a: ArrayView3<'_, f32>, b: ArrayView3<'_, f32>) -> Result<Compari
     })
 }
 
-/// Peak signal-to-noise ratio for a peak of 1, from the mean square of the difference.
+/// Returns the peak signal-to-noise ratio for a peak of 1 and this mean squared difference.
 fn decibels(mean_square: f64) -> f64 {
     -10.0 * mean_square.log10()
 }
@@ -62,8 +62,8 @@ fn mean_square(a: ArrayView2<'_, f32>, b: ArrayView2<'_, f32>) -> f64 {
     sum / a.len() as f64
 }
 
-/// The mean structural similarity of two planes over the places where the 11×11 Gaussian window
-/// (σ 1.5) fits; in a plane smaller than that the window shrinks to fit.
+/// Computes the mean structural similarity of two planes over all positions where the 11×11 Gaussian window (σ 1.5)
+/// fits. In a smaller plane the window shrinks to fit.
 pub fn ssim(a: ArrayView2<'_, f32>, b: ArrayView2<'_, f32>) -> f64 {
     let (height, width) = a.dim();
     let half = SSIM_HALF.min((height.min(width) - 1) / 2);
@@ -86,7 +86,7 @@ pub fn ssim(a: ArrayView2<'_, f32>, b: ArrayView2<'_, f32>) -> f64 {
     similarity.sum() / similarity.len() as f64
 }
 
-/// The Gaussian window's mean where it fits: (H − 2·half, W − 2·half).
+/// Computes the mean under the Gaussian window at all positions where it fits: (H − 2·half, W − 2·half).
 fn window(plane: &Array2<f64>, half: usize) -> Array2<f64> {
     let weight = |i: usize| (-0.5 * ((i as f64 - half as f64) / SSIM_SIGMA).powi(2)).exp();
     let sum: f64 = (0..=2 * half).map(weight).sum();
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
     use ndarray::Array3;
 
-    /// SSIM by its definition: a double sum over each window.
+    /// Computes SSIM by its definition, as a double sum over each window.
     fn naive_ssim(a: &Array2<f32>, b: &Array2<f32>) -> f64 {
         let (h, w) = a.dim();
         let g = |i: usize, j: usize| (-((i as f64 - 5.0).powi(2) + (j as f64 - 5.0).powi(2)) / (2.0 * 1.5 * 1.5)).exp();

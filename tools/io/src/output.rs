@@ -1,8 +1,9 @@
-//! Where a command writes: its outputs are checked before work begins, and files are written whole or not at all.
+//! The outputs of a command. They are checked before work begins, and files are written whole or not at all.
 //!
 //! A command calls [`file()`] or [`folder`] for each of its outputs before it computes anything. Readers call
-//! [`reading`] for each file that they open. Whichever comes first, a file that is both an input and an output is
-//! refused, also by another name, a link or a hard link. [`write_atomically`] writes beside the place and renames.
+//! [`reading`] for each file that they open. A file that is both an input and an output is refused, whichever call
+//! comes first, even under another name or through a symbolic or hard link. [`write_atomically`] writes a temporary
+//! file beside the target and renames it.
 
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,30 +14,30 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
-/// What an output folder may hold before the command writes into it. Hidden files do not count.
+/// The permitted contents of an output folder before the command writes into it. Hidden files do not count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Holding<'a> {
-    /// Nothing.
+    /// The folder must be empty.
     Nothing,
-    /// Anything: files of the same names are replaced, others stay.
+    /// Any contents are allowed. Files with the same names are replaced and others stay.
     Anything,
-    /// Nothing, or an earlier run, which the file of this name belongs to.
+    /// The folder must be empty or hold an earlier run, identified by a file of this name.
     RunOf(&'a str),
 }
 
 impl Holding<'_> {
-    /// What `--overwrite` says.
+    /// Converts the flag `--overwrite`.
     pub fn by_flag(overwrite: bool) -> Self {
         if overwrite { Self::Anything } else { Self::Nothing }
     }
 }
 
-/// Declares `path` an output of this command: a file that is absent or regular, in a folder that can be written to. Its
-/// name ends in one of `extensions`, or in anything where there are none.
+/// Declares `path` as an output of this command: an absent or regular file in a writable folder. Its extension must be
+/// one of `extensions`, unless that list is empty.
 ///
 /// # Errors
-/// Another name; a folder, a device, a pipe, a link to nothing; an input; another output; no such folder, or no right
-/// to write there.
+/// Returns an error if the name has another extension, if the path is a folder, a device, a pipe, a dangling link, an
+/// input or another output, or if its folder does not exist or is not writable.
 pub fn file(path: &Path, extensions: &[&str]) -> Result<()> {
     extension(path, extensions)?;
     let place = Place::of_file(path)?;
@@ -44,10 +45,10 @@ pub fn file(path: &Path, extensions: &[&str]) -> Result<()> {
     places().add_output(place)
 }
 
-/// Checks that the name of `path` ends in one of `extensions`, where there are any.
+/// Checks that `path` has one of the extensions in `extensions`, unless that list is empty.
 ///
 /// # Errors
-/// Another name.
+/// Returns an error if the extension is another.
 pub fn extension(path: &Path, extensions: &[&str]) -> Result<()> {
     if extensions.is_empty() || extensions.iter().any(|extension| has_extension(path, extension)) {
         return Ok(());
@@ -56,18 +57,19 @@ pub fn extension(path: &Path, extensions: &[&str]) -> Result<()> {
     Err(Error::file(path, format!("the name must end in {right}")))
 }
 
-/// Checks that `path` may be a file that this command changes, and reads for that.
+/// Checks that `path` can be a file that this command reads and changes.
 ///
 /// # Errors
-/// A folder, a device, a pipe, a link to nothing; no such folder, or no right to write there.
+/// Returns an error if the path is a folder, a device, a pipe or a dangling link, or if its folder does not exist or is
+/// not writable.
 pub fn check_file(path: &Path) -> Result<()> {
     Place::of_file(path)?.check_writable()
 }
 
-/// Declares `path` an output file of this command that must not exist yet, unless `overwrite` is set.
+/// Declares `path` as an output file of this command that must not exist yet, unless `overwrite` is set.
 ///
 /// # Errors
-/// Those of [`file()`]; a file that is there.
+/// Returns the errors of [`file()`], and an error if the file exists.
 pub fn new_file(path: &Path, extensions: &[&str], overwrite: bool) -> Result<()> {
     file(path, extensions)?;
     if path.exists() && !overwrite {
@@ -76,11 +78,11 @@ pub fn new_file(path: &Path, extensions: &[&str], overwrite: bool) -> Result<()>
     Ok(())
 }
 
-/// Declares `path` a folder that this command fills. It is made by [`make_folder`], when there is something to write.
+/// Declares `path` as a folder that this command fills. [`make_folder`] creates it when there is something to write.
 ///
 /// # Errors
-/// A file; a folder that holds more than `holding` allows; an input; a parent that is a file, or no right to write
-/// there.
+/// Returns an error if the path is a file or an input, if the folder holds more than `holding` allows, or if its parent
+/// is a file or not writable.
 pub fn folder(path: &Path, holding: Holding) -> Result<()> {
     if path.exists() && !path.is_dir() {
         return Err(Error::file(path, "is a file; the name of a folder is needed"));
@@ -111,28 +113,28 @@ pub fn folder(path: &Path, holding: Holding) -> Result<()> {
     places().add_output(place)
 }
 
-/// Notes that this command reads `path`.
+/// Records that this command reads `path`.
 ///
 /// # Errors
-/// An output of this command.
+/// Returns an error if the path is an output of this command.
 pub fn reading(path: &Path) -> Result<()> {
     places().add_input(path)
 }
 
-/// Notes that this command reads the files of the folder at `path`; some may not be read before much work is done.
+/// Records that this command reads the files in the folder at `path`, some of which it may open only later.
 ///
 /// # Errors
-/// Those of [`reading`]. A folder that cannot be read is left to whoever reads it.
+/// Returns the errors of [`reading`]. A folder that cannot be listed is not reported here but by its reader.
 pub fn reading_folder(path: &Path) -> Result<()> {
     reading(path)?;
     let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
     entries.map(|entry| entry.path()).try_for_each(|path| reading(&path))
 }
 
-/// Makes the folder at `path` and those that it lies in, where they are not there.
+/// Creates the folder at `path` and its missing parents.
 ///
 /// # Errors
-/// What the system refuses.
+/// Returns an error if the system refuses.
 pub fn make_folder(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path).map_err(|e| Error::file(path, format!("cannot be made: {e}")))
 }
@@ -140,7 +142,7 @@ pub fn make_folder(path: &Path) -> Result<()> {
 /// Lets `write` fill a temporary file beside `path`, waits until it is on the disk, and renames it to `path`.
 ///
 /// # Errors
-/// Whatever goes wrong, naming `path`; what was there is left as it was.
+/// Returns an error that names `path` if a step fails. An existing file then stays unchanged.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
@@ -148,17 +150,17 @@ pub fn write_atomically(
     Pending::write(path, write)?.place()
 }
 
-/// As [`write_atomically`], where `write` is another program, which fills a file by its name.
+/// Does the same as [`write_atomically`] with another program, which `write` runs with the name of the temporary file.
 ///
 /// # Errors
-/// Whatever goes wrong; what was there is left as it was.
+/// Returns an error if a step fails. An existing file then stays unchanged.
 pub(crate) fn write_by_name(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let pending = Pending::begin(path)?;
     write(pending.file.path())?;
     pending.synced()?.place()
 }
 
-/// A file that is written, but not in its place yet. Dropped, it goes.
+/// A temporary file that is not in its place yet. Dropping it deletes it.
 pub(crate) struct Pending {
     path: PathBuf,
     real: PathBuf,
@@ -166,7 +168,7 @@ pub(crate) struct Pending {
 }
 
 impl Pending {
-    /// As [`write_atomically`], without the last step.
+    /// Performs [`write_atomically`] up to the renaming.
     pub(crate) fn write(
         path: &Path,
         write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
@@ -180,13 +182,13 @@ impl Pending {
         pending.synced()
     }
 
-    /// An empty file.
+    /// Creates an empty temporary file.
     fn begin(path: &Path) -> Result<Self> {
         let real = Place::of_file(path)?.real;
         let parent = real.parent().unwrap_or(Path::new("."));
         remove_left_over(parent);
         let file = temporary_in(parent).map_err(|e| cannot_write(path, &e))?;
-        // The lock tells other runs that the file is in use. A file system without locks writes all the same.
+        // The lock tells other runs that the file is in use. Writing also works on file systems without locks.
         let _ = file.as_file().try_lock();
         Ok(Self {
             path: path.to_owned(),
@@ -201,7 +203,7 @@ impl Pending {
         synced.map_err(|e| cannot_write(&self.path, &e)).map(|()| self)
     }
 
-    /// Puts the file into its place.
+    /// Renames the file to its final path.
     pub(crate) fn place(self) -> Result<()> {
         let Self { path, real, file } = self;
         file.persist(real).map_err(|e| cannot_write(&path, &e.error))?;
@@ -213,14 +215,15 @@ fn cannot_write(path: &Path, why: &std::io::Error) -> Error {
     Error::file(path, format!("cannot be written: {why}"))
 }
 
-/// Temporary files are named `.phasefront-`, 12 letters or digits, `.tmp`: no other file is ever removed.
+/// The prefix of temporary files, which are named `.phasefront-`, 12 letters or digits, `.tmp`. No other file is ever
+/// removed.
 const PREFIX: &str = ".phasefront-";
 
 const SUFFIX: &str = ".tmp";
 
 const RANDOM: usize = 12;
 
-/// How old a temporary file must be to be thought left over: none is unlocked that long.
+/// The minimum age of an abandoned temporary file. A file in use is never unlocked for that long.
 const LEFT_OVER: Duration = Duration::from_secs(60);
 
 fn temporary_in(folder: &Path) -> std::io::Result<NamedTempFile> {
@@ -228,7 +231,7 @@ fn temporary_in(folder: &Path) -> std::io::Result<NamedTempFile> {
     builder.prefix(PREFIX).suffix(SUFFIX).rand_bytes(RANDOM);
     #[cfg(unix)]
     {
-        // A temporary file is its owner's alone unless it is said; the umask takes from this as from any other file.
+        // Temporary files are private by default. This requests the mode of ordinary files, to which the umask applies.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
@@ -240,8 +243,8 @@ fn is_temporary(name: &str) -> bool {
     random.is_some_and(|random| random.len() == RANDOM && random.bytes().all(|b| b.is_ascii_alphanumeric()))
 }
 
-/// Removes the temporary files in `folder` that killed runs left: regular files of [`temporary_in`]'s names that no
-/// process holds. Once a folder, as far as it can be done.
+/// Removes the temporary files that killed runs left in `folder`: regular files named as by [`temporary_in`] that no
+/// process has locked. This runs once per folder and ignores failures.
 fn remove_left_over(folder: &Path) {
     static DONE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     if !DONE.lock().is_ok_and(|mut done| done.insert(folder.to_owned())) {
@@ -254,7 +257,8 @@ fn remove_left_over(folder: &Path) {
         if !entry.file_name().to_str().is_some_and(is_temporary) {
             continue;
         }
-        // This does not follow links. What is not a regular file is not opened: a pipe would wait for its writer.
+        // This call does not follow links. Only regular files are opened, because opening a pipe would wait for its
+        // writer.
         let Some(about) = entry.metadata().ok().filter(Metadata::is_file) else {
             continue;
         };
@@ -266,14 +270,14 @@ fn remove_left_over(folder: &Path) {
     }
 }
 
-/// What tells one file from another, whatever names it has.
+/// The identity of a file, independent of its names.
 #[cfg(unix)]
 type Identity = (u64, u64);
 
 #[cfg(not(unix))]
 type Identity = PathBuf;
 
-/// `None` where nothing is there.
+/// Returns the identity of the file at `path`, or `None` if there is none.
 #[cfg(unix)]
 fn identity(path: &Path) -> Option<Identity> {
     use std::os::unix::fs::MetadataExt;
@@ -286,19 +290,19 @@ fn identity(path: &Path) -> Option<Identity> {
     std::fs::canonicalize(path).ok()
 }
 
-/// Where an output goes.
+/// The location of an output.
 #[derive(Debug, Clone)]
 struct Place {
-    /// As the user names it.
+    /// The path given by the user.
     path: PathBuf,
-    /// Without links.
+    /// The path with links resolved.
     real: PathBuf,
     identity: Option<Identity>,
     is_folder: bool,
 }
 
 impl Place {
-    /// The place of a file. A link is followed, so that the file that it points to is replaced and the link stays.
+    /// Creates the place of a file. A link is followed, so that its target is replaced and the link stays.
     fn of_file(path: &Path) -> Result<Self> {
         let place = |real| Self {
             path: path.to_owned(),
@@ -349,7 +353,7 @@ impl Place {
         })
     }
 
-    /// Tries whether files can be made here, or in the folder that this folder will lie in.
+    /// Checks that files can be created here, or in the nearest existing parent of this folder.
     fn check_writable(&self) -> Result<()> {
         let start = if self.is_folder {
             Some(&*self.real)
@@ -357,7 +361,7 @@ impl Place {
             self.real.parent()
         };
         let nearest = start.and_then(|path| path.ancestors().find(|path| path.exists()));
-        // On most systems this file has no name, and none is left behind.
+        // On most systems this file has no name, so nothing can be left behind.
         tempfile::tempfile_in(nearest.unwrap_or(Path::new("."))).map_err(|e| cannot_write(&self.path, &e))?;
         Ok(())
     }
@@ -367,7 +371,7 @@ impl Place {
     }
 }
 
-/// The outputs and the inputs of this process's command.
+/// The outputs and inputs of the command that this process runs.
 #[derive(Default)]
 struct Places {
     outputs: Vec<Place>,
@@ -424,7 +428,7 @@ fn both(output: &Path, input: &Path) -> Error {
     )
 }
 
-/// Whether a folder is absent or holds nothing but hidden files.
+/// Checks whether a folder is absent or contains only hidden files.
 fn is_empty(folder: &Path) -> Result<bool> {
     if !folder.exists() {
         return Ok(true);
@@ -439,7 +443,7 @@ fn is_empty(folder: &Path) -> Result<bool> {
     Ok(true)
 }
 
-/// `.png`, `.png or .webp`, `.png, .jpg or .webp`.
+/// Formats extensions as `.png`, `.png or .webp`, or `.png, .jpg or .webp`.
 fn alternatives(extensions: &[&str]) -> String {
     let dotted: Vec<_> = extensions.iter().map(|extension| format!(".{extension}")).collect();
     match &dotted[..] {
@@ -448,7 +452,7 @@ fn alternatives(extensions: &[&str]) -> String {
     }
 }
 
-/// Whether the name of `path` ends in `.extension`.
+/// Checks whether `path` has the extension `extension`, ignoring case.
 pub fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
 }

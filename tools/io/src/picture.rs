@@ -1,4 +1,4 @@
-//! Colour pictures: read as amplitudes or bytes, written as PNG.
+//! Colour pictures, read as amplitudes or bytes and written as PNG.
 
 pub mod depth_map;
 pub mod export;
@@ -12,25 +12,27 @@ use image::{DynamicImage, RgbImage};
 use ndarray::{Array3, ArrayView3};
 use std::path::Path;
 
-/// The picture in the file at `path`, upright.
+/// Opens the picture at `path` and turns it upright.
 pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
     decode::open_picture(path, Reading::UPRIGHT).map(|(image, _)| image)
 }
 
-/// The amplitudes of an image, (3, H, W) in \[0, 1], upright. Grey images have three equal colours; alpha is left out.
+/// Reads the amplitudes of an image, (3, H, W) in \[0, 1], upright. Grey images give three equal colours. Alpha is
+/// ignored.
 ///
 /// # Errors
-/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
+/// Returns an error if the file is missing, truncated, or not one of
+/// [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
 pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
     open_image(path).map(amplitudes)
 }
 
-/// The amplitudes of `image`, (3, H, W) in \[0, 1].
+/// Converts `image` to amplitudes, (3, H, W) in \[0, 1].
 pub fn amplitudes(image: DynamicImage) -> Array3<f32> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let amplitudes =
         |at: &dyn Fn(usize) -> f32| Array3::from_shape_fn((3, height, width), |(c, y, x)| at(3 * (y * width + x) + c));
-    // Not by way of floats: that would be all of it twice.
+    // A conversion through float images would need twice the memory.
     match image {
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
@@ -46,33 +48,34 @@ pub fn amplitudes(image: DynamicImage) -> Array3<f32> {
     }
 }
 
-/// The (H, W) of an image, upright, and its pixels as rows of RGB bytes. Grey images have three equal colours; alpha is
-/// left out.
+/// Reads the (H, W) of an image, upright, and its pixels as rows of RGB bytes. Grey images give three equal colours.
+/// Alpha is ignored.
 ///
 /// # Errors
-/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
+/// Returns an error if the file is missing, truncated, or not one of
+/// [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
 pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
     let image = open_image(path)?.into_rgb8();
     let shape = (image.height() as usize, image.width() as usize);
     Ok((shape, image.into_raw()))
 }
 
-/// Writes amplitudes, (C, H, W), as an 8-bit RGB PNG; what is over 1 is white, and one laser's are grey.
+/// Writes amplitudes, (C, H, W), as an 8-bit RGB PNG. Values above 1 are clipped, and one laser's are grey.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     let bytes = amplitude_bytes(amplitude);
     let (_, height, width) = amplitude.dim();
     write_png_of(path, PngShape::of_levels(3, height, width), &bytes, &[])
 }
 
-/// Amplitudes, (C, H, W), as rows of RGB bytes; one laser's are grey.
+/// Converts amplitudes, (C, H, W), to rows of RGB bytes. One laser's are grey.
 pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
     interleaved(as_rgb(&amplitude), |v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
-/// A stack of (C, H, W) as one of (3, H, W): one laser's plane is all three.
+/// Views a stack of (C, H, W) as (3, H, W). A single plane is repeated for all three colours.
 pub fn as_rgb<'a, T>(stack: &'a ArrayView3<'_, T>) -> ArrayView3<'a, T> {
     let (_, height, width) = stack.dim();
     stack.broadcast((3, height, width)).expect("three colours or one")
@@ -86,17 +89,17 @@ pub(crate) fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) ->
 /// Writes an 8-bit RGB PNG.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
     let (width, height) = picture.dimensions();
     let shape = PngShape::of_levels(3, height as usize, width as usize);
     write_png_of(path, shape, picture.as_raw(), &[])
 }
 
-/// Writes an 8-bit RGBA PNG of rows of `rgba`.
+/// Writes rows of `rgba` as an 8-bit RGBA PNG.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Result<()> {
     let shape = PngShape {
         width,
@@ -107,7 +110,7 @@ pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Resu
     write_png_of(path, shape, rgba, &[])
 }
 
-/// Size and kind of a PNG's pixels.
+/// The size and type of a PNG's pixels.
 #[derive(Clone, Copy)]
 pub(crate) struct PngShape {
     pub(crate) width: usize,
@@ -117,7 +120,7 @@ pub(crate) struct PngShape {
 }
 
 impl PngShape {
-    /// Of (`colours`, `height`, `width`) bytes.
+    /// Creates the shape of (`colours`, `height`, `width`) bytes.
     pub(crate) fn of_levels(colours: usize, height: usize, width: usize) -> Self {
         PngShape {
             width,
@@ -128,7 +131,7 @@ impl PngShape {
     }
 }
 
-/// What a PNG of so many colours is: RGB, or grey for one laser.
+/// Returns the PNG colour type for a number of colours: RGB, or grey for one laser.
 pub(crate) fn png_color(colours: usize) -> png::ColorType {
     match colours {
         1 => png::ColorType::Grayscale,
@@ -136,12 +139,12 @@ pub(crate) fn png_color(colours: usize) -> png::ColorType {
     }
 }
 
-/// Writes a PNG of rows of `pixels`, words big-endian, with text chunks of these names.
+/// Writes rows of `pixels` as a PNG with text chunks of these names. 16-bit values are big-endian.
 pub(crate) fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], texts: &[(&str, String)]) -> Result<()> {
     pending_png(path, shape, pixels, texts)?.place()
 }
 
-/// As [`write_png_of`], not in its place yet.
+/// Performs [`write_png_of`] without putting the file in place yet.
 pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], texts: &[(&str, String)]) -> Result<Pending> {
     Pending::write(path, |file| {
         let mut encoder = png::Encoder::new(file, shape.width as u32, shape.height as u32);

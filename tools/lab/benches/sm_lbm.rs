@@ -1,9 +1,10 @@
-//! How fast SM-LBM is beside what its speed depends on: two bare 2D transforms of rustfft a plane, of the same
-//! padded size, on the same threads, in the same run. `cargo bench --bench sm_lbm`
+//! Compares the time of SM-LBM with that of two plain 2D transforms by rustfft for each plane, of the same padded size,
+//! on the same threads, in the same run. Run it with `cargo bench --bench sm_lbm`.
 //!
-//! The scenes are as dense as can be: every plane has points in every row, so that no row is left out. A 2D transform
-//! by rustfft, which is 1D, is its rows, a transposition (the crate that rustfft itself uses) and its columns, and
-//! stays transposed. Beside it stand the 1D transforms alone, as if columns could be transformed where they lie.
+//! The scenes have the highest density: every plane has points in every row, so no row is skipped. rustfft computes 1D
+//! transforms, so a 2D transform consists of the rows, a transposition (by the crate that rustfft itself uses) and the
+//! columns, and its result stays transposed. The benchmark also times the 1D transforms alone, as if columns could be
+//! transformed in place.
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
@@ -20,7 +21,7 @@ use std::time::Instant;
 
 const ROUNDS: usize = 5;
 
-/// 2D transforms of a plane without all that is between them.
+/// Plain 2D transforms of a plane, without the other steps of SM-LBM.
 struct Bare {
     row: [Arc<dyn Fft<f32>>; 2],
     column: [Arc<dyn Fft<f32>>; 2],
@@ -54,7 +55,7 @@ impl Bare {
         }
     }
 
-    /// All lines of `plane` by `fft`.
+    /// Transforms all lines of `plane` by `fft`.
     fn lines(fft: &dyn Fft<f32>, plane: &mut [Complex32], scratch: &mut [Complex32], parts: usize) {
         let lines = plane.len() / fft.len();
         let piece = scratch.len() / parts;
@@ -64,7 +65,7 @@ impl Bare {
             .for_each(|(lines, scratch)| fft.process_with_scratch(lines, scratch));
     }
 
-    /// `planes` times forward and back: rows, columns; columns, rows.
+    /// Transforms forward and back `planes` times: rows, columns; columns, rows.
     fn run(&mut self, planes: usize, transpose: bool) {
         let (height, width) = self.shape;
         let Bare {

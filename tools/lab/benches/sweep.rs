@@ -1,9 +1,9 @@
-//! How fast the plane sweep is on a frame, for several planes, tiles and hidden layers: medians of frames after one
-//! that is not counted. Then the default sweep of frames of that size that are all of one depth, and as bad as can be:
-//! another depth at each pixel, and near and far in turn.
+//! Measures the time of the plane sweep on a frame, for several planes, tiles and hidden layers, as medians over frames
+//! after an uncounted first one. It then measures the default sweep on frames of the same size with the easiest and the
+//! hardest depths: one depth everywhere, a different depth at each pixel, and near and far alternating.
 //!
 //!     cargo bench --bench sweep -- $PWD/samples/scene_rgb.jpg $PWD/samples/scene_depth.png \
-//!         [THREADS] [PLANES TAPS LAYERS TILE]
+//!       [THREADS] [PLANES TAPS LAYERS TILE]
 
 use ndarray::Array2;
 use num_complex::Complex32;
@@ -97,7 +97,7 @@ fn main() -> Result<()> {
     })
 }
 
-/// The sweep that is asked for by its four numbers, or all that are of interest.
+/// Returns the sweep of the four given numbers, or all sweeps to measure.
 fn sweeps(display: &Display, numbers: &[usize]) -> Vec<Sweep> {
     let default = Sweep::for_display(display);
     if let [_, planes, taps, hidden_layers, tile] = *numbers {

@@ -1,4 +1,4 @@
-//! The commands of `phasefront-lab`: one file a command, with its flags and what it does.
+//! The commands of `phasefront-lab`. Each command has a file with its flags and its implementation.
 
 mod dataset;
 mod evaluate;
@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 use phasefront_command::start::Common;
 use phasefront_io::Result;
 
-/// The rule for what outputs replace.
+/// The help text on the files that outputs replace.
 const FILES: &str = "\
 Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
 folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \

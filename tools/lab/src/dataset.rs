@@ -1,16 +1,15 @@
-//! Data sets: pairs of a random scene's layered depth image and its hologram by SM-LBM, in files
-//! that NumPy opens.
+//! Data sets: pairs of a random scene's layered depth image and its SM-LBM hologram, in files that NumPy can open.
 //!
-//! A folder holds `manifest.json` and a `pair_000123.npz` for each scene with the arrays `rgb`, uint8
-//! (L, H, W, 4), RGBA, front first, alpha 0 where there is no hit; `depth`, uint16 (L, H, W), d·65535;
-//! and `hologram`, complex64 (C, H, W), C being 1 for a display of one laser, at the midpoint, carrier left out.
+//! A folder holds `manifest.json` and, for each scene, a `pair_000123.npz` with three arrays: `rgb`, uint8 (L, H, W,
+//! 4), RGBA, front first, with alpha 0 at pixels without a hit; `depth`, uint16 (L, H, W), d·65535; and `hologram`,
+//! complex64 (C, H, W), at the midpoint, without the carrier. C is 1 for a display with one laser.
 //!
-//! For a display with an aberration the holograms are those of SM-LBM's correcting variant; a network trained on them
-//! corrects by itself.
+//! For a display with an aberration, the holograms come from the correcting variant of SM-LBM. A network trained on
+//! them learns the correction.
 //!
-//! A pair is written beside its place and renamed into it, so that one that is there is whole. A data
-//! set is resumed by making it again: pairs that are there are kept. Shards write into one folder
-//! or into several that are joined by copying.
+//! A pair is written to a temporary file and then renamed, so every pair in the folder is complete. Making a data set
+//! again resumes it and keeps the existing pairs. Shards can write into one folder, or into several that are then
+//! merged by copying.
 
 use crate::scene::{self, Scene, Texture};
 use ndarray::{Array2, Array3, Array4};
@@ -33,51 +32,52 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
-/// The first words of a manifest: what reads it knows what follows.
+/// The format name at the start of a manifest, which tells readers how to interpret the rest.
 const FORMAT: &str = "phasefront-dataset-1";
 
-/// Every parameter of a data set: two that are equal hold the same bytes.
+/// All parameters of a data set. Two data sets with equal parameters hold the same bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     format: String,
-    /// How many pairs.
+    /// The number of pairs.
     pub scenes: usize,
-    /// Height and width of a scene, pixels.
+    /// The height and width of a scene, in pixels.
     pub size: usize,
-    /// Planes of SM-LBM.
+    /// The number of SM-LBM planes.
     pub planes: usize,
-    /// Layers of an LDI.
+    /// The number of layers of an LDI.
     pub ldi_layers: usize,
-    /// Scene i is of seed·2³² + i.
+    /// The seed. Scene i has the seed·2³² + i.
     pub seed: u64,
-    /// What the scenes look like.
+    /// The look of the scenes.
     #[serde(default, skip_serializing_if = "Look::is_objects")]
     pub look: Look,
     /// The display that the holograms are for.
     pub display: Display,
-    /// Which pairs are for what.
+    /// The ranges of pairs for training, validation and test.
     pub splits: Splits,
-    /// The display's aberration, which the holograms correct; empty where they correct none.
+    /// The display's aberration, which the holograms correct, or empty if they correct none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aberration: Vec<Entry>,
 }
 
-/// What the scenes of a data set look like.
+/// The look of a data set's scenes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", tag = "like")]
 pub enum Look {
-    /// Many objects, mostly in front of nothing: [`scene::random_scene`].
+    /// Many objects, mostly without a background: [`scene::random_scene`].
     #[default]
     Objects,
-    /// Bright and dark, filling the frame: [`scene::natural_scene`].
+    /// Bright and dark scenes that fill the frame: [`scene::natural_scene`].
     Photographs {
-        /// The [`scene::fingerprint`] of the photographs on its surfaces, in hexadecimal; none where there are none.
+        /// The [`scene::fingerprint`] of the photographs on the surfaces, in hexadecimal, or `None` without
+        /// photographs.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         textures: Option<String>,
     },
-    /// Of every kind: [`scene::varied_scene`].
+    /// Scenes of every kind: [`scene::varied_scene`].
     Varied {
-        /// As of [`Look::Photographs`].
+        /// The fingerprint of the photographs, as in [`Look::Photographs`].
         #[serde(default, skip_serializing_if = "Option::is_none")]
         textures: Option<String>,
     },
@@ -88,19 +88,19 @@ impl Look {
         *self == Self::Objects
     }
 
-    /// Like photographs, with these on surfaces.
+    /// Returns the photograph-like look with `textures` on the surfaces.
     pub fn photographs(textures: &[Texture]) -> Self {
         let textures = fingerprint(textures);
         Self::Photographs { textures }
     }
 
-    /// Of every kind, with these photographs on some surfaces.
+    /// Returns the varied look with `textures` on some surfaces.
     pub fn varied(textures: &[Texture]) -> Self {
         let textures = fingerprint(textures);
         Self::Varied { textures }
     }
 
-    /// Whether `textures` are the photographs that it names.
+    /// Checks whether `textures` are the photographs that this look names.
     fn names(&self, textures: &[Texture]) -> bool {
         match self {
             Self::Objects => textures.is_empty(),
@@ -108,7 +108,7 @@ impl Look {
         }
     }
 
-    /// The scene of `seed` for a frame of `size` x `size` pixels.
+    /// Makes the scene of `seed` for a frame of `size` x `size` pixels.
     fn scene(&self, seed: u64, size: usize, textures: &[Texture]) -> Scene {
         match self {
             Self::Objects => scene::random_scene(seed, size, size),
@@ -118,7 +118,7 @@ impl Look {
     }
 }
 
-/// The [`scene::fingerprint`] of photographs in hexadecimal, if there are any.
+/// Returns the [`scene::fingerprint`] of the photographs in hexadecimal, if there are any.
 fn fingerprint(textures: &[Texture]) -> Option<String> {
     (!textures.is_empty()).then(|| format!("{:016x}", scene::fingerprint(textures)))
 }
@@ -126,19 +126,19 @@ fn fingerprint(textures: &[Texture]) -> Option<String> {
 /// Half-open ranges of pair indices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Splits {
-    /// To train on.
+    /// The pairs for training.
     pub train: [usize; 2],
-    /// To choose by.
+    /// The pairs for validation.
     pub validation: [usize; 2],
-    /// To judge by, once.
+    /// The pairs for the final test, which are used once.
     pub test: [usize; 2],
 }
 
 impl Manifest {
-    /// A data set of `scenes` pairs, split as the paper's 3800/100/100.
+    /// Makes the manifest of a data set of `scenes` pairs, split like the paper's 3800/100/100.
     ///
     /// # Errors
-    /// A parameter that gives no data set.
+    /// Returns an error if a parameter is invalid.
     pub fn new(
         scenes: usize,
         size: usize,
@@ -182,12 +182,12 @@ impl Manifest {
         })
     }
 
-    /// The same of scenes that look so.
+    /// Returns the manifest with scenes of `look`.
     pub fn looking(self, look: Look) -> Self {
         Manifest { look, ..self }
     }
 
-    /// The same with holograms that correct `aberration`.
+    /// Returns the manifest with holograms that correct `aberration`.
     pub fn correcting(self, aberration: Option<&AberrationFile>) -> Self {
         Manifest {
             aberration: aberration.map_or_else(Vec::new, AberrationFile::entries),
@@ -198,7 +198,7 @@ impl Manifest {
     /// Reads the manifest of the data set in `dir`.
     ///
     /// # Errors
-    /// No manifest, or one that is not of this format.
+    /// Returns an error if there is no manifest or it has another format.
     pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join("manifest.json");
         let text = input::text(&path)?;
@@ -217,30 +217,31 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// The seed of scene `index`.
+    /// Returns the seed of scene `index`.
     pub fn scene_seed(&self, index: usize) -> u64 {
         (self.seed << 32) + index as u64
     }
 
-    /// The file of pair `index` in `dir`.
+    /// Returns the path of the file of pair `index` in `dir`.
     pub fn pair_path(dir: &Path, index: usize) -> PathBuf {
         dir.join(format!("pair_{index:06}.npz"))
     }
 }
 
-/// How holograms are made.
+/// The method that computes the holograms.
 enum GroundTruth {
     Plain,
     Corrected(Correction),
     Spatial(SpatialAberrations),
 }
 
-/// Makes the pairs of `manifest` that are in `shard` (of all pairs, or i/n of them: those whose index is i
-/// modulo n) and not in `dir` yet. `textures` are the photographs that its look names. `made` hears of each that is
-/// there.
+/// Makes the pairs of `manifest` that are in `shard` and not yet in `dir`. A shard is all pairs, or i/n of them: those
+/// whose index is i modulo n. `textures` are the photographs that the look names. `made` is called for each pair that
+/// is there.
 ///
 /// # Errors
-/// Other photographs than the manifest's, a folder that holds another data set, or that cannot be written.
+/// Returns an error if the photographs differ from the manifest's, or if the folder holds another data set or cannot be
+/// written.
 pub fn make(
     manifest: &Manifest,
     textures: &[Texture],
@@ -279,7 +280,7 @@ pub fn make(
             }
         },
     };
-    // In order, so that what a stopped run leaves is a beginning.
+    // Makes the pairs in order, so that a stopped run leaves the first ones.
     let mine: Range<usize> = 0..manifest.scenes.saturating_sub(shard).div_ceil(shards);
     mine.par_bridge().try_for_each(|i| {
         let index = i * shards + shard;
@@ -320,7 +321,7 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()
             false => (d * 65535.0).round() as u16,
         }
     });
-    // In memory first: on a full disk the archive's writer would speak for itself on stderr.
+    // Builds the archive in memory first: on a full disk, the archive's writer would print to stderr itself.
     let archive = || -> std::result::Result<Vec<u8>, ndarray_npy::WriteNpzError> {
         let mut npz = NpzWriter::new_compressed(Cursor::new(Vec::new()));
         npz.add_array("rgb", &rgb)?;
@@ -332,30 +333,30 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()
     output::write_atomically(path, |file| file.write_all(&bytes))
 }
 
-/// One pair: a scene and its hologram.
+/// A pair of a scene and its hologram.
 pub struct Pair {
     /// The scene.
     pub ldi: Ldi,
-    /// Its complex midpoint hologram, (C, H, W), carrier left out.
+    /// The scene's complex midpoint hologram, (C, H, W), without the carrier.
     pub hologram: Array3<Complex32>,
 }
 
-/// The arrays of a pair.
+/// The names of a pair's arrays.
 const ARRAYS: [&str; 3] = ["rgb.npy", "depth.npy", "hologram.npy"];
 
-/// Whether there is a whole pair: what a full disk or a lost write left is none.
+/// Checks whether the file is a complete pair. A full disk or a lost write leaves an incomplete file.
 fn is_whole(path: &Path) -> bool {
     let archive = file::open(path, u64::MAX).map(|file| ZipArchive::new(BufReader::new(file)));
     matches!(archive, Ok(Ok(archive)) if ARRAYS.iter().all(|name| archive.index_for_name(name).is_some()))
 }
 
-/// The file of array `name` in `archive`, whose values have `most` bytes.
+/// Opens the file of array `name` in `archive`, whose values have at most `most` bytes.
 fn array_bytes(
     archive: &mut ZipArchive<BufReader<File>>,
     name: &str,
     most: usize,
 ) -> std::result::Result<Vec<u8>, String> {
-    /// Of a header, at most.
+    /// The most bytes of a header.
     const HEADER: usize = 1 << 16;
     let array = archive
         .by_name(&format!("{name}.npy"))
@@ -366,10 +367,10 @@ fn array_bytes(
     Ok(bytes)
 }
 
-/// Reads pair `index` of the data set in `dir`, which `manifest` describes.
+/// Reads pair `index` of the data set in `dir` that `manifest` describes.
 ///
 /// # Errors
-/// A pair that is not there, damaged, or of another shape than the manifest says.
+/// Returns an error if the pair does not exist, is damaged, or differs in shape from the manifest.
 pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> {
     let path = Manifest::pair_path(dir, index);
     let file = file::open(&path, u64::MAX).map_err(|e| {

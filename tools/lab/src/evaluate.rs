@@ -1,10 +1,9 @@
-//! How good holograms are on a data set: the paper's Table 2. Amplitude PSNR and SSIM of the midpoint
-//! hologram, and their means over a focal stack of each scene's 15 most frequent depths and 5
-//! random ones; for any way to make a field ([`Method`]), as it is or encoded.
+//! Measures the quality of holograms on a data set, as in the paper's Table 2. The measures are the amplitude PSNR and
+//! SSIM of the midpoint hologram, and their means over a focal stack of each scene's 15 most frequent depths and 5
+//! random depths. Any [`Method`] that makes a field can be measured, with the field itself or encoded.
 //!
-//! An encoded field is judged as an eye sees it: through modulator levels and the Fourier aperture.
-//! The truth is always the data set's complex field. Pairs are valid to their border, so the whole
-//! frame counts.
+//! An encoded field is measured as an eye sees it: through the modulator's levels and the Fourier aperture. The truth
+//! is always the complex field of the data set. Pairs are valid up to their border, so the whole frame counts.
 
 mod ceiling;
 
@@ -36,31 +35,31 @@ use std::f32::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Bins of a scene's depth histogram.
+/// The number of bins in a scene's depth histogram.
 pub const DEPTH_BINS: usize = 200;
 
-/// Depths of a focal stack that are a scene's most frequent.
+/// The number of a scene's most frequent depths in a focal stack.
 pub const FREQUENT_DEPTHS: usize = 15;
 
-/// Depths of a focal stack that are random, of the other bins.
+/// The number of random depths in a focal stack, from the other bins.
 pub const RANDOM_DEPTHS: usize = 5;
 
-/// What differences are multiplied by in [`write_picture`].
+/// The factor that multiplies differences in [`write_picture`].
 pub const DIFFERENCE_GAIN: f32 = 4.0;
 
 type MakeField<'a> = dyn Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a;
 
-/// A way from a scene to its complex midpoint hologram.
+/// A method that turns a scene into its complex midpoint hologram.
 pub struct Method<'a> {
-    /// What it is called in tables and file names.
+    /// The name in tables and file names.
     pub name: String,
     field: Box<MakeField<'a>>,
-    /// What the field is trained for: takes the place of every encoding.
+    /// The pre-filter that the field was trained for. It replaces every encoding.
     prefilter: Option<Arc<Network>>,
 }
 
 impl<'a> Method<'a> {
-    /// Any function from a scene to its midpoint hologram, (C, H, W), carrier left out.
+    /// Makes a method of any function from a scene to its midpoint hologram, (C, H, W), without the carrier.
     pub fn new(name: impl Into<String>, field: impl Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a) -> Self {
         Method {
             name: name.into(),
@@ -69,14 +68,14 @@ impl<'a> Method<'a> {
         }
     }
 
-    /// The visible image itself as the field, with phase 0: what doing nothing is worth.
+    /// Takes the visible image itself, with phase 0, as the field: the baseline without any computation.
     pub fn rgb(display: &'a Display) -> Self {
         Self::new("rgb", move |ldi| {
             Ok(visible_frame(ldi, display)?.rgb().mapv(Complex32::from))
         })
     }
 
-    /// SM-LBM with `planes` planes on what is visible, an RGB-D image's worth.
+    /// Computes SM-LBM with `planes` planes on the visible layer, which equals an RGB-D image.
     pub fn visible(display: &'a Display, planes: usize) -> Self {
         Self::new("visible", move |ldi| {
             let front = Ldi::new(vec![ldi.layers[0].clone()])?;
@@ -84,20 +83,20 @@ impl<'a> Method<'a> {
         })
     }
 
-    /// The point-based method at `planes` depths on what is visible, the paper's first row of Table 2.
+    /// Computes the point-based method at `planes` depths on the visible layer: the first row of the paper's Table 2.
     pub fn points(display: &'a Display, planes: usize) -> Self {
         Self::new("points", move |ldi| {
             point_based::hologram(ldi, display, planes, Occlusion::Input, &|_, _| {})
         })
     }
 
-    /// SM-LBM with `planes` planes on all layers.
+    /// Computes SM-LBM with `planes` planes on all layers.
     pub fn layers(display: &'a Display, planes: usize) -> Self {
         Self::new("layers", move |ldi| sm_lbm::hologram(ldi, display, planes, &|_, _| {}))
     }
 
-    /// SM-LBM with `planes` planes on what is visible and the hidden surfaces that the sweep adds to it: the sweep by
-    /// exact waves.
+    /// Computes SM-LBM with `planes` planes on the visible layer and the hidden surfaces that the sweep adds. This is
+    /// the sweep with exact waves.
     pub fn filled(display: &'a Display, planes: usize) -> Self {
         Self::new("filled", move |ldi| {
             let filled = filled(&visible_frame(ldi, display)?, display)?;
@@ -105,10 +104,10 @@ impl<'a> Method<'a> {
         })
     }
 
-    /// The plane sweep on what is visible of scenes of `size`×`size` pixels.
+    /// Computes the plane sweep on the visible layer of scenes of `size`×`size` pixels.
     ///
     /// # Errors
-    /// A sweep that cannot be planned.
+    /// Returns an error if the sweep cannot be planned.
     pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
         let (plan, display) = (SweepPlan::new(size, size, display, sweep, 0.0)?, display.clone());
         Ok(Self::new("sweep", move |ldi| {
@@ -129,10 +128,10 @@ impl<'a> Method<'a> {
         }))
     }
 
-    /// A network on scenes of `size`×`size` pixels, of RGB-D or as many layers as it takes.
+    /// Runs a network on scenes of `size`×`size` pixels, with RGB-D or as many layers as its input has.
     ///
     /// # Errors
-    /// A pre-filter, or a network for another display.
+    /// Returns an error if the network is a pre-filter or is for another display.
     pub fn network(name: impl Into<String>, network: &Network, size: usize, display: &Display) -> Result<Self> {
         let name = name.into();
         if network.input() == InputKind::Seeded {
@@ -158,10 +157,10 @@ impl<'a> Method<'a> {
         }))
     }
 
-    /// A network with the pre-filter that it was trained with, which is part of every encoding.
+    /// Runs a network together with the pre-filter of its training, which is part of every encoding.
     ///
     /// # Errors
-    /// As [`Self::network`].
+    /// Returns an error if [`Self::network`] does.
     pub fn pair(
         name: impl Into<String>,
         network: &Network,
@@ -175,7 +174,7 @@ impl<'a> Method<'a> {
         })
     }
 
-    /// How a field of this method becomes levels by `options`.
+    /// Returns the encoder options for a field of this method, starting from `options`.
     fn encoder(&self, options: &EncoderOptions) -> EncoderOptions {
         EncoderOptions {
             encoding: match &self.prefilter {
@@ -187,21 +186,21 @@ impl<'a> Method<'a> {
     }
 }
 
-/// How a field is shown.
+/// A way to display a field.
 #[derive(Debug, Clone)]
 pub struct Shown {
-    /// What it is called in tables and file names.
+    /// The name in tables and file names.
     pub name: String,
-    /// By what levels; `None`: it is shown as the complex field it is.
+    /// The target and the encoder of the levels. `None` shows the complex field itself.
     pub levels: Option<(Target, EncoderOptions)>,
-    /// Steps of descent from there to the `Ceiling`; 0 shows the levels as they are.
+    /// The steps of descent from the levels toward the `Ceiling`. 0 shows the levels unchanged.
     pub ceiling: usize,
-    /// The aperture that is looked through, where it is not the one that the levels are made for.
+    /// The viewing aperture, if it differs from the one that the levels are made for.
     pub through: Option<Opening>,
 }
 
 impl Shown {
-    /// The complex field itself.
+    /// Shows the complex field itself.
     pub fn complex() -> Self {
         Shown {
             name: "complex".into(),
@@ -211,7 +210,7 @@ impl Shown {
         }
     }
 
-    /// Levels for `target` by `options`, whose encoder is called `encoder`.
+    /// Shows levels for `target` by `options`, with `encoder` as the encoder's name.
     pub fn encoded(encoder: &str, target: Target, options: EncoderOptions) -> Self {
         Shown {
             name: encoded_name(encoder, &options),
@@ -221,7 +220,7 @@ impl Shown {
         }
     }
 
-    /// The same for `method`, whose pre-filter takes the place of the encoder, also by name.
+    /// Returns this way for `method`, whose pre-filter replaces the encoder and the encoder's name.
     fn of(&self, method: &Method<'_>) -> Self {
         let levels = (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options)));
         let name = match (&levels, &method.prefilter) {
@@ -251,8 +250,8 @@ fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
     format!("{encoder}, dark {dark_threshold}, steps {local_steps}{more}")
 }
 
-/// The ways of `shown` that apply to fields of `method`. A pre-filter takes the place of every encoder, so that
-/// ways which differ in their encoder alone are one.
+/// Returns the ways of `shown` that apply to fields of `method`. A pre-filter replaces every encoder, so ways that
+/// differ only in the encoder become one.
 pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
     let mut ways: Vec<Shown> = Vec::new();
     for shown in shown.iter().map(|shown| shown.of(method)) {
@@ -263,21 +262,21 @@ pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
     ways
 }
 
-/// One way on all scenes.
+/// The results of one way on all scenes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Name of the [`Method`].
+    /// The name of the [`Method`].
     pub method: String,
-    /// Name of the [`Shown`].
+    /// The name of the [`Shown`].
     pub shown: String,
-    /// Means over the scenes.
+    /// The means over the scenes.
     pub mean: Figures,
-    /// Each scene: its index in the data set, and its figures.
+    /// For each scene: its index in the data set and its measures.
     pub scenes: Vec<(usize, Figures)>,
 }
 
 impl Row {
-    /// Indices of the `count` scenes of the least amplitude PSNR, worst first.
+    /// Returns the indices of the `count` scenes with the lowest amplitude PSNR, worst first.
     pub fn worst(&self, count: usize) -> Vec<usize> {
         let mut scenes = self.scenes.clone();
         scenes.sort_by(|(_, a), (_, b)| a.amplitude_psnr.total_cmp(&b.amplitude_psnr));
@@ -285,8 +284,8 @@ impl Row {
     }
 }
 
-/// The normalized depths of a scene's focal stack: the middles of the fullest bins of the histogram of its visible
-/// depths, then of random others. The same `seed` gives the same.
+/// Returns the normalized depths of a scene's focal stack: the middles of the fullest bins of the histogram of its
+/// visible depths, followed by those of random other bins. The same `seed` gives the same depths.
 pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
     let mut counts = [0usize; DEPTH_BINS];
     for d in depth.iter().filter(|d| !d.is_nan()) {
@@ -302,8 +301,8 @@ pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
     bins.iter().map(|bin| (*bin as f64 + 0.5) / DEPTH_BINS as f64).collect()
 }
 
-/// What looks at holograms of one data set: plans for its shape and display. Where its holograms correct an aberration
-/// that is one for all depths, it looks through that (the paper's Fig. 8).
+/// Displays the holograms of one data set: it holds plans for the data set's shape and display. If the holograms
+/// correct an aberration that is constant over depth, views pass through that aberration (the paper's Fig. 8).
 pub struct Viewer {
     size: usize,
     optics: Option<AberratedOptics>,
@@ -313,10 +312,10 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// Plans views from anywhere in the volume.
+    /// Plans views from any depth of the volume.
     ///
     /// # Errors
-    /// A volume that cannot be propagated through, or an aberration that is none.
+    /// Returns an error if waves cannot be propagated through the volume or the aberration is invalid.
     pub fn new(manifest: &Manifest) -> Result<Self> {
         let display = &manifest.display;
         let ends_m = [0.5, -0.5].map(|part| part * display.volume_depth_m());
@@ -338,11 +337,11 @@ impl Viewer {
         })
     }
 
-    /// The amplitudes of the midpoint hologram `field`, (C, H, W), at each of `z_m`, metres, where it is shown by
-    /// `shown`.
+    /// Returns the amplitudes of the midpoint hologram `field`, (C, H, W), at each of `z_m`, in metres, when `shown`
+    /// displays it.
     ///
     /// # Errors
-    /// A z outside of the volume, or levels that cannot be planned.
+    /// Returns an error if a z lies outside the volume or the levels cannot be planned.
     pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Seen> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
@@ -380,7 +379,7 @@ impl Viewer {
         })
     }
 
-    /// Takes `levels` by `steps` of descent toward the amplitudes of the midpoint hologram `field`.
+    /// Moves `levels` by `steps` of descent toward the amplitudes of the midpoint hologram `field`.
     fn lift(
         &self,
         field: &Array3<Complex32>,
@@ -401,7 +400,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// The share of the light of `shown`, (C, H, W) at the modulator, that passes `opening`.
+    /// Returns the share of the light of `shown`, (C, H, W) at the modulator, that passes `opening`.
     fn light(&self, shown: &[Complex32], opening: Opening) -> Result<f64> {
         let energy = |values: &[Complex32]| values.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>();
         let aperture = Aperture::new(self.size, self.size, opening)?;
@@ -414,19 +413,19 @@ impl Viewer {
     }
 }
 
-/// What is seen of a hologram.
+/// The views of a hologram.
 pub struct Seen {
-    /// Amplitudes, (C, H, W), one for each z.
+    /// The amplitudes, (C, H, W), for each z.
     pub views: Vec<Array3<f32>>,
-    /// The share of the modulator's light that passes the aperture; 1 for a complex field.
+    /// The share of the modulator's light that passes the aperture. 1 for a complex field.
     pub light: f64,
 }
 
-/// What methods are told of the depth of what is visible. Sensor and refined depth come from a simulated sensor
-/// with all faults of [`SENSOR_FAULTS`], and have no hidden layers.
+/// The depth that methods receive. Sensor and refined depth come from a simulated sensor with all faults of
+/// [`SENSOR_FAULTS`] and have no hidden layers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Depth {
-    /// As it was rendered
+    /// Depth as rendered
     Rendered,
     /// Simulated sensor depth, enlarged
     Sensor,
@@ -435,7 +434,7 @@ pub enum Depth {
 }
 
 impl Depth {
-    /// The scene `ldi` with depth of this kind; `seed` chooses the sensor's faults.
+    /// Returns the scene `ldi` with depth of this kind. `seed` selects the sensor's faults.
     fn of(self, ldi: &Ldi, seed: u64) -> Result<Cow<'_, Ldi>> {
         if self == Depth::Rendered {
             return Ok(Cow::Borrowed(ldi));
@@ -450,25 +449,26 @@ impl Depth {
     }
 }
 
-/// What is looked at of a data set.
+/// The part of a data set to evaluate.
 #[derive(Debug, Clone)]
 pub struct Sample {
-    /// Indices of its pairs.
+    /// The indices of the pairs.
     pub scenes: Vec<usize>,
-    /// Chooses the random depths of the focal stacks.
+    /// The seed of the random depths in the focal stacks.
     pub seed: u64,
-    /// What methods are told of the depth of what is visible.
+    /// The depth that methods receive.
     pub depth: Depth,
-    /// Pixels at the border of each scene that do not count: into a small frame at an offset light comes from outside,
-    /// which no modulator of its size sends.
+    /// The number of pixels at the border of each scene that do not count. At an offset, light from outside enters a
+    /// small frame, and no modulator of that size sends this light.
     pub margin: usize,
 }
 
-/// Judges each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`: rows in that order,
-/// the ways of a method together. `done` hears of each scene.
+/// Evaluates each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`. The rows are in
+/// that order, with the ways of a method together. `done` is called after each scene.
 ///
 /// # Errors
-/// No scenes, a margin that leaves nothing, a pair that cannot be read, or what a method refuses.
+/// Returns an error if there are no scenes, if the margin leaves no pixels, if a pair cannot be read, or if a method
+/// fails.
 pub fn evaluate(
     manifest: &Manifest,
     dir: &Path,
@@ -551,11 +551,11 @@ pub fn evaluate(
         .collect())
 }
 
-/// Writes a PNG of pair `index` by `method` as `shown`, one of its [`ways`], side by side: the visible image, the
-/// midpoint's amplitude, the true one, and [`DIFFERENCE_GAIN`] times their difference.
+/// Writes a PNG of pair `index` by `method` as `shown`, one of its [`ways`]. It shows, side by side, the visible image,
+/// the midpoint's amplitude, the true amplitude, and [`DIFFERENCE_GAIN`] times their difference.
 ///
 /// # Errors
-/// A pair that cannot be read, what the method refuses, or a file that cannot be written.
+/// Returns an error if the pair cannot be read, the method fails, or the file cannot be written.
 pub fn write_picture(
     path: &Path,
     manifest: &Manifest,

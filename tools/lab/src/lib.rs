@@ -1,4 +1,4 @@
-//! Ground truth: scenes, data sets for training, the evaluation of holograms and the paper's studies.
+//! Ground truth for holograms: scenes, training data sets, evaluation, and the studies of the paper.
 
 pub mod dataset;
 pub mod evaluate;

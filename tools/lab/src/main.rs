@@ -6,7 +6,7 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // clap exits with 2 if the command line is wrong.
+    // clap exits with 2 if the command line is invalid.
     let command::Lab { command, common } = command::Lab::parse();
     common.run(|| command.run(&common))
 }

@@ -1,15 +1,15 @@
 //! Scenes of textured triangle meshes, and their rendering to layered depth images.
 //!
-//! * [`Scene`], [`Mesh`] and [`Texture`] describe what is there.
-//! * [`random_scene`], [`natural_scene`] (like photographs) and [`varied_scene`] make the scenes of data sets.
+//! * [`Scene`], [`Mesh`] and [`Texture`] describe a scene.
+//! * [`random_scene`], [`natural_scene`] (photograph-like) and [`varied_scene`] make the scenes of data sets.
 //! * [`read_model`] reads glTF, GLB and OBJ files.
-//! * [`render_ldi_reference`] renders on the CPU, exactly; [`DepthPeeler`] the same on a GPU.
+//! * [`render_ldi_reference`] renders exactly on the CPU; [`DepthPeeler`] renders on a GPU.
 //!
 //! # Coordinates
-//! The camera is orthographic, as the illumination is collimated: it looks along −z and has no position. A vertex
-//! is `[x, y, z]`: x and y in pixels from the frame's top-left corner, x right and y down, so that the centre of
-//! pixel (row, column) lies at (column + ½, row + ½); z in parts of the volume's depth, toward the viewer, from
-//! +½ (nearest) to −½ (farthest). Normalized depth is d = ½ − z. A scene so described fits any display.
+//! The camera is orthographic, because the illumination is collimated. It looks along −z and has no position. A vertex
+//! is `[x, y, z]`. x and y are in pixels from the frame's top-left corner, x right and y down, so the centre of pixel
+//! (row, column) lies at (column + ½, row + ½). z is a fraction of the volume's depth, positive toward the viewer, from
+//! +½ (nearest) to −½ (farthest). The normalized depth is d = ½ − z. A scene in these coordinates fits any display.
 
 mod model;
 pub mod pattern;
@@ -26,38 +26,38 @@ pub use random::{fingerprint, natural_scene, random_scene, read_photographs, var
 pub use render::{DepthPeeler, render_ldi_reference};
 pub use texture::Texture;
 
-/// Farthest from the frame's corner that a vertex may lie, in pixels.
+/// The largest distance of a vertex from the frame's corner, in pixels.
 pub const MAX_COORDINATE_PX: f32 = 1_048_576.0;
 
-/// What there is to see: meshes in front of nothing.
+/// A scene: meshes in front of an empty background.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
-    /// The meshes. Of two surfaces at exactly the same depth the one that comes first here is seen.
+    /// The meshes. Of two surfaces at exactly the same depth, the earlier one in this list is visible.
     pub meshes: Vec<Mesh>,
 }
 
 /// A textured triangle mesh in the coordinates of the [module](self).
 ///
-/// A triangle's front is where its corners turn counter-clockwise as the viewer sees them. Back faces are not seen:
-/// an LDI records front-facing surfaces only.
+/// The front of a triangle is the side from which its corners run counter-clockwise. Back faces are invisible, because
+/// an LDI records only front-facing surfaces.
 #[derive(Debug, Clone)]
 pub struct Mesh {
-    /// Vertices.
+    /// The vertices.
     pub positions: Vec<[f32; 3]>,
-    /// Indices into `positions`, three a triangle.
+    /// The triangles, as indices into `positions`.
     pub triangles: Vec<[u32; 3]>,
-    /// Texture coordinates, one a vertex: (0, 0) is the texture's top-left corner, (1, 1) its bottom-right one.
-    /// Beyond [0, 1] the texture repeats.
+    /// The texture coordinates of each vertex: (0, 0) is the texture's top-left corner, (1, 1) its bottom-right corner.
+    /// Outside [0, 1] the texture repeats.
     pub uv: Vec<[f32; 2]>,
-    /// RGB factors of the texture, one a vertex, or none at all for white. Shading is written here.
+    /// The RGB factors of the texture for each vertex, or empty for white. They contain the shading.
     pub colour: Vec<[f32; 3]>,
-    /// The picture on the surface; meshes may share it.
+    /// The picture on the surface. Meshes may share it.
     pub texture: Arc<Texture>,
 }
 
 impl Scene {
-    /// Checks every mesh: indices in range, one uv and, if any, one colour a vertex, all numbers finite, vertices
-    /// within [`MAX_COORDINATE_PX`].
+    /// Checks that every mesh has valid indices, one uv and, if it has colours, one colour per vertex, and only finite
+    /// numbers, with all vertices within [`MAX_COORDINATE_PX`].
     pub fn check(&self) -> Result<()> {
         for (index, mesh) in self.meshes.iter().enumerate() {
             mesh.check()

@@ -1,10 +1,11 @@
-//! What seeded networks are trained on: the sweep's fields of a data set's scenes, on depths that were given.
+//! The training data of seeded networks: the sweep's fields of a data set's scenes, for given depths.
 //!
-//! A folder holds for each scene `depth_000123.npy`, uint16 (V, H, W): V variants of its visible depth, d·65535, clean
-//! or as a phone would measure it; the training package makes them. To each, [`make`] adds `refined_000123.npy`, uint16
-//! (R, H, W): a sensor's readings of the first, each with faults of its own, as the core refines them;
-//! `seed_000123.npy`, int16 (V + R, 6, H, W): the real planes of the field's three colours and its three imaginary
-//! ones, times [`SCALE`], on all of them; and to the folder, `seeds.json`, which says by which sweep and what R is.
+//! A folder holds, for each scene, `depth_000123.npy`, uint16 (V, H, W): V variants of the visible depth, d·65535,
+//! either clean or as a phone would measure it. The training package makes these files. [`make`] adds two files for
+//! each scene. `refined_000123.npy`, uint16 (R, H, W), holds readings of the first variant by a sensor, each with
+//! different faults, as refined by the core. `seed_000123.npy`, int16 (V + R, 6, H, W), holds the real planes of the
+//! field's three colours and the three imaginary planes, times [`SCALE`], for all these depths. It also adds
+//! `seeds.json`, which records the sweep and R, to the folder.
 
 use crate::dataset::{self, Manifest};
 use crate::study::refined_depth::{RATIO, SensorFaults, refine, simulate_sensor};
@@ -22,22 +23,22 @@ use rayon::prelude::*;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What a field is multiplied by: amplitudes up to 4 fit, in steps of 1.2·10⁻⁴.
+/// The factor that multiplies a field. Amplitudes up to 4 fit, in steps of 1.2·10⁻⁴.
 pub const SCALE: f32 = 8192.0;
-/// The first words of `seeds.json`.
+/// The format name at the start of `seeds.json`.
 const FORMAT: &str = "phasefront-seeds-1";
 
-/// Most noise of a refined depth's readings, of the volume's depth.
+/// The largest noise of a refined depth's readings, as a fraction of the volume's depth.
 const MOST_NOISE: f64 = 0.008;
-/// Farthest that refined depth stands beside the colour, display pixels.
+/// The largest shift of refined depth from the colour, in display pixels.
 const MOST_SHIFT: usize = 3;
 
-/// Makes the seeds of the data set in `data`, which `manifest` describes, for all depths in `dir` that have none yet,
-/// and for `refined` more of each scene, by `sweep`. `made` hears of each that is there.
+/// Makes the seeds of the data set in `data`, which `manifest` describes, by `sweep`. It covers all depths in `dir`
+/// that have no seeds yet, and `refined` more depths of each scene. `made` is called for each scene that is done.
 ///
 /// # Errors
-/// Depths that are of another shape than the scenes, scenes that a sensor's readings do not divide, seeds of another
-/// sweep, or a folder that cannot be written.
+/// Returns an error if the depths differ in shape from the scenes, if a sensor's readings do not divide the scenes, if
+/// the folder has seeds of another sweep, or if it cannot be written.
 pub fn make(
     manifest: &Manifest,
     data: &Path,
@@ -107,7 +108,8 @@ fn read_depths(path: &Path, size: usize) -> Result<Array3<u16>> {
     }
 }
 
-/// `count` depths of scene `index` as a sensor with faults reads its true `depth` and the core refines that.
+/// Simulates `count` readings of the true `depth` of scene `index` by a sensor with faults, and refines them with the
+/// core.
 fn refined_depths(depth: ArrayView2<'_, u16>, colour: &Array3<f32>, index: usize, count: usize) -> Result<Array3<u16>> {
     let (height, width) = depth.dim();
     let depth = depth.mapv(depth_of_code);
@@ -127,7 +129,7 @@ fn refined_depths(depth: ArrayView2<'_, u16>, colour: &Array3<f32>, index: usize
     Ok(all)
 }
 
-/// The fields of one scene on all its depths.
+/// Computes the fields of one scene for all its depths.
 fn fields(plan: &SweepPlan, colour: &Array3<f32>, depths: ArrayView3<'_, u16>) -> Result<Array4<i16>> {
     let (variants, height, width) = depths.dim();
     let mut fields = Array4::zeros((variants, 6, height, width));

@@ -1,5 +1,5 @@
-//! The paper's two studies of SM-LBM (Fig. 2): how many layers an LDI needs, and how many planes a
-//! volume. Both compare the amplitudes of midpoint holograms with those of the finest, over random
+//! The paper's two studies of SM-LBM (Fig. 2): the number of layers that an LDI needs, and the number of planes that a
+//! volume needs. Both compare the amplitudes of midpoint holograms with those of the finest setting, over random
 //! scenes.
 
 pub mod flicker;
@@ -17,44 +17,44 @@ use phasefront_io::{Error, Result, metrics};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The layers of the finest LDI; the others have 1 to one fewer.
+/// The number of layers of the finest LDI. The other LDIs have from 1 layer to one fewer than this.
 pub const FINEST_LAYERS: usize = 10;
-/// Planes that are compared with the finest, where they are fewer: 2⁵, 2⁷, 2⁹, 2¹¹.
+/// The numbers of planes that are compared with the finest, if they are smaller: 2⁵, 2⁷, 2⁹ and 2¹¹.
 pub const PLANES: [usize; 4] = [32, 128, 512, 2048];
 
-/// The random scenes of a study: [`scene::random_scene`] of `seed` and those after it.
+/// The random scenes of a study: [`scene::random_scene`] of `seed` and the following seeds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scenes {
-    /// How many.
+    /// The number of scenes.
     pub scenes: usize,
-    /// Height and width, pixels.
+    /// The height and width, in pixels.
     pub size: usize,
-    /// The seed of the first.
+    /// The seed of the first scene.
     pub seed: u64,
     /// The display that the holograms are for.
     pub display: Display,
 }
 
-/// How close one number of layers or planes comes to the finest.
+/// The quality of one number of layers or planes compared with the finest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Layers or planes.
+    /// The number of layers or planes.
     pub value: usize,
-    /// Mean over the scenes, dB; infinite where one of them equals the finest to the bit.
+    /// The mean PSNR over the scenes, in dB. Infinite if one of them equals the finest to the bit.
     pub psnr: f64,
-    /// Mean over the scenes.
+    /// The mean SSIM over the scenes.
     pub ssim: f64,
-    /// Each scene, dB.
+    /// The PSNR of each scene, in dB.
     pub psnr_of_scenes: Vec<f64>,
-    /// Each scene.
+    /// The SSIM of each scene.
     pub ssim_of_scenes: Vec<f64>,
 }
 
-/// Holograms of LDIs of 1 to 9 layers against 10, by SM-LBM with `planes` planes. `done` hears of the
-/// planes of each finished hologram, [`layers_work`] in all.
+/// Compares holograms of LDIs of 1 to 9 layers with those of 10, by SM-LBM with `planes` planes. `done` receives the
+/// planes of each finished hologram, [`layers_work`] in total.
 ///
 /// # Errors
-/// No scenes, or what [`sm_lbm::hologram`] refuses.
+/// Returns an error if there are no scenes or [`sm_lbm::hologram`] fails.
 pub fn layers(scenes: &Scenes, planes: usize, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Row>> {
     let values: Vec<usize> = (1..FINEST_LAYERS).collect();
     against_finest(scenes, FINEST_LAYERS, &values, FINEST_LAYERS, &|ldi, count| {
@@ -65,16 +65,16 @@ pub fn layers(scenes: &Scenes, planes: usize, done: &(dyn Fn(usize) + Sync)) -> 
     })
 }
 
-/// The planes of all holograms of [`layers`].
+/// Returns the total planes of all holograms of [`layers`].
 pub fn layers_work(scenes: &Scenes, planes: usize) -> usize {
     scenes.scenes * FINEST_LAYERS * planes
 }
 
-/// Holograms of [`PLANES`] against `finest`, from LDIs of `ldi_layers` layers. `done` hears of the planes
-/// of each finished hologram, [`planes_work`] in all.
+/// Compares holograms of [`PLANES`] with those of `finest`, from LDIs of `ldi_layers` layers. `done` receives the
+/// planes of each finished hologram, [`planes_work`] in total.
 ///
 /// # Errors
-/// No scenes, a `finest` that leaves nothing to compare, or what [`sm_lbm::hologram`] refuses.
+/// Returns an error if there are no scenes, if `finest` leaves nothing to compare, or if [`sm_lbm::hologram`] fails.
 pub fn planes(scenes: &Scenes, ldi_layers: usize, finest: usize, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Row>> {
     let values = fewer(finest);
     if values.is_empty() {
@@ -90,7 +90,7 @@ pub fn planes(scenes: &Scenes, ldi_layers: usize, finest: usize, done: &(dyn Fn(
     })
 }
 
-/// The planes of all holograms of [`planes`].
+/// Returns the total planes of all holograms of [`planes`].
 pub fn planes_work(scenes: &Scenes, finest: usize) -> usize {
     scenes.scenes * (fewer(finest).iter().sum::<usize>() + finest)
 }

@@ -1,16 +1,16 @@
-//! The map of one plane to another in perspective, through four points.
+//! Perspective maps between two planes, defined by four points.
 
 use phasefront_io::{Error, Result};
 
-/// (x, y) ↦ ((h₀x + h₁y + h₂)/w, (h₃x + h₄y + h₅)/w), w = h₆x + h₇y + 1.
+/// The map (x, y) ↦ ((h₀x + h₁y + h₂)/w, (h₃x + h₄y + h₅)/w), with w = h₆x + h₇y + 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Homography([f64; 8]);
 
 impl Homography {
-    /// The map that takes each of `from` to that of `to`.
+    /// Computes the map that takes each point of `from` to the matching point of `to`.
     ///
     /// # Errors
-    /// Three of the points on one line.
+    /// Returns an error if three of the points lie on one line.
     pub fn through(from: [[f64; 2]; 4], to: [[f64; 2]; 4]) -> Result<Self> {
         let mut rows = [[0.0; 9]; 8];
         for (i, ([x, y], [u, v])) in from.into_iter().zip(to).enumerate() {
@@ -26,7 +26,7 @@ impl Homography {
         }
     }
 
-    /// Where `point` goes.
+    /// Maps `point`.
     pub fn map(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let h = &self.0;
         let w = h[6] * x + h[7] * y + 1.0;
@@ -34,7 +34,7 @@ impl Homography {
     }
 }
 
-/// Gauss and Jordan, by the largest pivot; None where there is none.
+/// Solves the system by Gauss–Jordan elimination with partial pivoting. Returns `None` if it is singular.
 fn solve(rows: &mut [[f64; 9]; 8]) -> Option<[f64; 8]> {
     for i in 0..8 {
         let pivot = (i..8).max_by(|a, b| rows[*a][i].abs().total_cmp(&rows[*b][i].abs()))?;

@@ -1,7 +1,8 @@
-//! Where a photograph shows the modulator, and which pattern: the marks and the code of [`crate::camera::pattern`].
+//! Detection of the modulator and the pattern in a photograph, using the marks and the code of
+//! [`crate::camera::pattern`].
 //!
-//! The camera stands upright before the display and not mirrored, sees the whole modulator, and the modulator fills at
-//! least 40 % of the photograph's width.
+//! The camera must be upright in front of the display, must not mirror the image, and must see the whole modulator,
+//! which must fill at least 40 % of the photograph's width.
 
 use crate::camera::homography::Homography;
 use crate::camera::pattern::{CELLS, Pattern, decode};
@@ -11,19 +12,19 @@ use phasefront_io::Result;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What a part of the local light a pixel must be below to be part of a dark square.
+/// A pixel of a dark square is darker than this fraction of the local light.
 const DARKER: f32 = 0.55;
-/// How many times as bright as a dark square its frame is, at least.
+/// The minimum ratio of a frame's brightness to that of its dark square.
 const FRAMED: f32 = 1.4;
-/// What a part of the brightest light must be near for a place to be on the modulator at all.
+/// A place on the modulator has nearby light of at least this fraction of the brightest light.
 const LIT: f32 = 0.06;
 
-/// Why no marks were found, and what would be right.
+/// The reason why no marks were found, and the expected photograph.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoMarks {
-    /// Not four dark squares in bright frames; how many there were.
+    /// The number of dark squares in bright frames, which is not four.
     Count(usize),
-    /// The mark with the hole is not at the top left but there.
+    /// The mark with the hole is here instead of at the top left.
     Turned(&'static str),
 }
 
@@ -42,14 +43,14 @@ impl std::fmt::Display for NoMarks {
     }
 }
 
-/// Where the modulator lies in photographs.
+/// The position of the modulator in photographs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Registration {
-    /// From pixels of the modulator to those of the photograph.
+    /// The map from pixels of the modulator to pixels of the photograph.
     pub map: Homography,
-    /// The marks' centres in the photograph.
+    /// The centres of the marks in the photograph.
     pub marks: [[f64; 2]; 4],
-    /// Pixels of the photograph that one of the modulator takes.
+    /// The number of photograph pixels per modulator pixel.
     pub zoom: f64,
 }
 
@@ -57,7 +58,7 @@ impl Registration {
     /// Finds the marks of `pattern` in `photograph`.
     ///
     /// # Errors
-    /// Marks that are not there, or not upright.
+    /// Returns an error if the marks are missing or not upright.
     pub fn find(photograph: &Photograph, pattern: &Pattern) -> std::result::Result<Self, NoMarks> {
         let marks = find_marks(photograph, pattern)?;
         let map = Homography::through(pattern.marks(), marks).map_err(|_| NoMarks::Count(4))?;
@@ -67,7 +68,7 @@ impl Registration {
             zoom: (marks[1][0] - marks[0][0]).hypot(marks[1][1] - marks[0][1])
                 / (pattern.marks()[1][0] - pattern.marks()[0][0]),
         };
-        // The hole is bright, the middles of the other squares are dark.
+        // The hole is bright, and the centres of the other squares are dark.
         let quarter = pattern.square() as f64 / 4.0;
         let brightness = |[x, y]: [f64; 2]| registration.mean(photograph, x, y, quarter);
         let bright: [f32; 4] = pattern.marks().map(brightness);
@@ -81,7 +82,7 @@ impl Registration {
         }
     }
 
-    /// How far the marks of `other` are from these, pixels of the photograph: the mean of the four.
+    /// Returns the mean offset of the four marks of `other` from these marks, in pixels of the photograph.
     pub fn shift(&self, other: &Self) -> [f64; 2] {
         let mean = |axis: usize| {
             let apart = (0..4).map(|i| other.marks[i][axis] - self.marks[i][axis]);
@@ -90,7 +91,8 @@ impl Registration {
         [mean(0), mean(1)]
     }
 
-    /// The mean of `photograph` over a square of the modulator, `half` pixels to each side of (`x`, `y`).
+    /// Returns the mean of `photograph` over a square of the modulator that extends `half` pixels to each side of (`x`,
+    /// `y`).
     fn mean(&self, photograph: &Photograph, x: f64, y: f64, half: f64) -> f32 {
         let n = (2.0 * half * self.zoom).ceil().clamp(2.0, 24.0) as usize;
         let at = |i: usize| half * ((2 * i + 1) as f64 / n as f64 - 1.0);
@@ -104,7 +106,7 @@ impl Registration {
         sum / (n * n) as f32
     }
 
-    /// The pattern that the code in `photograph` says, None where it cannot be read.
+    /// Reads the pattern number from the code in `photograph`. Returns `None` if the code is unreadable.
     pub fn code(&self, photograph: &Photograph, pattern: &Pattern) -> Option<u8> {
         let half = pattern.cell() as f64 / 4.0;
         let (cells, between) = pattern.code();
@@ -118,7 +120,8 @@ impl Registration {
         decode(is_dark)
     }
 
-    /// `photograph` on the modulator's pixels, (H, W), the mean over each, as parts of the sensor's range.
+    /// Resamples `photograph` to the modulator's pixels, (H, W). Each value is the mean over a pixel, as a fraction of
+    /// the sensor's range.
     pub fn resample(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
         let n = self.zoom.ceil().clamp(1.0, 8.0) as usize;
         let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;
@@ -139,7 +142,8 @@ impl Registration {
         out
     }
 
-    /// The median of the light around the modulator, as a part of the sensor's range: what is there without it.
+    /// Returns the median of the light around the modulator, as a fraction of the sensor's range. This is the ambient
+    /// light.
     pub fn surroundings(&self, photograph: &Photograph, (height, width): (usize, usize)) -> f32 {
         let (h, w) = (height as f64, width as f64);
         let out = 0.03 * h.min(w);
@@ -160,14 +164,14 @@ impl Registration {
     }
 }
 
-/// A connected dark place: its box, both ends within, and how many pixels it has.
+/// A connected dark region: its bounding box with inclusive ends, and its number of pixels.
 struct Spot {
     x: [usize; 2],
     y: [usize; 2],
     area: usize,
 }
 
-/// The centres of the four marks' dark squares, to a part of a pixel.
+/// Returns the centres of the four marks' dark squares with subpixel accuracy.
 fn find_marks(photograph: &Photograph, pattern: &Pattern) -> std::result::Result<[[f64; 2]; 4], NoMarks> {
     let widest = photograph.width as f64 / pattern.shape().1 as f64;
     let side = widest * pattern.square() as f64;
@@ -227,8 +231,9 @@ fn find_marks(photograph: &Photograph, pattern: &Pattern) -> std::result::Result
     Ok(marks.map(|spot| centre(photograph, spot, factor)))
 }
 
-/// Whether a spot has a bright frame: beyond each of its sides a band of a quarter of its size is brighter in the mean
-/// than half of what is in it, by far. Single pixels would not do: the frame is grainy, and a hole is bright.
+/// Checks whether a spot has a bright frame. Beyond each of its sides, a band of a quarter of its size must have a mean
+/// that is much brighter than half of the spot's pixels. Single pixels are not reliable, because the frame is grainy
+/// and a hole is bright.
 fn is_framed(spot: &Spot, small: &[f32], width: usize, floor: f32) -> bool {
     let height = small.len() / width;
     let ([left, right], [top, bottom]) = (spot.x, spot.y);
@@ -257,7 +262,7 @@ fn is_framed(spot: &Spot, small: &[f32], width: usize, floor: f32) -> bool {
     .all(|beyond| beyond > FRAMED * within)
 }
 
-/// The centre of a dark square, weighted by how dark its pixels are, in the full photograph.
+/// Returns the centre of a dark square in the full photograph, weighted by the darkness of its pixels.
 fn centre(photograph: &Photograph, spot: &Spot, factor: usize) -> [f64; 2] {
     let grown = |[from, to]: [usize; 2], end: usize| {
         let (from, to) = (from * factor, (to + 1) * factor);
@@ -288,7 +293,7 @@ fn centre(photograph: &Photograph, spot: &Spot, factor: usize) -> [f64; 2] {
     [sum_x / sum, sum_y / sum]
 }
 
-/// The mean over 3×3 pixels, the rim going on outside.
+/// Returns the mean over 3×3 pixels, with the border pixels repeated outside.
 fn blurred(plane: &[f32], height: usize, width: usize) -> Vec<f32> {
     let mut out = vec![0.0; plane.len()];
     for y in 0..height {
@@ -305,7 +310,7 @@ fn blurred(plane: &[f32], height: usize, width: usize) -> Vec<f32> {
     out
 }
 
-/// The largest value within `radius` along both axes.
+/// Returns the largest value within `radius` along both axes.
 fn local_maxima(plane: &[f32], height: usize, width: usize, radius: usize) -> Vec<f32> {
     let along = |from: &[f32], length: usize, step: usize, start: usize, to: &mut [f32]| {
         for i in 0..length {
@@ -320,7 +325,7 @@ fn local_maxima(plane: &[f32], height: usize, width: usize, radius: usize) -> Ve
     out
 }
 
-/// The connected places of `is_dark`, by their four neighbours.
+/// Returns the connected regions of `is_dark`, with four neighbours per pixel.
 fn spots(is_dark: &[bool], height: usize, width: usize) -> Vec<Spot> {
     let mut seen = vec![false; is_dark.len()];
     let mut spots = Vec::new();
@@ -365,10 +370,10 @@ fn spots(is_dark: &[bool], height: usize, width: usize) -> Vec<Spot> {
     spots
 }
 
-/// [`Registration::find`], with an error of this crate.
+/// Calls [`Registration::find`] and converts its error.
 ///
 /// # Errors
-/// Marks that are not there, or not upright.
+/// Returns an error if the marks are missing or not upright.
 pub fn register(photograph: &Photograph, pattern: &Pattern) -> Result<Registration> {
     Registration::find(photograph, pattern).map_err(|e| phasefront_io::Error::Input(format!("the photograph {e}")))
 }
@@ -397,8 +402,7 @@ mod tests {
         .collect()
     }
 
-    /// In some patterns, dark ones and bright ones, in all three colours; those in which red is darkest are the
-    /// hardest.
+    /// Tests dark and bright patterns in all three colours. Patterns in which red is darkest are the hardest.
     #[test]
     fn marks_are_found_to_a_part_of_a_pixel_and_codes_are_read() {
         for (display, pattern) in displays() {

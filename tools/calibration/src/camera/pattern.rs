@@ -1,40 +1,40 @@
-//! The 256 test patterns of the double-phase calibration (Methods of the paper): in every cell of 2×2 pixels the top
-//! right and bottom left ones stay at level 0 and the other two show level k, so that through the Fourier aperture
-//! the cell's light is |1 + exp(iφₖ)|²/4.
+//! The 256 test patterns of the double-phase calibration (Methods of the paper). In every cell of 2×2 pixels the top
+//! right and bottom left pixels stay at level 0 and the other two have level k. Through the Fourier aperture the cell's
+//! light is then |1 + exp(iφₖ)|²/4.
 //!
-//! Every pattern carries what tells where it lies in a photograph and which one it is, whatever k: in each corner a
-//! dark square in a bright frame (the one at the top left has a bright hole), and beside the top left one ten dark or
-//! bright cells: one always dark, the eight bits of k (dark is 1, the highest first), and their parity. Dark is the
-//! checkerboard of level 0 and one that turns by about π: [`DARK`] does from 0.8·2π to 1.5·2π, another must be given
-//! for ranges beyond.
+//! Every pattern contains marks that locate it in a photograph and a code that identifies it, whatever k is. Each
+//! corner has a dark square in a bright frame, and the one at the top left has a bright hole. Beside the top left mark
+//! are ten dark or bright cells: one that is always dark, the eight bits of k (dark is 1, the highest bit first), and
+//! their parity. Dark areas are a checkerboard of level 0 and a level with a phase of about π. [`DARK`] is suitable for
+//! ranges from 0.8·2π to 1.5·2π. Other ranges need another dark level.
 
 use ndarray::Array2;
 use phasefront_io::{Error, Result};
 
-/// How many patterns there are: one a level.
+/// The number of patterns, one per level.
 pub const PATTERNS: usize = 256;
-/// The level that is dark beside 0, before anything is calibrated.
+/// The level that is dark beside level 0 on an uncalibrated display.
 pub const DARK: u8 = 105;
-/// Cells of the code: one dark, eight bits, parity.
+/// The number of cells of the code: one dark cell, eight bits, and a parity bit.
 pub const CELLS: usize = 10;
-/// Pixels around marks and code whose light is mixed with theirs.
+/// The width, in pixels, of the border around marks and code where their light mixes with the pattern's.
 const GUARD: usize = 2;
 
-/// The patterns of a modulator of one size.
+/// The patterns for a modulator of one size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pattern {
     height: usize,
     width: usize,
-    /// Side of a mark with its bright frame, pixels, a multiple of 8; the dark square has half of it.
+    /// The side of a mark with its bright frame, in pixels, a multiple of 8. The dark square has half this side.
     mark: usize,
     dark: u8,
 }
 
 impl Pattern {
-    /// For a modulator of (`height`, `width`) pixels.
+    /// Creates the patterns for a modulator of (`height`, `width`) pixels.
     ///
     /// # Errors
-    /// A modulator too small to carry marks.
+    /// Returns an error if the modulator is too small for marks.
     pub fn new(height: usize, width: usize) -> Result<Self> {
         let mark = (height.min(width) / 10 / 8 * 8).clamp(16, 128);
         if width < 9 * mark || height < 4 * mark {
@@ -50,28 +50,28 @@ impl Pattern {
         })
     }
 
-    /// The same with `dark` for the level that is dark beside 0.
+    /// Returns the patterns with `dark` as the level that is dark beside level 0.
     pub fn with_dark(self, dark: u8) -> Self {
         Pattern { dark, ..self }
     }
 
-    /// (H, W).
+    /// Returns the height and width, (H, W).
     pub fn shape(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// Side of a mark's dark square, pixels.
+    /// Returns the side of a mark's dark square, in pixels.
     pub fn square(&self) -> usize {
         self.mark / 2
     }
 
-    /// The centres (x, y) of the marks: top left, top right, bottom left, bottom right.
+    /// Returns the centres (x, y) of the marks: top left, top right, bottom left, bottom right.
     pub fn marks(&self) -> [[f64; 2]; 4] {
         let (near, w, h) = (self.mark as f64, self.width as f64, self.height as f64);
         [[near, near], [w - near, near], [near, h - near], [w - near, h - near]]
     }
 
-    /// The centres (x, y) of the code's cells, and of the bright places before, between and after them.
+    /// Returns the centres (x, y) of the code's cells, and of the bright places before, between and after them.
     pub fn code(&self) -> ([[f64; 2]; CELLS], [[f64; 2]; CELLS + 1]) {
         let m = self.mark as f64;
         let at = |half_cells: usize| [1.5 * m + m / 4.0 * half_cells as f64, 0.75 * m];
@@ -81,12 +81,12 @@ impl Pattern {
         )
     }
 
-    /// Side of a cell, pixels.
+    /// Returns the side of a cell of the code, in pixels.
     pub fn cell(&self) -> usize {
         self.mark / 4
     }
 
-    /// Whether pixel (`x`, `y`) shows the pattern itself, away from marks and code.
+    /// Checks whether pixel (`x`, `y`) belongs to the pattern itself, away from marks and code.
     pub fn measures(&self, y: usize, x: usize) -> bool {
         let inset = self.mark / 2;
         let beyond = |n: usize, from: usize, to: usize| n + GUARD < from || n >= to + GUARD;
@@ -100,7 +100,7 @@ impl Pattern {
             && outside(inset, inset + self.mark, self.mark / 2, 11 * self.mark / 2)
     }
 
-    /// The level of pixel (`x`, `y`) in pattern `k`.
+    /// Returns the level of pixel (`x`, `y`) in pattern `k`.
     pub fn level(&self, k: u8, y: usize, x: usize) -> u8 {
         let active = (x + y).is_multiple_of(2);
         let shown = match self.fixed(k, y, x) {
@@ -111,7 +111,7 @@ impl Pattern {
         if active { shown } else { 0 }
     }
 
-    /// Whether a pixel of a mark or of the code is dark; None elsewhere.
+    /// Returns whether a pixel of a mark or of the code is dark, or `None` elsewhere.
     fn fixed(&self, k: u8, y: usize, x: usize) -> Option<bool> {
         let (m, inset) = (self.mark, self.mark / 2);
         let within = |n: usize, from: usize, length: usize| (from..from + length).contains(&n);
@@ -127,7 +127,7 @@ impl Pattern {
             }
         }
         if within(y, inset, m / 2) && within(x, inset + m, 11 * m / 2) {
-            // Cells of m/4 every m/2, the first m/2 after the strip's beginning.
+            // Cells are m/4 wide, with a period of m/2. The first begins m/2 after the start of the strip.
             let along = x - inset - m + m / 8;
             let (cell, part) = (along / (m / 2), along % (m / 2));
             let inside = part < m / 4 && within(y, inset + m / 8, m / 4);
@@ -137,13 +137,13 @@ impl Pattern {
         None
     }
 
-    /// Pattern `k`, levels (H, W).
+    /// Returns the levels of pattern `k`, (H, W).
     pub fn frame(&self, k: u8) -> Array2<u8> {
         Array2::from_shape_fn((self.height, self.width), |(y, x)| self.level(k, y, x))
     }
 }
 
-/// The code of pattern `k`: which cells are dark.
+/// Returns which cells of the code of pattern `k` are dark.
 fn bits(k: u8) -> [bool; CELLS] {
     std::array::from_fn(|i| match i {
         0 => true,
@@ -152,7 +152,7 @@ fn bits(k: u8) -> [bool; CELLS] {
     })
 }
 
-/// The pattern that a code says, None where it is none.
+/// Decodes a pattern number. Returns `None` if the code is invalid.
 pub fn decode(dark: [bool; CELLS]) -> Option<u8> {
     let k = (dark[1..9].iter()).fold(0, |k, bit| k << 1 | u8::from(*bit));
     (bits(k) == dark).then_some(k)

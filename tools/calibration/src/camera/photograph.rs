@@ -1,6 +1,6 @@
-//! One photograph as numbers that grow in proportion to light: read from PNG or TIFF, written as PNG.
+//! Photographs with values proportional to light, read from PNG or TIFF and written as PNG.
 //!
-//! A camera's tone curve must be off (its raw file, developed linearly): nothing here can undo one.
+//! The camera's tone curve must be off, as in a raw file developed linearly. This module cannot undo a tone curve.
 
 use image::DynamicImage;
 use phasefront_io::input::decode::{self, Reading};
@@ -8,30 +8,31 @@ use phasefront_io::output::write_atomically;
 use phasefront_io::{Error, Result};
 use std::path::Path;
 
-/// The most pixels of a photograph: 200 megapixels.
+/// The maximum number of pixels of a photograph: 200 megapixels.
 const MOST_PIXELS: u64 = 200_000_000;
 
-/// The share of a photograph's pixels that may be at the sensor's end before it is called saturated.
+/// The maximum fraction of pixels at the sensor's limit. A photograph with more is treated as saturated.
 pub const SATURATED_SHARE: f64 = 1e-3;
 
 /// Grey values, (H, W), linear in light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Photograph {
-    /// Pixels along y.
+    /// The number of pixels along y.
     pub height: usize,
-    /// Pixels along x.
+    /// The number of pixels along x.
     pub width: usize,
-    /// Row by row.
+    /// The values, row by row.
     pub values: Vec<u16>,
-    /// The largest number that a value can be: 255 of 8 bits, 65535 of 16.
+    /// The largest possible value: 255 for 8 bits, 65535 for 16 bits.
     pub full: u16,
 }
 
 impl Photograph {
-    /// Reads a PNG or TIFF of 8 or 16 bits, grey or colour; of a colour one, channel `colour` (0 red, 1 green, 2 blue).
+    /// Reads an 8- or 16-bit PNG or TIFF, grey or colour. From a colour image it reads channel `colour` (0 red, 1
+    /// green, 2 blue).
     ///
     /// # Errors
-    /// A file that is missing, cut short, of another kind, or over 200 megapixels.
+    /// Returns an error if the file is missing, truncated, of another kind, or larger than 200 megapixels.
     pub fn read(path: &Path, colour: usize) -> Result<Self> {
         let how = Reading {
             most_pixels: MOST_PIXELS,
@@ -63,10 +64,10 @@ impl Photograph {
         })
     }
 
-    /// Writes a grey PNG of 8 bits where `full` is 255, of 16 otherwise.
+    /// Writes a grey PNG, with 8 bits if `full` is 255 and 16 bits otherwise.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let eight = self.full == 255;
         let bytes: Vec<u8> = match eight {
@@ -88,8 +89,8 @@ impl Photograph {
         })
     }
 
-    /// The share of pixels at the end of the sensor's range, 0 where the brightest is none that a sensor ends at: 255,
-    /// or the largest number of 10, 12, 14 or 16 bits, at either end of a word of 16.
+    /// Returns the fraction of pixels at the sensor's limit. It is 0 unless the brightest value is a limit of sensors:
+    /// 255, or the largest number of 10, 12, 14 or 16 bits, aligned to either end of a 16-bit word.
     pub fn saturated(&self) -> f64 {
         let most = self.values.iter().copied().max().unwrap_or(0);
         let is_end = match self.full {
@@ -108,7 +109,8 @@ impl Photograph {
         }
     }
 
-    /// The value at (`x`, `y`), pixel centres at halves, between the four nearest, the rim going on outside.
+    /// Interpolates the value at (`x`, `y`) between the four nearest pixels. Pixel centres are at half-integers, and
+    /// border pixels are repeated outside.
     pub fn sample(&self, x: f64, y: f64) -> f32 {
         let (x, y) = (x - 0.5, y - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
@@ -125,7 +127,7 @@ impl Photograph {
         top + (bottom - top) * fy
     }
 
-    /// The mean of each block of `factor`×`factor` pixels, what is left over at the end dropped: (H/f, W/f).
+    /// Averages blocks of `factor`×`factor` pixels and drops incomplete blocks at the end: (H/f, W/f).
     pub fn shrunk(&self, factor: usize) -> (usize, usize, Vec<f32>) {
         let (height, width) = (self.height / factor, self.width / factor);
         let mut out = vec![0.0; height * width];
@@ -142,7 +144,7 @@ impl Photograph {
     }
 }
 
-/// Channel `colour` of each pixel; of a grey one the grey.
+/// Returns channel `colour` of each pixel, or the grey value of a grey image.
 fn every<T: Copy>(raw: Vec<T>, channels: usize, colour: usize, to: impl Fn(T) -> u16) -> Vec<u16> {
     let channel = if channels >= 3 { colour } else { 0 };
     raw.chunks_exact(channels).map(|p| to(p[channel])).collect()

@@ -1,4 +1,4 @@
-//! What a calibration looks like: curves with what was measured, and maps over the modulator, as SVG.
+//! SVG charts of a calibration: curves with the measured points, and maps over the modulator.
 
 use ndarray::{Array2, ArrayView2};
 use phasefront_io::{Error, Result, output};
@@ -7,65 +7,65 @@ use plotters::prelude::*;
 use std::io::Write;
 use std::path::Path;
 
-/// Width and height of a panel, pixels.
+/// The width and height of a panel, in pixels.
 const PANEL: (u32, u32) = (430, 330);
-/// One after the other for the curves of a panel.
+/// The colours of the curves in a panel, in order.
 const COLOURS: [RGBColor; 4] = [
     RGBColor(31, 95, 160),
     RGBColor(196, 78, 22),
     RGBColor(60, 140, 60),
     RGBColor(120, 70, 150),
 ];
-/// The most rectangles along a side of a map.
+/// The maximum number of rectangles along a side of a map.
 const CELLS: usize = 96;
 
 type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// A curve by its points, drawn as a line or as dots.
+/// A curve, drawn as a line or as dots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// In the legend; empty for none.
+    /// The name in the legend, or an empty string for no entry.
     pub name: String,
-    /// By growing x.
+    /// The points in ascending order of x.
     pub points: Vec<(f64, f64)>,
-    /// Dots where true, else a line.
+    /// Whether the points are drawn as dots instead of a line.
     pub dots: bool,
 }
 
-/// Curves over one pair of axes.
+/// Curves with common axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Over them.
+    /// The title above the panel.
     pub title: String,
-    /// Along x.
+    /// The label of the x axis.
     pub x: &'static str,
-    /// Along y.
+    /// The label of the y axis.
     pub y: &'static str,
-    /// At least one point in all.
+    /// The curves, which need at least one point in total.
     pub curves: Vec<Curve>,
 }
 
-/// A value for each pixel of the modulator, NaN where there is none.
+/// A map with one value per pixel of the modulator. NaN marks pixels without a value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map {
-    /// Over it.
+    /// The title above the map.
     pub title: String,
-    /// (H, W).
+    /// The values, (H, W).
     pub values: Array2<f32>,
 }
 
-/// Writes `panels` side by side, `across` a row, to `path`, an SVG.
+/// Writes `panels` as SVG to `path`, with `across` panels in each row.
 ///
 /// # Errors
-/// A panel without a finite point, or a file that cannot be written.
+/// Returns an error if a panel has no finite point or the file cannot be written.
 pub fn write_curves(path: &Path, panels: &[Panel], across: usize) -> Result<()> {
     write(path, panels.len(), across, |area, i| curves(area, &panels[i]))
 }
 
-/// Writes `maps` side by side, `across` a row, to `path`, an SVG.
+/// Writes `maps` as SVG to `path`, with `across` maps in each row.
 ///
 /// # Errors
-/// A map without a finite value, or a file that cannot be written.
+/// Returns an error if a map has no finite value or the file cannot be written.
 pub fn write_maps(path: &Path, maps: &[Map], across: usize) -> Result<()> {
     write(path, maps.len(), across, |area, i| map(area, &maps[i]))
 }
@@ -89,7 +89,7 @@ fn write(path: &Path, count: usize, across: usize, draw: impl Fn(&Area<'_>, usiz
     output::write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// The least and the largest of finite values, apart at least a little.
+/// Returns the least and the largest finite value, at least a little apart.
 fn span(values: impl Iterator<Item = f64>) -> std::result::Result<(f64, f64), &'static str> {
     let (low, high) = values
         .filter(|v| v.is_finite())
@@ -148,7 +148,7 @@ fn map(area: &Area<'_>, map: &Map) -> Drawn {
     let (low, high) = span(small.iter().map(|v| f64::from(*v)))?;
     let (height, width) = map.values.dim();
     let title = format!("{}: {} to {}", map.title, short(low), short(high));
-    // The chart's sides as the modulator's.
+    // The chart has the modulator's aspect ratio.
     let inner = f64::from(PANEL.0 - 40);
     let tall = (inner * height as f64 / width as f64).min(f64::from(PANEL.1 - 60));
     let wide = tall * width as f64 / height as f64;
@@ -172,7 +172,7 @@ fn map(area: &Area<'_>, map: &Map) -> Drawn {
     Ok(())
 }
 
-/// From dark blue over a light middle to dark red.
+/// Returns a colour from dark blue through a light centre to dark red.
 fn shade(t: f64) -> RGBColor {
     const STOPS: [[f64; 3]; 5] = [
         [20.0, 40.0, 110.0],
@@ -187,13 +187,13 @@ fn shade(t: f64) -> RGBColor {
     RGBColor(mix(0) as u8, mix(1) as u8, mix(2) as u8)
 }
 
-/// Three digits.
+/// Formats a number with three digits.
 fn short(v: f64) -> String {
     let digits = (2.0 - v.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0);
     format!("{v:.0$}", digits as usize)
 }
 
-/// The mean of what is finite in each of at most [`CELLS`] cells along a side.
+/// Averages the finite values in each of at most [`CELLS`] cells along a side.
 fn shrunk(values: ArrayView2<'_, f32>) -> Array2<f32> {
     let (height, width) = values.dim();
     let step = height.max(width).div_ceil(CELLS);

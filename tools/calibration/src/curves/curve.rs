@@ -1,62 +1,62 @@
-//! The phase curve of one pixel from its light at 256 levels, Eq. 12–13, smooth and monotone.
+//! Fit of the phase curve of one pixel to its light at 256 levels (Eq. 12–13). The curve is smooth and monotone.
 //!
-//! # First: the paper's way
+//! # Initial curve: the paper's method
 //! θₖ = 2·acos((√Iₖ − √Iₘᵢₙ)/(√Iₘₐₓ − √Iₘᵢₙ)) is the angle between the two pixels of a cell, folded into 0..π (Eq. 12).
-//! It is unfolded at each turning point of the light (Eq. 13, for curves beyond 2π too): φₖ = θₖ up to the first
+//! It is unfolded at each turning point of the light (Eq. 13, extended to curves beyond 2π): φₖ = θₖ up to the first
 //! minimum, 2π − θₖ up to the next maximum, 2π + θₖ, and so on.
 //!
-//! # Then: what the light says
-//! Where the light is at its extremes acos makes noise large and biased. So the curve is fitted to the light itself: Iₖ
-//! = a + b·cos φ(k), with φ a cubic spline of 12 coefficients that do not fall (so nor does φ), φ(0) = 0, and a penalty
-//! on their third differences, which leaves what is straight or bowed as it is; by Gauss and Newton's method from the
-//! paper's curve, increments that would be negative held at 0.
+//! # Refinement: a fit to the light
+//! Near the extremes of the light, acos amplifies noise and adds bias. The curve is therefore fitted to the light
+//! itself: Iₖ = a + b·cos φ(k), where φ is a cubic spline with 12 non-decreasing coefficients (which makes φ
+//! non-decreasing) and φ(0) = 0. A penalty on the third differences of the coefficients leaves straight and bowed
+//! curves unchanged. The Gauss–Newton method starts at the paper's curve and holds negative increments at 0.
 //!
 //! # Ranges under 2π
-//! Below 2π nothing changes: b comes from what is seen. Below π the light never reaches its minimum, and a
-//! and b cannot be told apart; then the minimum is taken to be the light around the modulator.
+//! For ranges between π and 2π, b still follows from the light. Below π the light never reaches its minimum, so a and b
+//! cannot be separated. The minimum is then assumed to be the light around the modulator.
 
-/// Levels of a modulator.
+/// The number of levels of a modulator.
 pub const LEVELS: usize = 256;
-/// Coefficients of a curve.
+/// The number of coefficients of a curve.
 pub const COEFFICIENTS: usize = 12;
-/// Increments of the coefficients, the first of which is 0.
+/// The number of increments of the coefficients, without the first, which is 0.
 const INCREMENTS: usize = COEFFICIENTS - 1;
-/// Unknowns of a fit: increments, a and b.
+/// The number of unknowns of a fit: the increments, a and b.
 const UNKNOWNS: usize = INCREMENTS + 2;
-/// Coefficients, then a and b.
+/// The number of coefficients plus a and b.
 const N: usize = COEFFICIENTS + 2;
 const A: usize = COEFFICIENTS;
 const B: usize = COEFFICIENTS + 1;
-/// The weight of the penalty against light of amplitude 1: as for noise of 1/30 and increments whose second differences
-/// are 0.2 rad.
+/// The weight of the penalty relative to light of amplitude 1. It corresponds to noise of 1/30 and increments whose
+/// second differences are 0.2 rad.
 const PENALTY: f64 = 0.03;
-/// The most steps of a fit.
+/// The maximum number of iterations of a fit.
 const STEPS: usize = 20;
-/// What the light must rise or fall by, of its range, before a turning point counts: what marks and code beside a pixel
-/// scatter into it is less.
+/// The minimum change of the light, as a fraction of its range, for a turning point. Marks and code beside a pixel
+/// scatter less light into it.
 const TURN: f32 = 0.1;
-/// The same for a turn that is taken only if the curve that follows from it explains the light better: one just beyond
-/// π.
+/// The same minimum for fine turning points, such as one just beyond π. They are used only if the resulting curve
+/// explains the light better.
 const FINE_TURN: f32 = 0.015;
-/// And of the noise that the mean of nine levels has.
+/// The minimum for fine turning points, relative to the noise of a mean over nine levels.
 const FINE_TURN_NOISE: f32 = 4.0;
 
-/// Cubic B-splines over the levels 0..=255, nine equal intervals, clamped at both ends.
+/// Cubic B-splines over the levels 0..=255, with nine equal intervals, clamped at both ends.
 pub struct Basis {
-    /// For each level the first spline that is not 0 there, and the four values.
+    /// For each level, the index of the first nonzero spline and the values of four splines.
     rows: Vec<(usize, [f64; 4])>,
-    /// (coefficients × coefficients): from light to coefficients that fit phases in the least squares.
+    /// The matrix, (coefficients × coefficients), that yields the least-squares coefficients for given phases.
     smoother: [[f64; COEFFICIENTS]; COEFFICIENTS],
 }
 
-/// A pixel's curve.
+/// The curve of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// The spline's coefficients, radians, from 0 on, never falling.
+    /// The coefficients of the spline in radians, non-decreasing and starting at 0.
     pub coefficients: [f32; COEFFICIENTS],
-    /// The root mean square of what the fit leaves, as a part of the light's amplitude b.
+    /// The RMS residual of the fit, relative to the light's amplitude b.
     pub residual: f32,
-    /// Whether the light passed a minimum: the range is π at least.
+    /// Whether the light passed a minimum, which means that the range is at least π.
     pub passed_minimum: bool,
 }
 
@@ -67,7 +67,7 @@ impl Default for Basis {
 }
 
 impl Basis {
-    /// The splines' values.
+    /// Computes the values of the splines.
     pub fn new() -> Self {
         let intervals = COEFFICIENTS - 3;
         let knot = |i: isize| (i - 3).clamp(0, intervals as isize) as f64;
@@ -75,7 +75,7 @@ impl Basis {
             .map(|k| {
                 let t = k as f64 * intervals as f64 / (LEVELS - 1) as f64;
                 let span = (t as usize).min(intervals - 1);
-                // Cox and de Boor: from one constant spline to four cubic ones.
+                // The Cox–de Boor recursion goes from one constant spline to four cubic ones.
                 let mut values = [1.0, 0.0, 0.0, 0.0];
                 for degree in 1..4usize {
                     let mut next = [0.0; 4];
@@ -108,20 +108,20 @@ impl Basis {
         Basis { rows, smoother }
     }
 
-    /// The curve at each level, radians.
+    /// Returns the curve at each level, in radians.
     pub fn curve(&self, coefficients: &[f32; COEFFICIENTS]) -> [f32; LEVELS] {
         let mut highest = 0.0f32;
         std::array::from_fn(|k| {
             let (first, values) = &self.rows[k];
             let terms = values.iter().zip(&coefficients[*first..]);
-            // Where coefficients are equal, rounding alone would make the curve fall.
+            // With equal coefficients, rounding could make the curve decrease.
             highest = highest.max(terms.map(|(v, c)| *v as f32 * c).sum());
             highest
         })
     }
 
-    /// Fits the curve of a pixel whose light at each level is `light`; `dark` is the light around the modulator. None
-    /// where the light does not answer to the level, or is no number.
+    /// Fits the curve of a pixel whose light at each level is `light`. `dark` is the light around the modulator.
+    /// Returns `None` if the light does not respond to the level or is not a number.
     pub fn fit(&self, light: &[f32; LEVELS], dark: f32) -> Option<Fit> {
         let (coarse, fine) = (unfolded(light, dark)?, unfolded_fine(light, dark)?);
         let other = (coarse != fine).then_some(fine);
@@ -130,7 +130,7 @@ impl Basis {
         (fits.min_by(|a, b| a.1.total_cmp(&b.1))).map(|(fit, _)| fit)
     }
 
-    /// The fit that begins with phases of Eq. 12–13, and the sum of squares that it leaves of the light, with the
+    /// Fits a curve from the initial phases of Eq. 12–13. Also returns its cost: the sum of squared residuals plus the
     /// penalty.
     fn fit_from(
         &self,
@@ -144,7 +144,7 @@ impl Basis {
         let most = smooth.iter().copied().fold(0.0, f32::max);
         let scale = f64::from(most - if passed_minimum { least } else { dark }) / 2.0;
         let offset = f64::from(if passed_minimum { least } else { dark });
-        // Light in units of its amplitude: I/scale = a + b·cos φ, a and b near 1.
+        // Light is in units of its amplitude: I/scale = a + b·cos φ, with a and b near 1.
         let seen: Vec<f64> = (light.iter()).map(|v| (f64::from(*v) - offset) / scale).collect();
         let mut p = [0.0; UNKNOWNS];
         p[..INCREMENTS].copy_from_slice(&self.increments(phases));
@@ -154,7 +154,7 @@ impl Basis {
             let target = self.step(&p, &seen, passed_minimum);
             let mut share = 1.0;
             let (mut next, mut lower) = (p, f64::INFINITY);
-            // A full step goes to where the linear model is best; half of it while that is worse.
+            // A full step leads to the optimum of the linear model. It is halved while the cost is higher.
             for _ in 0..6 {
                 next = std::array::from_fn(|i| p[i] + share * (target[i] - p[i]));
                 lower = self.cost(&next, &seen);
@@ -189,7 +189,7 @@ impl Basis {
         Some((fit, cost * scale * scale))
     }
 
-    /// The increments of the spline nearest to `phases`, none below 0.
+    /// Returns the increments of the spline nearest to `phases`, clamped to at least 0.
     fn increments(&self, phases: &[f32; LEVELS]) -> [f64; INCREMENTS] {
         let mut projected = [0.0; COEFFICIENTS];
         for ((first, values), phase) in self.rows.iter().zip(phases) {
@@ -202,7 +202,7 @@ impl Basis {
         std::array::from_fn(|i| (c[i + 1] - c[i].max(0.0)).max(0.0))
     }
 
-    /// The phase at each level.
+    /// Returns the phase at each level.
     fn phases<'a>(&'a self, p: &[f64; UNKNOWNS]) -> impl Iterator<Item = f64> + use<'a> {
         let mut c = [0.0; COEFFICIENTS];
         for i in 1..COEFFICIENTS {
@@ -226,12 +226,13 @@ impl Basis {
         left + PENALTY * bent
     }
 
-    /// Where the linear model about `p` is best, increments at 0 or above; a = b where the minimum was not seen.
+    /// Returns the optimum of the linear model about `p`, with non-negative increments. Sets a = b if no minimum was
+    /// passed.
     fn step(&self, p: &[f64; UNKNOWNS], seen: &[f64], free: bool) -> [f64; UNKNOWNS] {
         let (gram, right) = self.normal_equations(p, seen);
         let (mut system, mut wanted) = of_increments(gram, right);
         if !free {
-            // One unknown for both: their columns and rows summed, the second left alone.
+            // Both are one unknown: their columns and rows are summed, and the second is unused.
             let (a, b) = (INCREMENTS, INCREMENTS + 1);
             for row in &mut system {
                 row[a] += row[b];
@@ -246,7 +247,7 @@ impl Basis {
             system[b][b] = 1.0;
             wanted[b] = 0.0;
         }
-        // The equations for the unknowns themselves, and the penalty.
+        // This solves for the unknowns themselves instead of their changes, and adds the penalty.
         for (row, wanted) in system.iter_mut().zip(&mut wanted) {
             *wanted += row.iter().zip(p).map(|(g, p)| g * p).sum::<f64>();
         }
@@ -267,7 +268,8 @@ impl Basis {
         next
     }
 
-    /// Of the linear model about `p`, in coefficients, where splines are local, a and b; the lower triangle.
+    /// Builds the normal equations of the linear model about `p`, in terms of the coefficients, a and b. The splines
+    /// are local in the coefficients. Only the lower triangle is filled.
     fn normal_equations(&self, p: &[f64; UNKNOWNS], seen: &[f64]) -> ([[f64; N]; N], [f64; N]) {
         let (a, b) = (p[INCREMENTS], p[INCREMENTS + 1]);
         let mut gram = [[0.0; N]; N];
@@ -296,8 +298,8 @@ impl Basis {
     }
 }
 
-/// Normal equations in increments, a and b, of those in coefficients: coefficient i is the sum of the increments below
-/// it, so sums from the end.
+/// Converts normal equations in coefficients, a and b to increments, a and b. Coefficient i is the sum of the
+/// increments up to i, so this sums from the end.
 fn of_increments(mut gram: [[f64; N]; N], mut right: [f64; N]) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
     for i in 1..N {
         let (above, row) = gram.split_at_mut(i);
@@ -324,7 +326,7 @@ fn of_increments(mut gram: [[f64; N]; N], mut right: [f64; N]) -> ([[f64; UNKNOW
     (system, wanted)
 }
 
-/// Solves `system`, with increments that would be below 0 held at 0.
+/// Solves `system` and holds increments that would be negative at 0.
 fn non_negative(system: [[f64; UNKNOWNS]; UNKNOWNS], wanted: [f64; UNKNOWNS]) -> [f64; UNKNOWNS] {
     let mut held = [false; UNKNOWNS];
     loop {
@@ -345,7 +347,7 @@ fn non_negative(system: [[f64; UNKNOWNS]; UNKNOWNS], wanted: [f64; UNKNOWNS]) ->
     }
 }
 
-/// Solves a symmetric positive system of the first `n` unknowns; directions without weight stay 0.
+/// Solves a symmetric positive system in its first `n` unknowns. Unknowns with zero weight stay 0.
 pub(crate) fn cholesky<const N: usize>(mut m: [[f64; N]; N], mut right: [f64; N], n: usize) -> [f64; N] {
     for i in 0..n {
         for j in 0..=i {
@@ -365,7 +367,7 @@ pub(crate) fn cholesky<const N: usize>(mut m: [[f64; N]; N], mut right: [f64; N]
     right
 }
 
-/// The mean over nine levels, fewer at the ends.
+/// Averages over nine levels, and fewer at the ends.
 fn smoothed(light: &[f32; LEVELS]) -> [f32; LEVELS] {
     std::array::from_fn(|k| {
         let half = 4.min(k).min(LEVELS - 1 - k);
@@ -374,15 +376,15 @@ fn smoothed(light: &[f32; LEVELS]) -> [f32; LEVELS] {
     })
 }
 
-/// The phases of Eq. 12–13, and whether a minimum was passed. None where the light does not change, or is brightest
-/// elsewhere than the phase 0 of level 0 asks.
+/// Returns the phases of Eq. 12–13 and whether a minimum was passed. Returns `None` if the light does not change, or if
+/// its maximum is inconsistent with a phase of 0 at level 0.
 pub fn unfolded(light: &[f32; LEVELS], dark: f32) -> Option<([f32; LEVELS], bool)> {
     unfolded_at(light, dark, |range| TURN * range)
 }
 
-/// [`unfolded`] at turns as small as noise lets them be told.
+/// Computes [`unfolded`] with turning points as small as the noise allows.
 fn unfolded_fine(light: &[f32; LEVELS], dark: f32) -> Option<([f32; LEVELS], bool)> {
-    // Of a smooth curve's second differences noise of σ makes 6σ².
+    // Noise of σ gives second differences of a smooth curve a variance of 6σ².
     let bends = light.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2));
     let noise = (bends.sum::<f32>() / (6.0 * (LEVELS - 2) as f32)).sqrt() / 3.0;
     unfolded_at(light, dark, |range| {
@@ -399,12 +401,13 @@ fn unfolded_at(light: &[f32; LEVELS], dark: f32, turn: impl Fn(f32) -> f32) -> O
         return None;
     }
     let enough = turn(range);
-    // The levels at which the light turns, found once it has gone back by enough; the last ones are means of fewer.
+    // A turn is accepted once the light has reversed by enough. The means of the last levels cover fewer values, so
+    // those levels are skipped.
     let mut turns = Vec::new();
     let (mut extreme, mut at, mut falls) = (smooth[0], 0, true);
     for (k, value) in smooth.iter().enumerate().take(LEVELS - 4) {
         let beyond = if falls { *value < extreme } else { *value > extreme };
-        // Minima lie low and maxima high; what turns elsewhere is noise where the light is flat.
+        // Minima have low light and maxima have high light. Other turns are noise where the light is flat.
         let is_low = extreme - least < 0.5 * range;
         if beyond {
             (extreme, at) = (*value, k);
@@ -431,8 +434,8 @@ fn unfolded_at(light: &[f32; LEVELS], dark: f32, turn: impl Fn(f32) -> f32) -> O
     Some((phases, passed_minimum))
 }
 
-/// The lowest level whose phase is nearest to each of 256 steps of 2π, by a `curve` that rises: a full table's row. A
-/// phase that lies beyond the curve's end has the end or level 0, whichever is nearer.
+/// Returns the lowest level whose phase is nearest to each of 256 steps of 2π, by an increasing `curve`. This is a row
+/// of the full table. A phase beyond the end of the curve gets the last level or level 0, whichever is nearer.
 pub fn inverse(curve: &[f32; LEVELS]) -> [u8; LEVELS] {
     use std::f32::consts::TAU;
     let last = curve[LEVELS - 1];
@@ -449,8 +452,8 @@ pub fn inverse(curve: &[f32; LEVELS]) -> [u8; LEVELS] {
     })
 }
 
-/// The level, with its fraction, at which a rising `curve` has `phase`; beyond its end it goes on at the slope of
-/// its last sixteenth, up to 511.
+/// Returns the fractional level at which an increasing `curve` has `phase`. Beyond its end, the curve is extrapolated
+/// with the slope of its last sixteenth, up to 511.
 pub fn level_of(curve: &[f32; LEVELS], phase: f32) -> f32 {
     let above = curve.partition_point(|v| *v < phase);
     match above {
@@ -474,7 +477,7 @@ mod tests {
     use phasefront_io::dice::Dice;
     use std::f32::consts::{PI, TAU};
 
-    /// A curve of `range`·2π with a bow and an S, and its light with noise.
+    /// Creates a curve of `range`·2π with a bow and an S shape, and its noisy light.
     fn pixel(range: f32, noise: f64, seed: u64) -> ([f32; LEVELS], [f32; LEVELS]) {
         let mut dice = Dice::new(seed);
         let curve: [f32; LEVELS] = std::array::from_fn(|k| {
@@ -512,10 +515,10 @@ mod tests {
     #[test]
     fn curves_of_all_ranges_come_back_from_noisy_light() {
         let basis = Basis::new();
-        // What noise allows: the light tells of the phase by sin φ, and so nothing where it is at an extreme. The
-        // covariance of the penalised least squares (the inverse of Fisher's information, the penalty added) says that
-        // 19 times in 20 the worst of 20 seeds stays below 0.043, 0.013, 0.011, 0.022, 0.028 and 0.016; a curve that
-        // ends at an extreme, at 2π or at π, is the hardest.
+        // These are the limits that noise sets. The light depends on the phase by sin φ, so it carries no information
+        // at its extremes. The covariance of the penalised least squares (the inverse of Fisher's information with the
+        // penalty added) predicts that, 19 times in 20, the worst of 20 seeds stays below 0.043, 0.013, 0.011, 0.022,
+        // 0.028 and 0.016. Curves that end at an extreme, at 2π or at π, are the hardest.
         for (range, noise, most) in [
             (1.0, 0.0, 0.01),
             (1.02, 0.02, 0.045),
@@ -549,8 +552,8 @@ mod tests {
         }
     }
 
-    /// Eq. 12 takes differences of roots, which is exact where the light's minimum is 0; stray light below it, a
-    /// sixtieth of the maximum here, bends what it gives by 0.1 rad. The fit knows of stray light.
+    /// Eq. 12 takes differences of square roots, which is exact if the light's minimum is 0. Stray light, here a
+    /// sixtieth of the maximum, changes its result by 0.1 rad. The fit accounts for stray light.
     #[test]
     fn equations_12_and_13_unfold_a_clean_curve() {
         let (curve, light) = pixel(1.3, 0.0, 0);

@@ -1,9 +1,9 @@
-//! From photographs of the 256 patterns to each pixel's phase curve, and from the curves to the table that a phone
-//! holds.
+//! Computation of each pixel's phase curve from photographs of the 256 patterns, and of the compact per-pixel table
+//! from the curves.
 //!
 //! # Memory
-//! One photograph is held at a time. Its light on the modulator's pixels goes to a temporary file of 2 bytes a pixel
-//! and pattern (1 GB for 1920×1080), from which rows are read pattern by pattern for the fits. Curves take 48 bytes a
+//! One photograph is in memory at a time. Its light on the modulator's pixels goes to a temporary file with 2 bytes per
+//! pixel and pattern (1 GB for 1920×1080). The fits read rows of it, pattern by pattern. The curves take 48 bytes per
 //! pixel.
 
 use crate::COLOURS;
@@ -21,50 +21,50 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Nodes of the table along the wider axis, at most, but for the last.
+/// The maximum number of the table's nodes along the longer axis, without the last node.
 const NODES: usize = 60;
-/// Intervals of phase of the table.
+/// The number of phase intervals of the table.
 const INTERVALS: usize = 32;
-/// Rows that are fitted at a time.
+/// The number of rows that are fitted at a time.
 const STRIP: usize = 8;
-/// By how many pixels of the modulator a photograph may be shifted against the first.
+/// The maximum shift of a photograph relative to the first, in pixels of the modulator.
 const MOST_SHIFT: f64 = 0.75;
-/// A pixel whose light changes by less than this part of the median does not answer.
+/// A pixel whose light changes by less than this fraction of the median is unresponsive.
 const LEAST_CONTRAST: f32 = 0.1;
-/// The most that a fit may leave, as a part of the light's amplitude, for its pixel to count.
+/// The maximum residual of a usable fit, relative to the light's amplitude.
 const MOST_RESIDUAL: f32 = 0.25;
-/// The share of pixels that need not answer.
+/// The maximum fraction of unresponsive pixels.
 pub const SILENT_SHARE: f64 = 0.01;
 
-/// What is wrong with one photograph, and what to do.
+/// A problem with one photograph, with advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// The colour, 0 red to 2 blue.
+    /// The colour, from 0 for red to 2 for blue.
     pub colour: usize,
-    /// The pattern that it should show.
+    /// The pattern that the photograph should show.
     pub pattern: usize,
-    /// What is wrong.
+    /// The kind of problem.
     pub what: What,
 }
 
-/// See [`Problem`].
+/// The kind of a [`Problem`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum What {
-    /// No file of that name.
+    /// No file has the expected name.
     Missing,
     /// The file cannot be read.
     Unreadable(String),
-    /// (H, W) of it and of the first.
+    /// The size differs: (H, W) of this photograph and of the first.
     Size([usize; 2], [usize; 2]),
-    /// The share of pixels at the sensor's end.
+    /// The photograph is saturated. The value is the fraction of pixels at the sensor's limit.
     Saturated(f64),
-    /// The marks are not there.
+    /// The marks were not found.
     NoMarks(NoMarks),
-    /// The code says another pattern.
+    /// The code is that of another pattern.
     Shows(u8),
     /// The code cannot be read.
     NoCode,
-    /// By how many pixels of the photograph it is shifted, x and y.
+    /// The photograph is shifted by (x, y), in its pixels.
     Shifted([f64; 2]),
 }
 
@@ -104,12 +104,12 @@ impl std::fmt::Display for Problem {
     }
 }
 
-/// Why there are no curves: the photographs, or the disk.
+/// The reason why no curves were computed: the photographs or another error.
 #[derive(Debug)]
 pub enum Refusal {
-    /// Photographs that cannot be used, all of them.
+    /// All photographs that cannot be used.
     Problems(Vec<Problem>),
-    /// Something else.
+    /// Another error.
     Other(Error),
 }
 
@@ -119,10 +119,10 @@ impl From<Error> for Refusal {
     }
 }
 
-/// The photograph of a pattern in one colour: a file's, or what a camera gives.
+/// A function that returns the photograph of a pattern in one colour, from a file or a camera.
 pub type Source<'a> = &'a dyn Fn(usize) -> std::result::Result<Photograph, What>;
 
-/// The file of the photograph of pattern `k`, one of `capture_000.png`, `.tif`, `.tiff` in `folder`.
+/// Returns the file of the photograph of pattern `k` in `folder`: `capture_000.png`, `.tif` or `.tiff`.
 fn capture_path(folder: &Path, k: usize) -> Option<PathBuf> {
     ["png", "tif", "tiff", "PNG", "TIF", "TIFF"]
         .iter()
@@ -133,7 +133,7 @@ fn capture_path(folder: &Path, k: usize) -> Option<PathBuf> {
 /// Reads the photograph of pattern `k` in `colour` from `folder`.
 ///
 /// # Errors
-/// A file that is missing or cannot be read.
+/// Returns an error if the file is missing or cannot be read.
 pub fn read_capture(folder: &Path, colour: usize, k: usize) -> std::result::Result<Photograph, What> {
     let path = capture_path(folder, k).ok_or(What::Missing)?;
     Photograph::read(&path, colour).map_err(|e| match e {
@@ -142,7 +142,7 @@ pub fn read_capture(folder: &Path, colour: usize, k: usize) -> std::result::Resu
     })
 }
 
-/// The light of each pixel in each pattern, on disk.
+/// The light of each pixel in each pattern, stored on disk.
 struct Stack {
     file: File,
     shape: (usize, usize),
@@ -171,7 +171,7 @@ impl Stack {
         self.file.write_all(&bytes).map_err(|e| self.refuse(e))
     }
 
-    /// Rows `y`.. of `rows` rows: for each pixel its light in all patterns.
+    /// Returns the light in all patterns for each pixel of `rows` rows, starting at row `y`.
     fn rows(&mut self, y: usize, rows: usize) -> Result<Vec<[f32; LEVELS]>> {
         let (height, width) = self.shape;
         let mut bytes = vec![0; 2 * rows * width];
@@ -188,32 +188,33 @@ impl Stack {
     }
 }
 
-/// The curves of one colour.
+/// The phase curves of one colour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curves {
-    /// 0 red to 2 blue.
+    /// The colour, from 0 for red to 2 for blue.
     pub colour: usize,
-    /// (H, W), each the coefficients of [`Basis`]; NaN where a pixel gave none.
+    /// The coefficients of [`Basis`] for each pixel, (H, W). Pixels without a curve are NaN.
     pub coefficients: Array2<[f32; COEFFICIENTS]>,
-    /// (H, W): what the fit left, as a part of the light's amplitude; NaN where there is none.
+    /// The residual of each fit, (H, W), relative to the light's amplitude. Pixels without a curve are NaN.
     pub residual: Array2<f32>,
-    /// Pixels that do not answer, (y, x): dust, or dead ones. Their curves are taken from their neighbours.
+    /// The unresponsive pixels, (y, x), caused by dust or defects. Their curves come from their neighbours.
     pub silent: Vec<(usize, usize)>,
-    /// The share of pixels whose light passed no minimum: their range is about π or less.
+    /// The fraction of pixels whose light passed no minimum, so that their range is about π or less.
     pub under_pi: f64,
-    /// Pixels of the photograph that one of the modulator takes.
+    /// The number of photograph pixels per modulator pixel.
     pub zoom: f64,
-    /// A few pixels, (y, x), with their light: for plots.
+    /// The light of a few pixels, (y, x), for plots.
     pub samples: Vec<((usize, usize), [f32; LEVELS])>,
-    /// The light around the modulator, as a part of the sensor's range.
+    /// The light around the modulator, as a fraction of the sensor's range.
     pub dark: f32,
 }
 
-/// Finds the curves of one colour from the photographs that `source` gives; `spool` is a folder for the temporary
-/// file. `progress` hears of the photographs and rows done, of all.
+/// Computes the curves of one colour from the photographs that `source` returns. The temporary file is created in the
+/// folder `spool`. `progress` receives the number of photographs and rows done, and their total.
 ///
 /// # Errors
-/// Photographs that cannot be used, told one by one; more than [`SILENT_SHARE`] of the pixels without an answer.
+/// Returns an error that lists the unusable photographs, or an error if more than [`SILENT_SHARE`] of the pixels are
+/// unresponsive.
 pub fn measure(
     pattern: &Pattern,
     colour: usize,
@@ -260,7 +261,7 @@ pub fn measure(
     Ok(curves)
 }
 
-/// What is right with a photograph, against the first.
+/// Checks a photograph against the first one.
 fn checked(
     photograph: &Photograph,
     pattern: &Pattern,
@@ -292,7 +293,7 @@ fn checked(
     Ok(registration)
 }
 
-/// What a pixel's light gave.
+/// The result for one pixel.
 struct Pixel {
     coefficients: [f32; COEFFICIENTS],
     residual: f32,
@@ -336,7 +337,7 @@ fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progres
             coefficients[at] = pixel.coefficients;
             residual[at] = pixel.residual;
             contrast[at] = pixel.contrast;
-            // The middle, and two places between it and the corners.
+            // The samples are the centre and two points between it and the corners.
             let places = [
                 (height / 2, width / 2),
                 (height / 4, width * 3 / 4),
@@ -356,7 +357,7 @@ fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progres
         if contrast.is_nan() {
             continue;
         }
-        // The comparison says no to NaN.
+        // A comparison with NaN is false.
         let answers = *contrast >= LEAST_CONTRAST * median && residual[at] <= MOST_RESIDUAL;
         if !answers {
             silent.push(at);
@@ -384,18 +385,18 @@ fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progres
 }
 
 impl Curves {
-    /// (H, W).
+    /// Returns the height and width, (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.coefficients.dim()
     }
 
-    /// The curve of pixel (`x`, `y`), None where it gave none.
+    /// Returns the curve of pixel (`x`, `y`), or `None` if it has none.
     pub fn curve(&self, basis: &Basis, y: usize, x: usize) -> Option<[f32; LEVELS]> {
         let coefficients = &self.coefficients[(y, x)];
         (!coefficients[0].is_nan()).then(|| basis.curve(coefficients))
     }
 
-    /// What level 255 turns, in units of 2π, of each pixel that has a curve.
+    /// Returns the phase of level 255, in units of 2π, for each pixel that has a curve.
     pub fn ranges(&self) -> Vec<f32> {
         let mut ranges: Vec<f32> = (self.coefficients.iter())
             .map(|c| c[COEFFICIENTS - 1] / TAU)
@@ -406,16 +407,16 @@ impl Curves {
     }
 }
 
-/// Pixels from node to node of the table of a (`height`, `width`) modulator.
+/// Returns the spacing of the table's nodes, in pixels, for a (`height`, `width`) modulator.
 pub fn spacing(height: usize, width: usize) -> usize {
     height.max(width).div_ceil(NODES)
 }
 
-/// The compact table of the curves of red, green and blue: its nodes' curves are those of a smooth surface through the
-/// pixels' ([`surface`]), which also takes the noise of single pixels away, and bridges marks and dust.
+/// Computes the compact table from the curves of red, green and blue. The nodes' curves lie on a smooth surface through
+/// the pixels' curves ([`surface`]), which also suppresses the noise of single pixels and bridges marks and dust.
 ///
 /// # Errors
-/// Curves of different shapes, or without any.
+/// Returns an error if the shapes differ or a colour has no curves.
 pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
     let (height, width) = curves[0].shape();
     if curves.iter().any(|c| c.shape() != (height, width)) {
@@ -429,7 +430,7 @@ pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
             .ok_or_else(|| Error::Input(format!("{}: no pixel has a curve", COLOURS[curves.colour])))?;
         for coefficients in &nodes {
             let mut highest = 0.0f32;
-            // Where the surface goes on beyond the pixels a curve could fall.
+            // A curve could decrease where the surface is extrapolated beyond the pixels.
             let rising = coefficients.map(|c| {
                 highest = highest.max(c);
                 highest
@@ -442,30 +443,31 @@ pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
     Ok(PerPixel::new(height, width, spacing, INTERVALS, &levels, &turns)?)
 }
 
-/// The levels of the knots' phases by a node's curve, and the phase from which 0 is nearer than its end.
+/// Returns the levels at the knots' phases by a node's curve, and the phase above which 0 is nearer than the curve's
+/// end.
 fn knots(curve: &[f32; LEVELS]) -> ([f32; INTERVALS + 1], f32) {
     let values = std::array::from_fn(|k| curve::level_of(curve, k as f32 / INTERVALS as f32 * TAU));
     let last = curve[LEVELS - 1];
     (values, if last < TAU { 0.5 * (last + TAU) } else { TAU })
 }
 
-/// How far apart phases are that should be equal, over all pixels with a curve, radians.
+/// Phase errors over all pixels with a curve, in radians.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Errors {
-    /// What the factory's linear table leaves, root mean square.
+    /// The RMS error of the factory's linear table.
     pub linear_rms: f64,
-    /// What the full table leaves: its steps of one level.
+    /// The RMS error of the full table, caused by its steps of one level.
     pub full_rms: f64,
-    /// What the compact table leaves.
+    /// The RMS error of the compact table.
     pub compact_rms: f64,
-    /// Between the compact table and the full one, root mean square.
+    /// The RMS difference between the compact table and the full one.
     pub between_rms: f64,
-    /// Between the compact table and the full one, in 99.9 of 100 places at most.
+    /// The 99.9th percentile of the difference between the compact table and the full one.
     pub between_most: f64,
 }
 
-/// What tables leave of one colour's phases where its curves can reach them, by the curves themselves. Phases are every
-/// fourth of 256 steps.
+/// Computes the phase errors of the tables for one colour, where its measured curves reach the phase. It tests every
+/// fourth of 256 phase steps.
 pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
     let (height, width) = curves.shape();
     let basis = Basis::new();
@@ -477,7 +479,7 @@ pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
     struct Sums {
         count: f64,
         squares: [f64; 4],
-        // Counts of |between| by thousandths of a radian.
+        // Counts of |between| in bins of a thousandth of a radian.
         histogram: Vec<u64>,
     }
     let none = || Sums {
@@ -537,15 +539,15 @@ pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
     }
 }
 
-/// Writes the full table of one colour, uint8 (H, W, 256), to `file` as .npy: for each pixel the level of each of 256
-/// phase steps. Pixels without a curve have those of `table`.
+/// Writes the full table of one colour, uint8 (H, W, 256), to `file` as .npy: the level of each of 256 phase steps for
+/// each pixel. Pixels without a curve use the levels of `table`.
 ///
 /// # Errors
-/// What writing refuses.
+/// Returns an error if writing fails.
 pub fn write_full(curves: &Curves, table: &PerPixel, file: &mut dyn Write) -> std::io::Result<()> {
     let (height, width) = curves.shape();
     let mut header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({height}, {width}, {LEVELS}), }}");
-    // Magic, version and length are 10 bytes; the whole is a multiple of 64 and ends with a line break.
+    // Magic, version and length take 10 bytes. The total length is a multiple of 64 and ends with a line break.
     let padding = (10 + header.len() + 1).next_multiple_of(64) - (10 + header.len() + 1);
     header.push_str(&" ".repeat(padding));
     header.push('\n');

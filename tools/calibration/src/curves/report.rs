@@ -1,4 +1,4 @@
-//! What a calibration of curves found, as numbers and as drawings.
+//! Numerical reports and charts of calibrated curves.
 
 use crate::COLOURS;
 use crate::curves::chart::{self, Curve, Map, Panel};
@@ -11,45 +11,45 @@ use serde::Serialize;
 use std::f32::consts::TAU;
 use std::path::Path;
 
-/// One colour's curves.
+/// The results for one colour.
 #[derive(Debug, Clone, Serialize)]
 pub struct ColourReport {
-    /// "red", "green" or "blue".
+    /// The name of the colour: "red", "green" or "blue".
     pub colour: &'static str,
-    /// What level 255 turns, in units of 2π: the least, the median, the most over the modulator.
+    /// The phase of level 255, in units of 2π: minimum, median and maximum over the modulator.
     pub range_turns: [f32; 3],
-    /// The share of pixels that do not reach 2π.
+    /// The fraction of pixels that do not reach 2π.
     pub under_two_pi: f64,
-    /// The share of pixels whose light passed no minimum: about π or less.
+    /// The fraction of pixels whose light passed no minimum, so that their range is about π or less.
     pub under_pi: f64,
-    /// Pixels that do not answer; their curves are their neighbours'.
+    /// The number of unresponsive pixels. Their curves come from their neighbours.
     pub silent_pixels: usize,
-    /// The first of them, (x, y).
+    /// The first unresponsive pixels, (x, y).
     pub silent_at: Vec<[usize; 2]>,
-    /// Root mean square of what fits leave of the light, as a part of its amplitude.
+    /// The RMS residual of the fits, relative to the light's amplitude.
     pub residual: f64,
-    /// Pixels of a photograph that one of the modulator takes.
+    /// The number of photograph pixels per modulator pixel.
     pub zoom: f64,
-    /// Phase errors of the tables by the measured curves, radians.
+    /// The phase errors of the tables according to the measured curves, in radians.
     pub errors_rad: Errors,
 }
 
-/// The curves of all three colours, and their table.
+/// The results for all three colours and their table.
 #[derive(Debug, Clone, Serialize)]
 pub struct LutReport {
-    /// Red, green, blue.
+    /// The results for red, green and blue.
     pub colours: Vec<ColourReport>,
-    /// The compact table's file, bytes.
+    /// The size of the compact table's file, in bytes.
     pub table_bytes: usize,
-    /// A full table of 256 levels for each pixel and colour, bytes.
+    /// The size of a full table of 256 levels for each pixel and colour, in bytes.
     pub full_bytes: usize,
-    /// Pixels between the table's nodes.
+    /// The spacing of the table's nodes, in pixels.
     pub spacing: usize,
-    /// Intervals of phase of the table.
+    /// The number of phase intervals of the table.
     pub intervals: usize,
 }
 
-/// The numbers.
+/// Computes the report for these curves and their table.
 pub fn report(curves: &[Curves; 3], table: &PerPixel) -> LutReport {
     let colours = curves.iter().map(|curves| {
         let ranges = curves.ranges();
@@ -79,7 +79,7 @@ pub fn report(curves: &[Curves; 3], table: &PerPixel) -> LutReport {
 }
 
 impl LutReport {
-    /// As lines to read.
+    /// Formats the report as text.
     pub fn text(&self) -> String {
         let mut text = String::from(
             "colour  range/2π least median most   <2π %   <π %  silent  residual   phase error, rad RMS: linear    full  compact  compact−full (99.9 %)\n",
@@ -110,11 +110,11 @@ impl LutReport {
     }
 }
 
-/// Draws the curves of a few pixels with what was measured, what fits leave, and the maps of range and residual, into
-/// `curves.svg`, `residuals.svg` and `maps.svg` of `folder`.
+/// Draws the curves of a few pixels with their measurements, the residuals, and the maps of range and residual. Writes
+/// `curves.svg`, `residuals.svg` and `maps.svg` in `folder`.
 ///
 /// # Errors
-/// Files that cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn draw(curves: &[Curves; 3], folder: &Path) -> Result<()> {
     let basis = Basis::new();
     let (mut fits, mut residuals, mut maps) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,20 +1,21 @@
-//! A smooth surface through what single pixels gave, at the nodes of a coarse grid: bilinear between nodes, nearest in
-//! the least squares to the pixels that gave something, with a penalty on its bending energy.
+//! Fit of a smooth surface to the values of single pixels. The surface is bilinear between the nodes of a coarse grid.
+//! It is the least-squares fit to the pixels that have a value, with a penalty on its bending energy.
 //!
-//! Nodes that stand in a hole (a mark, dust) or beyond the last pixel are where the surface bends least, which goes on
-//! with the slope around them.
+//! Nodes in a hole (a mark or dust) or beyond the last pixel take the values of least bending, which continues the
+//! slope around them.
 
 use ndarray::{Array2, Array3, ArrayView2};
 use phasefront_core::display::response::per_pixel;
 use rayon::prelude::*;
 
-/// The weight of the bending energy against a node's share of pixels: waves shorter than 2π nodes are taken for noise.
+/// The weight of the bending energy relative to a node's share of pixels. Waves shorter than 2π nodes are treated as
+/// noise.
 const STIFFNESS: f64 = 1.0;
-/// Residual at which a surface is solved, as a part of the first one.
+/// The residual at which the solver stops, relative to the first one.
 const SOLVED: f64 = 1e-7;
 
-/// The values at the nodes every `spacing` pixels of the surfaces through the N numbers of each pixel of `seen`, NaN
-/// where a pixel gave none. None where none did.
+/// Fits surfaces to the N values of each pixel of `seen`, where NaN marks pixels without values. Returns the values at
+/// nodes every `spacing` pixels, or `None` if no pixel has values.
 pub fn fit<const N: usize>(seen: ArrayView2<'_, [f32; N]>, spacing: usize) -> Option<Array2<[f32; N]>> {
     let (height, width) = seen.dim();
     let shape = per_pixel::nodes(height, width, spacing);
@@ -29,13 +30,13 @@ pub fn fit<const N: usize>(seen: ArrayView2<'_, [f32; N]>, spacing: usize) -> Op
     }))
 }
 
-/// The normal equations of the pixels, and the penalty.
+/// The normal equations of the pixels, with the penalty.
 struct System {
-    /// (Gh, Gw).
+    /// The size of the grid, (Gh, Gw).
     shape: (usize, usize),
-    /// (Gh, Gw, 9): what each node shares with the nodes around it, row by row.
+    /// The coefficients that couple each node to the nodes around it, row by row, (Gh, Gw, 9).
     gram: Array3<f64>,
-    /// (Gh, Gw, N): each node's sum of pixels.
+    /// The weighted sum of pixels at each node, (Gh, Gw, N).
     right: Array3<f64>,
     pixels: f64,
     weight: f64,
@@ -53,7 +54,7 @@ impl System {
             let first = (i * spacing).saturating_sub(spacing - 1);
             for y in first..(i * spacing + spacing).min(height) {
                 let dy = y.abs_diff(i * spacing) as f64 / spacing as f64;
-                // Rows of nodes that this row of pixels lies between, and its shares in them.
+                // The two rows of nodes around this row of pixels, and its weights in them.
                 let row = y / spacing;
                 let part = (y % spacing) as f64 / spacing as f64;
                 for (x, value) in seen.row(y).iter().enumerate() {
@@ -90,7 +91,7 @@ impl System {
         }
     }
 
-    /// Adds what the equations make of `from` to `to`, which is 0.
+    /// Multiplies `from` by the matrix of the equations and adds the product to `to`, which must be 0.
     fn apply(&self, from: &[f64], to: &mut [f64]) {
         let (rows, columns) = self.shape;
         for i in 0..rows {
@@ -103,7 +104,7 @@ impl System {
                 to[i * columns + j] += sum;
             }
         }
-        // Second differences along x and y, and the mixed ones, which count twice.
+        // The penalty has second differences along x and y, and mixed ones, which count twice.
         let mut bend = |at: &[(usize, f64)], weight: f64| {
             let bent: f64 = at.iter().map(|(node, share)| share * from[*node]).sum();
             for (node, share) in at {
@@ -129,17 +130,17 @@ impl System {
         }
     }
 
-    /// The nodes of number `n`, by conjugate gradients.
+    /// Solves for value `n` of the nodes by the conjugate gradient method.
     fn solve(&self, n: usize) -> Vec<f64> {
         let right: Vec<f64> = self.right.slice(ndarray::s![.., .., n]).iter().copied().collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        // From their mean on.
+        // The iteration starts at the mean.
         let mean = right.iter().sum::<f64>() / self.pixels;
         let mut nodes = vec![mean; right.len()];
         let mut image = vec![0.0; right.len()];
         self.apply(&nodes, &mut image);
         let mut residual: Vec<f64> = right.iter().zip(&image).map(|(a, b)| a - b).collect();
-        // Nodes weigh as many pixels as they have, and the penalty.
+        // The preconditioner is the diagonal: the pixels of each node and the penalty.
         let own: Vec<f64> = (self.gram.slice(ndarray::s![.., .., 4]).iter())
             .map(|own| 1.0 / (own + 12.0 * self.weight))
             .collect();
@@ -171,7 +172,7 @@ mod tests {
     use super::*;
     use phasefront_io::dice::Dice;
 
-    /// What the grid makes of its nodes at a pixel.
+    /// Interpolates the grid at a pixel.
     fn read(nodes: &Array2<[f32; 2]>, spacing: usize, y: usize, x: usize) -> [f32; 2] {
         let (rows, columns) = nodes.dim();
         let at = |i: usize, j: usize, n: usize| nodes[(i.min(rows - 1), j.min(columns - 1))][n];
@@ -207,7 +208,7 @@ mod tests {
         assert!(fit(Array2::from_elem((9, 9), [f32::NAN; 2]).view(), 4).is_none());
     }
 
-    /// A wave of the length of what differs over a panel, noise a third of its height.
+    /// Tests a wave as long as typical variations over a panel, with noise of a third of its amplitude.
     #[test]
     fn noise_is_smoothed_and_waves_stay() {
         let (shape, spacing) = ((80, 144), 3);

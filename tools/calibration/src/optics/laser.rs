@@ -1,6 +1,6 @@
-//! The laser's amplitude over the modulator, from a photograph of a diffuser in its place (Methods of the paper): a
-//! median of 5×5 pixels takes away dust, the mean around each node the speckle, and, where asked for, a
-//! mixture of Gaussian beams fits what is left.
+//! Measurement of the laser's amplitude over the modulator from a photograph of a diffuser in its place (Methods of the
+//! paper). A median of 5×5 pixels removes dust, and the mean around each node removes speckle. An optional mixture of
+//! Gaussian beams fits the result.
 
 use crate::camera::marks::Registration;
 use crate::camera::photograph::{Photograph, SATURATED_SHARE};
@@ -8,18 +8,18 @@ use ndarray::Array2;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 
-/// Nodes of the map along the wider axis.
+/// The number of nodes of the map along the longer axis.
 const NODES: usize = 49;
-/// Half the median's width.
+/// The half width of the median filter.
 const HALF: usize = 2;
-/// The most Gaussians of a mixture.
+/// The maximum number of Gaussians of a mixture.
 pub const MOST_GAUSSIANS: usize = 4;
 
-/// The amplitude at the nodes of a map, (Gh, Gw), of a (`height`, `width`) modulator, 1 at its brightest, from a
-/// photograph of the diffuser that `registration` places.
+/// Computes the amplitude at the nodes of a map, (Gh, Gw), for a (`height`, `width`) modulator, from a photograph of
+/// the diffuser that `registration` locates. The brightest node is 1.
 ///
 /// # Errors
-/// A photograph that is saturated or dark.
+/// Returns an error if the photograph is saturated or dark.
 pub fn map(
     photograph: &Photograph,
     registration: &Registration,
@@ -39,8 +39,8 @@ pub fn map(
     let (rows, columns) = (nodes(height), nodes(width));
     let step = |n: usize, nodes: usize| ((n - 1) as f64 / (nodes - 1) as f64).max(1.0);
     let (step_y, step_x) = (step(height, rows), step(width, columns));
-    // Into pixels at the rim the median, sampling and what registration is off bring the dark beside it: nodes there
-    // look at pixels a little further in, and follow their slope.
+    // The median, sampling and errors of the registration mix the dark surroundings into pixels at the border. Nodes
+    // there use pixels a little further in and extrapolate their slope.
     let reach = ((HALF as f64 + 1.0) / registration.zoom + 0.5).ceil();
     let window = |node: usize, step: f64, n: usize| {
         let quarter = (n - 1) as f64 / 4.0;
@@ -55,7 +55,7 @@ pub fn map(
         for (y, wy) in &along_y.shares {
             for (x, wx) in &along_x.shares {
                 let light = f64::from(light[(*y, *x)] - dark);
-                // The plane that fits the window best, where the node is.
+                // This evaluates the plane that best fits the window, at the node.
                 sum += light * (wy[0] * wx[0] + wy[1] * wx[0] + wy[0] * wx[1]);
             }
         }
@@ -70,17 +70,17 @@ pub fn map(
     Ok(map / most)
 }
 
-/// The pixels of an axis that a node looks at, with their shares in the mean and in the way from the mean to the node
-/// by the slope.
+/// The pixels of an axis that a node uses, with their weights in the mean and in the slope term from the mean to the
+/// node.
 struct Window {
     shares: Vec<(usize, [f64; 2])>,
 }
 
 impl Window {
-    /// Of pixels less than `half` from `centre`, the nearer the more, for a node `at`.
+    /// Creates the window of pixels less than `half` from `centre` for a node `at`. Nearer pixels have more weight.
     fn new(at: f64, centre: f64, half: f64) -> Self {
         let pixels = (centre - half).ceil() as usize..=(centre + half).floor() as usize;
-        // At a distance of `half` a pixel still counts a little, so that one alone counts at all.
+        // A pixel at distance `half` keeps a small weight, so that a single pixel has a nonzero weight.
         let weight = |x: usize| 1.01 - (x as f64 - centre).abs() / half;
         let all: f64 = pixels.clone().map(weight).sum();
         let mean = pixels.clone().map(|x| weight(x) * x as f64).sum::<f64>() / all;
@@ -93,7 +93,7 @@ impl Window {
     }
 }
 
-/// The median of 5×5 pixels, the rim going on outside.
+/// Returns the median of 5×5 pixels, with the border pixels repeated outside.
 fn median(photograph: &Photograph) -> Photograph {
     let (height, width) = (photograph.height, photograph.width);
     let mut out = photograph.clone();
@@ -113,19 +113,19 @@ fn median(photograph: &Photograph) -> Photograph {
     out
 }
 
-/// One beam: its intensity, centre, and the three numbers of its inverse width, in nodes of a map.
+/// One beam: its intensity, its centre, and the three parameters of its inverse width, in nodes of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gaussian([f64; 6]);
 
 impl Gaussian {
-    /// I(x, y) = I₀·exp(−(p·dx² + 2q·dx·dy + r·dy²)).
+    /// Computes I(x, y) = I₀·exp(−(p·dx² + 2q·dx·dy + r·dy²)).
     fn intensity(&self, x: f64, y: f64) -> f64 {
         let [height, cx, cy, p, q, r] = self.0;
         let (dx, dy) = (x - cx, y - cy);
         height * (-(p * dx * dx + 2.0 * q * dx * dy + r * dy * dy)).exp()
     }
 
-    /// Derivatives by its six numbers.
+    /// Computes the derivatives with respect to the six parameters.
     fn slopes(&self, x: f64, y: f64) -> [f64; 6] {
         let [height, cx, cy, p, q, r] = self.0;
         let (dx, dy) = (x - cx, y - cy);
@@ -141,12 +141,12 @@ impl Gaussian {
     }
 }
 
-/// Fits the intensity of `map`, amplitudes (Gh, Gw), by a sum of `count` Gaussian beams in the least squares, by
-/// Levenberg and Marquardt's method, one beam more at a time; gives the fit's amplitudes, its beams, and the root mean
-/// square that it leaves of the intensity.
+/// Fits the intensity of `map`, amplitudes (Gh, Gw), with a least-squares sum of `count` Gaussian beams, by the
+/// Levenberg–Marquardt method, adding one beam at a time. Returns the fitted amplitudes, the beams, and the RMS
+/// residual of the intensity.
 ///
 /// # Errors
-/// No Gaussians or over [`MOST_GAUSSIANS`].
+/// Returns an error if `count` is zero or exceeds [`MOST_GAUSSIANS`].
 pub fn mixture(map: &Array2<f32>, count: usize) -> Result<(Array2<f32>, Vec<Gaussian>, f64)> {
     if !(1..=MOST_GAUSSIANS).contains(&count) {
         return Err(Error::Input(format!(
@@ -158,7 +158,7 @@ pub fn mixture(map: &Array2<f32>, count: usize) -> Result<(Array2<f32>, Vec<Gaus
     let mut beams: Vec<Gaussian> = Vec::new();
     let mut left = f64::INFINITY;
     for _ in 0..count {
-        // The next beam begins where the most light is left; a fit of one beam to two leaves less than none too.
+        // The next beam begins where the most light remains. A fit of one beam to two also leaves negative residuals.
         let rest = Array2::from_shape_fn((rows, columns), |(y, x)| {
             let sum: f64 = beams.iter().map(|b| b.intensity(x as f64, y as f64)).sum();
             seen[(y, x)] - sum
@@ -186,7 +186,7 @@ pub fn mixture(map: &Array2<f32>, count: usize) -> Result<(Array2<f32>, Vec<Gaus
     Ok((fitted, beams, left))
 }
 
-/// Improves `beams` until nothing is gained; gives the root mean square that is left.
+/// Improves `beams` until convergence. Returns the RMS residual.
 fn descend(beams: &mut Vec<Gaussian>, seen: &Array2<f64>) -> f64 {
     let n = 6 * beams.len();
     let cost = |beams: &[Gaussian]| -> f64 {
@@ -240,7 +240,7 @@ fn descend(beams: &mut Vec<Gaussian>, seen: &Array2<f64>) -> f64 {
     (now / seen.len() as f64).sqrt()
 }
 
-/// Solves a symmetric positive system, its lower half given, by Cholesky's method.
+/// Solves a symmetric positive system, given its lower half, by Cholesky decomposition.
 fn solve(mut m: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
     let n = right.len();
     for i in 0..n {
@@ -288,7 +288,7 @@ mod tests {
                 let x = j as f64 / (columns - 1) as f64 * 175.0;
                 simulated.laser(colour, y, x)
             });
-            // Maps have no scale: by the best common factor.
+            // Maps have an arbitrary scale, so this uses the best common factor.
             let rms = |map: &Array2<f32>| {
                 let dot = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
                     map.iter().zip(&truth).map(|(a, b)| f(f64::from(*a), *b)).sum()

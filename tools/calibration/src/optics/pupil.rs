@@ -1,9 +1,10 @@
-//! How sharp a spot is by what is left of its aberration, and what was left of it by how sharp spots were.
+//! A model of the sharpness of a spot as a function of its residual aberration, and its inversion.
 //!
-//! The light in the focus is the Fourier transform of the pupil, exp(i·terms) over ρ ≤ 1, and sharpness is ΣI² over
-//! (ΣI)². From one photograph alone no sign can be told; but those of a search differ by steps that are known, focus
-//! among them, so that one aberration explains them all. [`explain`](Pupil::explain) finds it by Levenberg and
-//! Marquardt's method, the scale of sharpness with it, which pixels and stray light decide.
+//! The light in the focus is the Fourier transform of the pupil, exp(i·terms) over ρ ≤ 1. Sharpness is ΣI² over (ΣI)².
+//! One photograph alone does not determine the sign of an aberration. The photographs of a search differ by known
+//! steps, including focus, so a single aberration must explain them all. [`explain`](Pupil::explain) finds it by the
+//! Levenberg–Marquardt method, together with the scale of the sharpness, which depends on the camera's pixels and stray
+//! light.
 
 use ndarray::Array2;
 use num_complex::Complex32;
@@ -11,33 +12,34 @@ use phasefront_core::optics::fft::{Fft2, Scratch};
 use phasefront_core::optics::zernike::{self, Coefficients};
 use rayon::prelude::*;
 
-/// Samples across the pupil.
+/// The number of samples across the pupil.
 const PUPIL: usize = 28;
-/// Of the plane that it is transformed in: twice as many, as I² has twice the band of the light.
+/// The number of samples across the plane of the transform. It is about twice as large, because I² has twice the
+/// bandwidth of the light.
 const PLANE: usize = 60;
-/// The most steps of a descent.
+/// The maximum number of steps of a descent.
 const STEPS: usize = 15;
-/// The terms of an aberration.
+/// The number of terms of an aberration.
 const TERMS: usize = 5;
 
-/// One spot: the terms that were shown, radians, and how sharp it was, in any unit.
+/// One spot: the displayed terms in radians, and its sharpness in any unit.
 pub type Spot = (Coefficients, f64);
 
 /// The pupil and its transform.
 pub struct Pupil {
     fft: Fft2,
-    /// Each sample within ρ ≤ 1: where it is in the plane, and the terms of coefficient 1 there.
+    /// The samples within ρ ≤ 1: the index in the plane, and the value of each term with a coefficient of 1.
     inside: Vec<(usize, [f32; TERMS])>,
-    /// ΣI² without aberration.
+    /// The value of ΣI² without aberration.
     sharpest: f64,
 }
 
-/// An aberration that explains spots.
+/// An aberration that explains the measured spots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Explained {
-    /// The terms that correct it.
+    /// The terms that correct the aberration.
     pub correction: Coefficients,
-    /// The root mean square of what it leaves of the spots' sharpness, as a part of theirs.
+    /// The RMS residual of the spots' sharpness, relative to their sharpness.
     pub residual: f64,
 }
 
@@ -48,7 +50,7 @@ impl Default for Pupil {
 }
 
 impl Pupil {
-    /// A round pupil.
+    /// Creates a round pupil.
     pub fn new() -> Self {
         let at = |i: usize| (2 * i + 1) as f64 / PUPIL as f64 - 1.0;
         let places = (0..PUPIL * PUPIL).map(|i| (i, at(i % PUPIL), at(i / PUPIL)));
@@ -72,8 +74,8 @@ impl Pupil {
         pupil
     }
 
-    /// How sharp the spot of a pupil with the terms `left` is, 1 without any; and how fast that changes with each of
-    /// them.
+    /// Returns the sharpness of the spot of a pupil with the terms `left`, which is 1 without any, and its derivative
+    /// with respect to each term.
     fn sharpness(&self, left: &Coefficients, scratch: &mut Scratch) -> (f64, Coefficients) {
         let a = left.map(|a| a as f32);
         let mut plane = vec![Complex32::ZERO; PUPIL * PUPIL];
@@ -85,7 +87,7 @@ impl Pupil {
         let Scratch { rows, columns, work } = scratch;
         self.fft.rows_forward(&plane, rows, work);
         self.fft.spectrum(rows, columns, |_, _, _| {}, work);
-        // ΣI² = Σ|F|⁴; |F|²F brought back says how each sample of the pupil changes it.
+        // ΣI² = Σ|F|⁴. The inverse transform of |F|²F gives its derivative with respect to each sample of the pupil.
         let mut sum = 0.0;
         for value in columns.iter_mut() {
             let light = value.norm_sqr();
@@ -103,8 +105,8 @@ impl Pupil {
         (sum / self.sharpest, slopes.map(|s| s / self.sharpest))
     }
 
-    /// The correction that explains `spots` best, of those that are found from each of `starts`. None where no spot has
-    /// light.
+    /// Returns the correction that explains `spots` best among the local optima found from `starts`. Returns `None` if
+    /// no spot has light.
     pub fn explain(&self, spots: &[Spot], starts: &[Coefficients]) -> Option<Explained> {
         if spots.iter().all(|(_, sharp)| *sharp <= 0.0) {
             return None;
@@ -114,8 +116,8 @@ impl Pupil {
             .min_by(|a, b| a.residual.total_cmp(&b.residual))
     }
 
-    /// What each spot leaves by `correction`, at the scale that leaves least, and how fast that changes with its terms,
-    /// the scale following.
+    /// Returns the residual of each spot for `correction`, at the best scale, and its derivatives with respect to the
+    /// terms, including the change of the scale.
     fn residuals(&self, spots: &[Spot], correction: &Coefficients, scratch: &mut Scratch) -> (Vec<f64>, Array2<f64>) {
         let mut models = Vec::with_capacity(spots.len());
         for (shown, _) in spots {
@@ -148,7 +150,7 @@ impl Pupil {
             let mut right = [0.0; TERMS];
             for (row, left) in slopes.rows().into_iter().zip(&left) {
                 for i in 0..TERMS {
-                    // The residual falls with the correction as the model rises.
+                    // The residual decreases with the correction as the model increases.
                     right[i] -= row[i] * left;
                     (gram[i].iter_mut().zip(row)).for_each(|(g, v)| *g += row[i] * v);
                 }
@@ -194,7 +196,7 @@ mod tests {
         std::array::from_fn(|_| dice.range(-most, most))
     }
 
-    /// Against the sums as they stand, in f64.
+    /// Compares with direct sums in f64.
     #[test]
     fn sharpness_is_that_of_the_transform_and_slopes_are_its_own() {
         let pupil = Pupil::new();
@@ -230,7 +232,7 @@ mod tests {
         }
     }
 
-    /// A round of a search is enough, in any unit of sharpness, with 2 % of noise.
+    /// One round of a search is enough, in any unit of sharpness, with 2 % of noise.
     #[test]
     fn eleven_spots_tell_the_aberration_and_its_sign() {
         let pupil = Pupil::new();

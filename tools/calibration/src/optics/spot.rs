@@ -1,11 +1,11 @@
-//! The coefficients of an aberration from photographs of a focused spot, by search.
+//! Search for the coefficients of an aberration, using photographs of a focused spot.
 //!
-//! A sub-hologram (Eq. 19) focuses light to a distance; the camera stands focused there. Each round shows the best
-//! coefficients so far, and steps to either side of them along five directions that are at right angles and turned from
-//! round to round. [`crate::optics::pupil`] finds the aberration that explains how sharp all spots of all rounds were;
-//! the next round begins there. Steps stay large: a spot tells most where its sharpness falls, and nothing where it is
-//! sharpest. Directions mix the terms because sharpness is the same for a pupil and its mirror images: steps of one
-//! term at a time hardly tell them apart.
+//! A sub-hologram (Eq. 19) focuses light to a distance, at which the camera is focused. Each round displays the best
+//! coefficients so far, and steps to either side of them along five orthogonal directions that change from round to
+//! round. [`crate::optics::pupil`] finds the aberration that explains the sharpness of all spots of all rounds, and the
+//! next round begins there. Steps stay large: a spot carries most information where its sharpness falls, and none where
+//! it is sharpest. The directions mix the terms because a pupil and its mirror images have the same sharpness, so steps
+//! of one term at a time hardly distinguish them.
 
 use crate::camera::photograph::{Photograph, SATURATED_SHARE};
 use crate::optics::pupil::{Pupil, Spot};
@@ -19,34 +19,34 @@ use phasefront_io::dice::Dice;
 use phasefront_io::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// Photographs of a round.
+/// The number of photographs in a round.
 pub const TRIALS: usize = 1 + 2 * TERMS.len();
-/// Rounds of a search.
+/// The number of rounds of a search.
 pub const ROUNDS: usize = 3;
-/// A step, radians RMS of the wavefront: about where sharpness falls the fastest.
+/// The size of a step, in radians RMS of the wavefront: about where sharpness falls fastest.
 const STEP: f64 = 0.6;
 /// The mean squares of the terms over the pupil.
 const MEAN_SQUARES: Coefficients = [1.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0, 1.0 / 8.0, 1.0 / 8.0];
-/// From how many places around the best the first round looks for what explains it, and the others.
+/// The number of starting points around the best coefficients, in the first round and in the other rounds.
 const STARTS: [usize; 2] = [16, 2];
-/// How far around, radians.
+/// The distance of the starting points from the best coefficients, in radians.
 const AROUND: f64 = 2.0;
 
-/// A search under way.
+/// The state of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Search {
     /// The best coefficients so far.
     pub best: Coefficients,
-    /// Rounds done.
+    /// The number of rounds done.
     pub round: usize,
-    /// The spots that were displayed so far, and how sharp each was.
+    /// The spots displayed so far and their sharpness.
     pub seen: Vec<Spot>,
-    /// The root mean square of what the best leaves unexplained of that, as a part of it.
+    /// The RMS residual of the sharpness for the best coefficients, relative to the sharpness.
     pub residual: f64,
 }
 
 impl Search {
-    /// A search from `best`.
+    /// Starts a search at `best`.
     pub fn from(best: Coefficients) -> Self {
         Search {
             best,
@@ -56,12 +56,12 @@ impl Search {
         }
     }
 
-    /// Whether all rounds are done.
+    /// Checks whether all rounds are done.
     pub fn is_done(&self) -> bool {
         self.round >= ROUNDS
     }
 
-    /// What the round shows: the best, then a step to either side of it in each direction.
+    /// Returns the coefficients that this round displays: the best, then a step to either side of it in each direction.
     pub fn trials(&self) -> [Coefficients; TRIALS] {
         let directions = directions(self.round as u64);
         std::array::from_fn(|i| match i.checked_sub(1) {
@@ -73,7 +73,7 @@ impl Search {
         })
     }
 
-    /// The next round, from how sharp each trial's spot was.
+    /// Returns the search after this round, given the sharpness of each trial's spot.
     pub fn learn(&self, sharpness: &[f64; TRIALS]) -> Search {
         let mut seen = self.seen.clone();
         seen.extend(self.trials().into_iter().zip(*sharpness));
@@ -95,7 +95,7 @@ impl Search {
     }
 }
 
-/// Five wavefronts of 1 rad RMS at right angles: random ones, each less what it has of those before (Gram and Schmidt).
+/// Returns five random orthogonal wavefronts of 1 rad RMS (Gram–Schmidt).
 fn directions(seed: u64) -> [Coefficients; TERMS.len()] {
     let mut dice = Dice::new(seed ^ 0x0044_4952);
     let mut directions = [[0.0; TERMS.len()]; TERMS.len()];
@@ -112,14 +112,15 @@ fn directions(seed: u64) -> [Coefficients; TERMS.len()] {
     directions.map(|d| std::array::from_fn(|j| d[j] / MEAN_SQUARES[j].sqrt()))
 }
 
-/// The middle of the frame, as a place of a spot.
+/// The position of a spot in the middle of the frame.
 pub const MIDDLE: [f64; 2] = [0.5, 0.5];
 
-/// The levels of `target`, (H, W), that focus one colour's light to `z_m` at `place` (x and y, parts of the frame) by
-/// the correction `a`: the sub-hologram around there, double phase for the dark around it.
+/// Returns the levels of `target`, (H, W), that focus one colour's light to `z_m` at `place` (x and y, as fractions of
+/// the frame) with the correction `a`. The sub-hologram lies around that place. A double phase makes the area around it
+/// dark.
 ///
 /// # Errors
-/// A z at the modulator, or so far from it that the sub-hologram does not fit.
+/// Returns an error if z is at the modulator, or so far from it that the sub-hologram does not fit.
 pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coefficients) -> Result<Array2<u8>> {
     let display = &target.display;
     let (height, width) = (display.height(), display.width());
@@ -156,11 +157,11 @@ fn outside([x, y]: [f64; 2], side: usize, (width, height): (usize, usize)) -> Er
     ))
 }
 
-/// How sharp the spot of a photograph is: ΣI²/(ΣI)² around its brightest place, in a square of `side` pixels, what lies
-/// around taken away; 1 for a single pixel.
+/// Returns the sharpness of the spot in a photograph: ΣI²/(ΣI)² around its brightest place, in a square of `side`
+/// pixels, after subtraction of the background. A single pixel gives 1.
 ///
 /// # Errors
-/// A photograph that is saturated, or without a spot.
+/// Returns an error if the photograph is saturated or has no spot.
 pub fn sharpness(photograph: &Photograph, side: usize) -> Result<f64> {
     if photograph.saturated() > SATURATED_SHARE / 100.0 {
         return Err(Error::Input(
@@ -171,7 +172,7 @@ pub fn sharpness(photograph: &Photograph, side: usize) -> Result<f64> {
     sorted.sort_unstable();
     let part = |percent: usize| f64::from(sorted[(sorted.len() - 1) * percent / 100]);
     let (dark, most) = (part(50), part(100));
-    // Of a normal distribution 68 % lie within one σ.
+    // In a normal distribution, 68 % of the values lie within one σ.
     let noise = ((part(84) - part(16)) / 2.0).max(0.5);
     let (y0, x0) = brightest(photograph);
     if most - dark < 12.0 * noise {
@@ -189,12 +190,12 @@ pub fn sharpness(photograph: &Photograph, side: usize) -> Result<f64> {
             count += 1.0;
         }
     }
-    // What noise alone adds to the squares is taken away.
+    // This subtracts the contribution of noise to the squares.
     let squares = squares - count * noise * noise;
     Ok(squares.max(0.0) / (sum * sum).max(f64::MIN_POSITIVE))
 }
 
-/// Where the mean of 5×5 pixels is largest, (y, x).
+/// Returns the position, (y, x), of the largest mean over 5×5 pixels.
 fn brightest(photograph: &Photograph) -> (usize, usize) {
     let (height, width) = (photograph.height, photograph.width);
     let mut best = (0, (0, 0));
@@ -212,8 +213,8 @@ fn brightest(photograph: &Photograph) -> (usize, usize) {
     best.1
 }
 
-/// The exposure at which a spot without aberration fills 0.7 of the sensor, where a flat phase would fill all at 1: the
-/// spot is brighter by the square of the sub-hologram's Fresnel number times π.
+/// Returns the exposure at which a spot without aberration reaches 0.7 of the sensor's range, where a flat phase would
+/// fill the range at exposure 1. The spot is brighter by the square of π times the sub-hologram's Fresnel number.
 pub fn exposure(display: &Display, colour: usize, z_m: f64) -> f64 {
     let distance_m = z_m - display.offset_m();
     let wavelength_m = display.wavelengths_m()[colour];
@@ -222,14 +223,14 @@ pub fn exposure(display: &Display, colour: usize, z_m: f64) -> f64 {
     0.7 / (gain * gain).max(1.0)
 }
 
-/// Side of the square in which [`sharpness`] looks, pixels of a photograph that shows each of the modulator's with
-/// `zoom` of its own: the reach of aberrations that the search can find.
+/// Returns the side of the square that [`sharpness`] evaluates, in pixels of a photograph with `zoom` pixels per
+/// modulator pixel. It covers all aberrations that the search can find.
 pub fn window(zoom: f64) -> usize {
     (32.0 * zoom) as usize
 }
 
-/// The Strehl ratio of a pupil with the terms `a`: the light in the middle of the spot as a part of what it would be
-/// without them, |mean exp(i·terms)|² over ρ ≤ 1.
+/// Computes the Strehl ratio of a pupil with the terms `a`: the light in the centre of the spot relative to that
+/// without aberration, |mean exp(i·terms)|² over ρ ≤ 1.
 pub fn strehl(a: &Coefficients) -> f64 {
     const N: i32 = 60;
     let (mut sum, mut count) = (num_complex::Complex64::ZERO, 0.0);
@@ -255,7 +256,7 @@ mod tests {
     #[test]
     fn a_flat_pupil_has_a_strehl_ratio_of_one_and_small_terms_follow_marechal() {
         assert_eq!(strehl(&[0.0; 5]), 1.0);
-        // exp(−σ²), σ² = a²/6 for astigmatism.
+        // The expected value is exp(−σ²), with σ² = a²/6 for astigmatism.
         let a = 0.3f64;
         assert!((strehl(&[0.0, a, 0.0, 0.0, 0.0]) - (-a * a / 6.0).exp()).abs() < 2e-3);
     }

@@ -1,4 +1,4 @@
-//! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
+//! Measurements of the time of a frame on a GPU: every stage by the device's own time stamps, and the device's peak,
 //! measured in the same run.
 
 use super::{full_light, median, named};
@@ -14,62 +14,64 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// One combination that is measured on a GPU.
+/// A combination to measure on a GPU.
 #[derive(Debug, Clone)]
 pub struct GpuCase<'a> {
-    /// What makes the hologram.
+    /// The method that makes the hologram.
     pub method: &'a Method,
-    /// Width and height, pixels.
+    /// The width and height in pixels.
     pub size: (usize, usize),
-    /// How its field becomes levels, at one brightness.
+    /// The encoding of the field into levels, at one brightness.
     pub encoder: &'a EncoderOptions,
-    /// How a network computes.
+    /// The options for computing a network.
     pub chain: ChainOptions,
 }
 
-/// What was measured of one [`GpuCase`]. Times are milliseconds, medians over frames.
+/// The measurements of one [`GpuCase`]. Times are medians over frames, in milliseconds.
 #[derive(Debug, Clone, Serialize)]
 pub struct GpuRow {
-    /// `network`, `sweep` or `seeded`, which is also the name of its stage.
+    /// The method: `network`, `sweep` or `seeded`. Its stage has the same name.
     pub method: &'static str,
-    /// Convolution layers; 0 without a network.
+    /// The number of convolution layers; 0 without a network.
     pub layers: usize,
-    /// The numbers that the network, or a sweep by itself, was computed in: `f32`, `f16` or `int8`.
+    /// The number type of the network, or of a sweep without one: `f32`, `f16` or `int8`.
     pub precision: String,
-    /// Always `gpu`.
+    /// The backend: always `gpu`.
     pub backend: &'static str,
-    /// The device, how many layers or planes a dispatch computes, and how many dispatches the method takes.
+    /// The device, the number of layers or planes that a dispatch computes, and the number of dispatches of the method.
     pub kernels: String,
-    /// Pixels.
+    /// The width in pixels.
     pub width: usize,
-    /// Pixels.
+    /// The height in pixels.
     pub height: usize,
-    /// Each stage's median, where the device has time stamps.
+    /// The median time of each stage, if the device has time stamps.
     pub stage_ms: BTreeMap<&'static str, f64>,
-    /// The median of whole frames, one at a time, from the CPU's memory and back to it.
+    /// The median time of whole frames, one at a time, from the CPU's memory and back to it.
     pub total_ms: f64,
-    /// The fastest and the slowest frame.
+    /// The times of the fastest and the slowest frame.
     pub spread_ms: [f64; 2],
-    /// Time a frame with several in flight whose levels stay on the GPU.
+    /// The time per frame with several frames in flight whose levels stay on the GPU.
     pub flying_ms: f64,
-    /// What encoding through the per-pixel table takes longer than through none, of all stages, where there is one and
-    /// the device has time stamps.
+    /// The extra time of encoding through the per-pixel table, in percent of all stages, if there is a table and the
+    /// device has time stamps.
     pub table_percent: Option<f64>,
-    /// Frames that were measured one at a time.
+    /// The number of frames that were measured one at a time.
     pub frames: usize,
-    /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
+    /// The network's multiply-adds per second at its median time, in units of 10⁹, if its stage does nothing else.
     pub gmac_per_s: Option<f64>,
-    /// That, of what the device does here from registers alone in these numbers.
+    /// The rate of the network in percent of the peak that the device reaches here from registers alone with this
+    /// number type.
     pub peak_percent: Option<f64>,
-    /// What the method's dispatches read and write, each value once, of what a copy does here.
+    /// The bandwidth of the method's dispatches, with each value read or written once, in percent of the bandwidth of a
+    /// copy here.
     pub bandwidth_percent: Option<f64>,
 }
 
-/// Measures `case` on `device`: frames until `budget` is spent, five at least, after
-/// one that is not counted; where the modulator has a table for each pixel, each frame once more through it.
+/// Measures `case` on `device`: processes frames until `budget` is spent, at least five, after one warm-up frame. If
+/// the modulator has a table for each pixel, each frame is processed a second time through it.
 ///
 /// # Errors
-/// A case that cannot be planned there, or a device that does not answer as the CPU does.
+/// Returns an error if the case cannot be planned on the device, or if the device's results differ from the CPU's.
 pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget: Duration) -> Result<GpuRow> {
     let (width, height) = case.size;
     let (name, network) = named(case.method);
@@ -142,18 +144,18 @@ fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-/// Times of frames one at a time, milliseconds.
+/// The times of frames that are processed one at a time, in milliseconds.
 #[derive(Default)]
 struct Alone {
     totals: Vec<f64>,
     stages: BTreeMap<&'static str, Vec<f64>>,
-    /// Of encoding through the table.
+    /// The times of encoding through the table.
     table_encode: Vec<f64>,
 }
 
 impl Alone {
-    /// Frames until `budget` is spent, five at least, after one that is not counted; each once more `by_table`, where
-    /// there is one. `name` is that of the method's stage.
+    /// Times frames until `budget` is spent, at least five, after one warm-up frame. Each frame also runs through
+    /// `by_table`, if given. `name` is the name of the method's stage.
     fn measure(
         name: &'static str,
         pipeline: &mut GpuPipeline,
@@ -182,7 +184,7 @@ impl Alone {
         Ok(alone)
     }
 
-    /// Takes a frame's times.
+    /// Adds a frame's times.
     fn note(&mut self, name: &'static str, times: &FrameTimes) {
         let FrameTimes {
             colour,
@@ -202,7 +204,7 @@ impl Alone {
     }
 }
 
-/// Time a frame with several in flight whose levels stay on the GPU, milliseconds.
+/// Measures the time per frame with several frames in flight whose levels stay on the GPU, in milliseconds.
 fn flying_ms(pipeline: &mut GpuPipeline, frame: &Frame<'_>, budget: Duration) -> Result<f64> {
     let start = Instant::now();
     let mut flying = VecDeque::new();
@@ -221,7 +223,7 @@ fn flying_ms(pipeline: &mut GpuPipeline, frame: &Frame<'_>, budget: Duration) ->
     Ok(ms(start.elapsed()) / f64::from(flown))
 }
 
-/// A frame as phones give it: luma, chroma at half the resolution, depth of 16 bits.
+/// A frame as phones deliver it: luma, chroma at half the resolution, depth of 16 bits.
 struct Images {
     width: usize,
     luma: Vec<u8>,

@@ -1,5 +1,5 @@
-//! Networks with random weights, for numbers of layers of which none is bundled: what a network costs does not depend
-//! on its weights. Written as ONNX, so that they come the way of all others.
+//! Networks with random weights, for numbers of layers that no bundled network has. The cost of a network does not
+//! depend on its weights. The networks are written as ONNX and read like all others.
 
 use phasefront::Network;
 use phasefront_io::Result;
@@ -7,21 +7,21 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// Filters of each hidden layer, the paper's.
+/// The filters of each hidden layer, as in the paper.
 const FILTERS: usize = 24;
-/// Planes of an RGB-D frame, and of a field.
+/// The planes of an RGB-D frame, and of a field.
 const INPUTS: usize = 4;
 const OUTPUTS: usize = 6;
 
-/// An f32 network of `layers` for RGB-D frames and the paper's display.
+/// Makes an f32 network of `layers` layers for RGB-D frames and the paper's display.
 ///
 /// # Errors
-/// Fewer layers than a chain has.
+/// Returns an error if there are fewer layers than a chain has.
 pub fn network(layers: usize) -> Result<Arc<Network>> {
     Ok(Arc::new(Network::from_onnx(&onnx(layers))?))
 }
 
-/// Protocol buffers: fields of numbers and of bytes, one after another.
+/// A message of Protocol Buffers: fields of numbers and of bytes, one after another.
 #[derive(Default)]
 struct Message(Vec<u8>);
 
@@ -58,7 +58,7 @@ fn node(kind: &str, reads: &[&str], writes: &str, attributes: &[(&str, &[u64])])
     message = message.text(2, writes).text(4, kind);
     for (name, values) in attributes {
         let attribute = Message::default().text(1, name);
-        // Of type INT where there is one value, else INTS.
+        // The type is INT for one value, else INTS.
         let attribute = match values {
             [value] => attribute.number(3, *value).number(20, 2),
             values => (values.iter())
@@ -77,7 +77,7 @@ fn tensor(name: &str, shape: &[usize], values: impl Iterator<Item = f32>) -> Vec
     message.number(2, 1).text(8, name).bytes(9, &raw).0
 }
 
-/// What a graph reads or writes: (1, `planes`, height, width), the last two of any size.
+/// Describes an input or output of a graph: (1, `planes`, height, width), where the last two may have any size.
 fn planes(name: &str, planes: usize) -> Vec<u8> {
     let sized = |n: usize| Message::default().number(1, n as u64).0;
     let named = |name: &str| Message::default().text(2, name).0;
@@ -88,7 +88,7 @@ fn planes(name: &str, planes: usize) -> Vec<u8> {
     Message::default().text(1, name).bytes(2, &kind.0).0
 }
 
-/// The chain of [`phasefront_core::method::network::chain`].
+/// Writes the chain of [`phasefront_core::method::network::chain`] as ONNX.
 fn onnx(layers: usize) -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(layers as u64);
     let mut graph = Message::default().text(2, "chain");
@@ -113,7 +113,7 @@ fn onnx(layers: usize) -> Vec<u8> {
         };
         let outputs = if last { OUTPUTS } else { FILTERS };
         let (kernel, bias) = (format!("w{i}"), format!("b{i}"));
-        // So that values neither vanish nor grow along the chain.
+        // This spread keeps values from vanishing or growing along the chain.
         let spread = (3.0 / (9 * inputs) as f32).sqrt();
         let mut weights = |n: usize| {
             (0..n)

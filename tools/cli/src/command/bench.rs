@@ -1,4 +1,4 @@
-//! `phasefront bench`: how fast a frame is on this machine, stage by stage.
+//! `phasefront bench`: measures how long each stage of a frame takes on this machine.
 
 use crate::flags::backend::BackendFlags;
 use crate::flags::encoder::{Encoder, EncoderFlags};
@@ -19,15 +19,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Measure how fast a frame is, stage by stage; all combinations of what is not given
+/// Measure how long each stage of a frame takes, for all combinations of the flags that are not given
 ///
-/// With a --display that has a per-pixel table, also what reading it adds to a frame.
+/// With a --display that has a per-pixel table, also measure how much longer a frame takes because of the table.
 #[derive(Args)]
 pub(crate) struct Bench {
-    /// Layers of the network; 0 is the plane sweep. If none of so many is bundled, one with random weights in f32
+    /// Layers of the network; 0 for the plane sweep. If no network with this number is bundled, one with random f32
+    /// weights
     #[arg(long, value_name = "L")]
     layers: Option<usize>,
-    /// Its numbers
+    /// Number type of the network
     #[arg(long, value_enum)]
     precision: Option<PrecisionName>,
     /// An ONNX file instead of the bundled networks
@@ -36,32 +37,32 @@ pub(crate) struct Bench {
     /// Width and height [default: 384x384, 960x540 and 1920x1080]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(usize, usize)>,
-    /// Seconds to spend on each combination; five frames at least
+    /// Seconds for each combination, with at least five frames
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
     #[command(flatten)]
     encoder: EncoderFlags,
-    /// Draw the stages' times there
+    /// Write a chart of the stages' times
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendFlags,
-    /// How the network is computed on the GPU, both ways if not given
+    /// Number of layers that a GPU dispatch computes [default: both variants]
     #[arg(long, value_enum)]
     fusion: Option<FusionName>,
     #[command(flatten)]
     display: DisplayFlags,
 }
 
-/// Layers of the deepest network that GPUs are measured with.
+/// The number of layers of the deepest network that GPUs are measured with.
 const DEEPEST: usize = 30;
 
-/// How many layers a dispatch of the GPU computes.
+/// The number of layers that a GPU dispatch computes.
 #[derive(Clone, Copy, ValueEnum)]
 enum FusionName {
-    /// One
+    /// One layer
     Layers,
-    /// Two and the skip around them
+    /// Two layers and the skip around them
     Pairs,
 }
 
@@ -96,7 +97,7 @@ impl Bench {
         }
     }
 
-    /// What is asked for, or all bundled networks.
+    /// Returns the requested methods, or those of all bundled networks.
     fn methods(&self, target: &Target, on_gpu: bool) -> Result<Vec<Method>> {
         if let Some(file) = &self.network {
             let network = networks::network(file, None)?;
@@ -106,7 +107,7 @@ impl Bench {
         if self.layers.is_none_or(|layers| layers == 0) {
             methods.push(Method::Sweep(Sweep::for_display(&target.display)));
         }
-        // What a GPU is judged by, unless it is bundled.
+        // The network for measurements of GPUs, unless it is bundled.
         let random = match self.layers {
             Some(layers) => Some(layers).filter(|&layers| layers > 0),
             None => on_gpu.then_some(DEEPEST),
@@ -170,7 +171,7 @@ impl Bench {
         Ok(())
     }
 
-    /// The bundled networks, of the layers and numbers that are asked for.
+    /// Returns the bundled networks with the requested layers and precision.
     fn bundled(&self) -> Vec<Arc<Network>> {
         let precisions = [Precision::Float32, Precision::Int8];
         let wanted = |precision: &Precision| (self.precision).is_none_or(|asked| asked.precision() == *precision);
@@ -182,7 +183,7 @@ impl Bench {
         networks.filter(deep).collect()
     }
 
-    /// The same on a GPU, each network in the numbers that it has: f32 networks in f16 too.
+    /// Measures on a GPU, with each network in its own precision, and f32 networks in f16 too.
     fn on_gpu(
         &self,
         methods: &[Method],
@@ -208,7 +209,7 @@ impl Bench {
                 Some(network::Precision::F32) if device.has_half() => vec![Float::F16, Float::F32],
                 _ => vec![Float::F32],
             };
-            // A sweep by itself has no layers.
+            // A sweep without a network has no layers.
             let fusions = match network {
                 Some(_) => &fusions[..],
                 None => &[Fusion::Layers],
@@ -321,7 +322,7 @@ fn bars(rows: &[Row]) -> Vec<Bar> {
             row.height,
             row.threads
         ),
-        // Bars of one picture name their parts alike, whatever makes the hologram.
+        // All bars of one chart have the same names for their parts, whatever the method.
         parts: [
             ("hologram", row.method),
             ("propagate", "propagate"),

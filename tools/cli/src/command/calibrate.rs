@@ -1,4 +1,4 @@
-//! `phasefront calibrate`: from photographs of a display to the files that its `--display` file refers to.
+//! `phasefront calibrate`: makes the files that a `--display` file refers to, from photographs of a display.
 
 use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
@@ -47,28 +47,28 @@ impl Calibrate {
 
 /// Find each pixel's phase curve: write the 256 patterns, or read their photographs
 ///
-/// First `--patterns DIR`; show each on the modulator, focus on it, photograph it in each colour, linear, none
-/// saturated, the camera fixed, as red/capture_000.png (or .tif) … blue/capture_255.png. Then `--captures DIR -o
-/// table.pfp`.
+/// First run it with `--patterns DIR`. Show each pattern on the modulator, focus on it, and photograph it in each
+/// colour as red/capture_000.png (or .tif) … blue/capture_255.png. Photographs must be linear and not saturated, and
+/// the camera must not move. Then run it with `--captures DIR -o table.pfp`.
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("step").required(true))]
 pub(crate) struct Lut {
-    /// Write pattern_000.png to pattern_255.png there
+    /// Write pattern_000.png to pattern_255.png to this folder
     #[arg(long, value_name = "DIR", group = "step", conflicts_with = "output")]
     patterns: Option<PathBuf>,
-    /// Level that the marks of --patterns are dark by: one that turns the phase by about π [default: 105]
+    /// Level that makes the marks of --patterns dark, which turns the phase by about π [default: 105]
     #[arg(long, value_name = "LEVEL", requires = "patterns")]
     dark: Option<u8>,
     /// Folder with the folders red, green and blue of photographs
     #[arg(long, value_name = "DIR", group = "step", requires = "output")]
     captures: Option<PathBuf>,
-    /// The table for a phone: `per_pixel` of a display file
+    /// Output table for a phone: `per_pixel` of a display file
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write the full tables there too: full_red.npy …, uint8 (H, W, 256)
+    /// Also write the full tables to this folder: full_red.npy …, uint8 (H, W, 256)
     #[arg(long, value_name = "DIR", requires = "captures")]
     full: Option<PathBuf>,
-    /// Write drawings of curves, residuals and maps there
+    /// Write drawings of curves, residuals and maps to this folder
     #[arg(long, value_name = "DIR", requires = "captures")]
     report: Option<PathBuf>,
     #[command(flatten)]
@@ -188,19 +188,19 @@ impl Lut {
 
 /// Find the laser's amplitude over the modulator, from photographs of a diffuser in its place
 ///
-/// CAPTURES has folders red, green and blue, in each diffuser.png (or .tif) and capture_000.png, a photograph of
-/// pattern 0 by the camera where it stands, which tells where the modulator is.
+/// CAPTURES has folders red, green and blue. Each holds diffuser.png (or .tif) and capture_000.png, a photograph of
+/// pattern 0 from the same camera position, which shows where the modulator is.
 #[derive(Args)]
 pub(crate) struct Laser {
     /// Folder with the folders red, green and blue
     #[arg(value_name = "CAPTURES")]
     captures: PathBuf,
-    /// Fit a mixture of that many Gaussian beams
+    /// Fit a mixture of this many Gaussian beams
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=4))]
     gaussians: Option<u8>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// The map: `laser` of a display file
+    /// Output map: `laser` of a display file
     #[arg(short, value_name = "OUT.png")]
     output: PathBuf,
     #[command(flatten)]
@@ -275,9 +275,9 @@ impl Laser {
 
 /// Find the coefficients of an aberration from photographs of a focused spot, round by round
 ///
-/// Focus the camera at --z-mm and run: DIR/round_0 gets trial_00.png to trial_10.png. Show and photograph each as
-/// capture_00.png … in the same folder, run again for the next round, and so on; the last run writes the coefficients
-/// of that colour and z into FILE. Coefficients found by hand can be written there directly.
+/// Focus the camera at --z-mm and run the command, which writes trial_00.png to trial_10.png to DIR/round_0. Show each
+/// trial, photograph it as capture_00.png … in the same folder, and run the command again for the next round. The last
+/// run writes the coefficients of that colour and z into FILE. You can also write coefficients found by hand into FILE.
 #[derive(Args)]
 pub(crate) struct Aberration {
     /// Folder of the search
@@ -286,16 +286,16 @@ pub(crate) struct Aberration {
     /// z of the spot, mm from the middle of the volume
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
     z_mm: f64,
-    /// Whose light it is
+    /// Colour of the light
     #[arg(long, value_enum)]
     colour: ColourName,
-    /// Where in the frame the spot is, from its left and top, 0 to 1, for aberrations that differ over it [default: the
-    /// middle, for all]
+    /// Position of the spot in the frame, from its left and top, 0 to 1, for aberrations that differ over it [default:
+    /// the middle, for the whole frame]
     #[arg(long, value_name = "X,Y", value_parser = parse_place)]
     at: Option<[f64; 2]>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// The coefficients: `aberration` of a display file
+    /// Output coefficients: `aberration` of a display file
     #[arg(short, value_name = "FILE.toml")]
     output: PathBuf,
     #[command(flatten)]
@@ -320,7 +320,7 @@ fn parse_place(text: &str) -> std::result::Result<[f64; 2], String> {
     }
 }
 
-/// `search.json` of a search's folder.
+/// The file `search.json` in a search's folder.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SearchFile {
@@ -332,7 +332,7 @@ struct SearchFile {
 
 impl Aberration {
     fn run(self, json: bool) -> Result<()> {
-        // Coefficients are added to those that the file has, which the display's file may name: it is read, too.
+        // The command adds coefficients to this file, and the display's file may refer to it, so it is an input too.
         output::check_file(&self.output)?;
         let state = self.folder.join("search.json");
         let file = self.display.read_of_three()?;
@@ -351,7 +351,7 @@ impl Aberration {
                         "has coefficients of this colour at this z already; --overwrite searches on from them",
                     ));
                 }
-                // Photographs of another search would be taken for this one's.
+                // Photographs of another search must not be taken for this one's.
                 output::folder(&self.folder, Holding::RunOf("search.json"))?;
                 output::make_folder(&self.folder)?;
                 SearchFile {
@@ -412,7 +412,7 @@ impl Aberration {
         self.folder.join(format!("round_{}", now.search.round))
     }
 
-    /// The entry of this z and place.
+    /// Returns the entry of this z and place.
     fn entry(&self, entries: &[Entry]) -> Option<Entry> {
         let [x, y] = self.at.map_or([None; 2], |at| at.map(Some));
         (entries.iter())
@@ -420,7 +420,7 @@ impl Aberration {
             .cloned()
     }
 
-    /// How sharp each trial's photograph is.
+    /// Measures the sharpness of each trial's photograph.
     fn sharpness(&self, now: &SearchFile, display: &Display) -> Result<[f64; TRIALS]> {
         let round = self.round(now);
         let mut sharpness = [0.0; TRIALS];
@@ -482,12 +482,12 @@ fn write_state(path: &Path, now: &SearchFile) -> Result<()> {
     output::write_atomically(path, |file| writeln!(file, "{text}"))
 }
 
-/// Put a display's file and all that it refers to into one, for an app to carry
+/// Put a display's file and all files that it refers to into one file for an app
 #[derive(Args)]
 pub(crate) struct Pack {
     #[command(flatten)]
     display: DisplayFlags,
-    /// The file for the app
+    /// Output file for the app
     #[arg(short, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
@@ -509,15 +509,15 @@ impl Pack {
     }
 }
 
-/// Go through a calibration on a simulated display with a simulated camera
+/// Rehearse a calibration on a simulated display with a simulated camera
 ///
-/// Writes the files of the calibration with a display.toml that refers to them, outcome.json, photographs and drawings.
+/// Writes the files of the calibration, a display.toml that refers to them, outcome.json, photographs and drawings.
 #[derive(Args)]
 pub(crate) struct Rehearse {
-    /// Pixels of the modulator
+    /// Size of the modulator
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = parse_size)]
     size: (usize, usize),
-    /// Pixels of the camera for one of the modulator
+    /// Number of camera pixels across one pixel of the modulator
     #[arg(long, value_name = "Z", default_value_t = 2.5)]
     zoom: f64,
     /// Seed of the display's flaws and the camera's noise
@@ -526,10 +526,10 @@ pub(crate) struct Rehearse {
     /// z of the focused spot, mm
     #[arg(long, value_name = "Z", default_value_t = 12.0, allow_negative_numbers = true)]
     spot_z_mm: f64,
-    /// Keep all photographs, to run `calibrate lut` and `calibrate laser` on
+    /// Keep all photographs, as input for `calibrate lut` and `calibrate laser`
     #[arg(long)]
     captures: bool,
-    /// Folder of what comes out
+    /// Output folder
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
@@ -576,14 +576,14 @@ impl Rehearse {
     }
 }
 
-/// Notes that the photographs of all colours are inputs.
+/// Marks the photographs of all colours as inputs.
 fn reading_captures(captures: &Path) -> Result<()> {
     COLOURS
         .iter()
         .try_for_each(|colour| output::reading_folder(&captures.join(colour)))
 }
 
-/// The photograph `stem` of `folder`, a PNG or TIFF.
+/// Returns the path of the photograph `stem` in `folder`, a PNG or TIFF.
 fn photo_path(folder: &Path, stem: &str) -> Result<PathBuf> {
     ["png", "tif", "tiff", "PNG", "TIF", "TIFF"]
         .iter()
@@ -597,7 +597,7 @@ fn photo_path(folder: &Path, stem: &str) -> Result<PathBuf> {
         })
 }
 
-/// Levels, (H, W), as a grey PNG of 8 bits.
+/// Writes levels, (H, W), as a grey PNG of 8 bits.
 fn grey(levels: ndarray::Array2<u8>, path: &Path) -> Result<()> {
     let (height, width) = levels.dim();
     let values = levels.iter().map(|v| u16::from(*v)).collect();

@@ -1,4 +1,4 @@
-//! `phasefront compare`: PSNR and SSIM of the amplitudes of two images or holograms.
+//! `phasefront compare`: measures PSNR and SSIM between the amplitudes of two images or holograms.
 
 use clap::Args;
 use ndarray::Array3;
@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 /// Compare two images or holograms: PSNR and SSIM of their amplitudes, per colour and overall
 #[derive(Args)]
 pub(crate) struct Compare {
-    /// An image, or a hologram, which is looked at from --z-mm
+    /// An image, or a hologram that is viewed at --z-mm
     a: PathBuf,
-    /// What to compare it with
+    /// The image or hologram to compare it with
     b: PathBuf,
     /// Focus for holograms, mm from the middle of the volume, positive toward the viewer [default: 0]
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
@@ -32,7 +32,7 @@ impl Compare {
         let mut text = String::from("        PSNR dB    SSIM");
         let colours = ["red", "green", "blue"];
         let each = result.psnr.iter().zip(&result.ssim);
-        // Of one laser the overall figure is its own.
+        // With one laser, the overall figure is also that of its colour.
         for (colour, (psnr, ssim)) in colours.iter().zip(each).filter(|_| result.psnr.len() == colours.len()) {
             text += &format!("\n{colour:7} {psnr:7.2}  {ssim:6.4}");
         }

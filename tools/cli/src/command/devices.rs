@@ -1,4 +1,4 @@
-//! `phasefront devices`: the modulators that are known by name.
+//! `phasefront devices`: lists the modulators that are known by name.
 
 use clap::Args;
 use phasefront::output::Layout;
@@ -8,10 +8,10 @@ use phasefront_io::{Result, display};
 use serde_json::json;
 use std::path::Path;
 
-/// List the modulators that --display knows by name, or say all of one
+/// List the modulators that --display knows by name, or describe one of them
 #[derive(Args)]
 pub(crate) struct Devices {
-    /// A modulator's name or file, to be told with the sources of its figures
+    /// Name or file of a modulator to describe, with the sources of its figures
     #[arg(value_name = "NAME|FILE")]
     device: Option<String>,
 }

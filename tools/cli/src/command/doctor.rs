@@ -1,4 +1,4 @@
-//! `phasefront doctor`: what this machine offers, what is chosen of it, and whether it computes as it should.
+//! `phasefront doctor`: reports what this machine offers and which of it is used, and tests its results.
 
 use crate::flags::encoder::EncoderFlags;
 use clap::Args;
@@ -12,19 +12,19 @@ use phasefront_models::default_network;
 use serde::Serialize;
 use serde_json::json;
 
-/// Say what this machine offers and what is chosen of it, and test that it computes as it should
+/// Report what this machine offers and which of it is used, and test whether it computes correctly
 ///
-/// Ends with 1 where the self-test fails. Put its output into reports of faults.
+/// Exits with 1 if the self-test fails. Attach the output to bug reports.
 #[derive(Args)]
 pub(crate) struct Doctor {
-    /// A part of the name of the GPU that is tested [default: the fastest; drivers in software are taken by name only]
+    /// Part of the name of the GPU to test [default: the fastest; drivers in software are taken by name only]
     #[arg(long, value_name = "NAME")]
     gpu: Option<String>,
     #[command(flatten)]
     display: DisplayFlags,
 }
 
-/// What `phasefront hologram` takes where nothing is said.
+/// The defaults of `phasefront hologram`.
 #[derive(Serialize)]
 struct Chosen {
     display: String,

@@ -1,4 +1,4 @@
-//! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
+//! `phasefront hologram`: makes a phase-only hologram of an RGB-D image or a layered depth image.
 
 mod stills;
 
@@ -20,23 +20,22 @@ use std::time::Duration;
 pub(crate) struct Hologram {
     #[command(flatten)]
     request: HologramRequest,
-    /// Write the complex field at the modulator there too, with a .json beside it
+    /// Also write the complex field at the modulator, with a .json beside it
     #[arg(long, value_name = "FILE.npy")]
     complex: Option<PathBuf>,
-    /// Say how near to its own wave is what the hologram shows: at the midpoint, and over a stack of depths
+    /// Compare the displayed image with the hologram's own wave, at the midpoint and over a stack of depths
     #[arg(long)]
     judge: bool,
-    /// Write what the modulator's input takes there too: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
+    /// Also write what the modulator's input takes: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
     #[arg(long, value_name = "FRAME.png")]
     packed: Option<PathBuf>,
-    /// The hologram: a PNG of modulator levels; for folders of pictures the folder of their holograms, NAME.png for
-    /// each picture NAME
+    /// Output: a PNG of modulator levels; for folders of pictures, a folder that gets NAME.png for each picture NAME
     #[arg(short, value_name = "OUT.png|DIR")]
     output: PathBuf,
-    /// For folders of pictures: keep the holograms that an earlier run with the same flags made
+    /// For folders of pictures: keep the holograms of an earlier run with the same flags
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// For folders of pictures: replace holograms that are there
+    /// For folders of pictures: replace existing holograms
     #[arg(long)]
     overwrite: bool,
 }

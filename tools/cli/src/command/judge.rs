@@ -1,4 +1,4 @@
-//! `phasefront judge`: methods and encoders side by side, on one's own image and display.
+//! `phasefront judge`: compares methods and encoders on an image and a display.
 
 use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::FrameFlags;
@@ -22,11 +22,11 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Judge methods and encoders on an image and a display: quality of the displayed image, and time
+/// Compare methods and encoders on an image and a display: quality of the displayed image, and time
 ///
-/// With a layered depth image the truth is its exact wave. With an RGB-D image there is none: if depth is clean, the
-/// exact wave of what is visible and of the hidden surfaces that the sweep finds takes its place, else the largest
-/// network's. The answer says which.
+/// For a layered depth image, the reference is its exact wave. An RGB-D image has no exact wave. If its depth is clean,
+/// the reference is the exact wave of what is visible and of the hidden surfaces that the sweep finds; otherwise it is
+/// the wave of the largest network. The answer names the reference.
 #[derive(Args)]
 pub(crate) struct Judge {
     #[command(flatten)]
@@ -34,41 +34,41 @@ pub(crate) struct Judge {
     /// Folder of a layered depth image
     #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
     ldi: Option<PathBuf>,
-    /// Methods [default: sweep and, where one was trained for the display, network]
+    /// Methods [default: sweep, and network if one was trained for the display]
     #[arg(long, value_enum, value_delimiter = ',')]
     method: Vec<CoreMethod>,
-    /// Encoders, each as published, corrected by default, and corrected for a still
+    /// Encoders, each as published, with the default correction, and with the correction for stills
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"])]
     encoder: Vec<EncoderName>,
-    /// Planes of the exact wave
+    /// Number of planes of the exact wave
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
     planes: u16,
-    /// Pixels at the border that do not count: into an image at an offset light comes from outside
+    /// Width of a border that does not count, in pixels; at an offset, light enters an image from outside
     #[arg(long, value_name = "PX", default_value_t = 0)]
     margin: usize,
     #[command(flatten)]
     display: DisplayFlags,
-    /// A page to look at them all in
+    /// Page that shows all results
     #[arg(short, value_name = "OUT.html")]
     output: Option<PathBuf>,
 }
 
-/// Views of a page.
+/// The number of views in a page.
 const PAGE_VIEWS: usize = 9;
-/// Bytes of all views of a page.
+/// The bytes of all views in a page.
 const PAGE_BYTES: usize = 4_000_000;
-/// What corrects a still.
+/// The midpoint steps that correct a still.
 const STILL_STEPS: usize = 3;
 
 /// A method with an encoder.
 struct Combination {
     method: CoreMethod,
     encoder: EncoderFlags,
-    /// Of the pairs, whose encoder is their own.
+    /// The name of the network pair, if the encoder belongs to a pair.
     network: Option<&'static str>,
 }
 
-/// A combination, judged.
+/// The result of a combination.
 struct Row {
     method: &'static str,
     encoder: String,
@@ -142,7 +142,7 @@ impl Judge {
         Ok(())
     }
 
-    /// What combinations are judged by: a field at the modulator, and what it is.
+    /// Makes the reference for all combinations: a field at the modulator, and its description.
     fn truth(
         &self,
         file: &DisplayFile,
@@ -278,7 +278,7 @@ fn table(rows: &[Row], what: &str) -> String {
     text + &format!("\nJudged by {what}. Times are of one run, after no warm-up.")
 }
 
-/// A page with what each combination shows, and what it is judged by.
+/// Writes a page that shows the displayed images of each combination and the reference.
 fn write_page(
     path: &std::path::Path,
     file: &DisplayFile,

@@ -1,4 +1,4 @@
-//! `phasefront link`: whether pixels reach the modulator as they are.
+//! `phasefront link`: checks whether pixels reach the modulator unchanged.
 
 use clap::{Args, Subcommand};
 use phasefront_cli::modulator::link;
@@ -22,12 +22,12 @@ pub(crate) struct Pattern {
     /// Size of the screen
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1920x1080")]
     size: (usize, usize),
-    /// The pattern
+    /// Output pattern
     #[arg(short, value_name = "OUT.png")]
     output: PathBuf,
 }
 
-/// Read a capture of the pattern: as a frame grabber in the modulator's place saves it, or a screenshot
+/// Read a capture of the pattern, saved by a frame grabber in the modulator's place or as a screenshot
 #[derive(Args)]
 pub(crate) struct Read {
     /// The captured image, PNG or BMP

@@ -1,4 +1,4 @@
-//! `phasefront multiplex`: several phase maps of one image, for modulators that are faster than the eye.
+//! `phasefront multiplex`: makes several phase maps of one image, for modulators that are faster than the eye.
 
 use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::FrameFlags;
@@ -17,40 +17,40 @@ use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Make several phase maps of an RGB-D image, whose mean intensity is nearest to it, for fast modulators
+/// Make several phase maps of an RGB-D image for fast modulators, with a mean intensity close to the image's
 #[derive(Args)]
 pub(crate) struct MultiplexCommand {
     #[command(flatten)]
     frame: FrameFlags,
-    /// How the wave is made
+    /// Method for the wave
     #[arg(long, value_enum, default_value_t = CoreMethod::Sweep)]
     method: CoreMethod,
     /// A bundled network, or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
-    /// Numbers that a bundled network computes in [default: int8]
+    /// Number type of a bundled network [default: int8]
     #[arg(long, value_enum)]
     precision: Option<PrecisionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
     #[command(flatten)]
     display: DisplayFlags,
-    /// How many maps
+    /// Number of maps
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1024))]
     maps: u16,
-    /// Do not make each map for what the mean of those before it lacks
+    /// Do not let each map compensate for the error in the mean of the maps before it
     #[arg(long)]
     no_feedback: bool,
-    /// Write the maps' planes as one frame of a modulator of bit planes there too
+    /// Also write the maps' planes as one frame of a modulator of bit planes
     #[arg(long, value_name = "FRAME.png")]
     packed: Option<PathBuf>,
-    /// The one colour of --packed; without it a frame holds the maps of all three, red first
+    /// The one colour of --packed; without it, a frame holds the maps of all three colours, red first
     #[arg(long, value_parser = packed::COLOURS, requires = "packed")]
     colour: Option<String>,
-    /// Say how near the mean of the first 1, 2, 4, 8 … maps is to the wave
+    /// Compare the mean of the first 1, 2, 4, 8 … maps with the wave
     #[arg(long)]
     judge: bool,
-    /// Folder of the maps: phase_000.png …
+    /// Output folder of the maps: phase_000.png …
     #[arg(short, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -144,7 +144,7 @@ impl MultiplexCommand {
             };
             hologram::write_phase_only(&path(n), map.levels.view(), &info)?;
         }
-        // With --overwrite: maps of an earlier run that had more of them do not belong to these.
+        // With --overwrite: further maps of a longer earlier run do not belong to these.
         for left in (maps.len()..).map(path).take_while(|path| path.is_file()) {
             std::fs::remove_file(&left).map_err(|e| Error::file(left, format!("cannot be removed: {e}")))?;
         }

@@ -1,4 +1,4 @@
-//! `phasefront networks`: the names that --network takes.
+//! `phasefront networks`: lists the names that --network takes.
 
 use clap::Args;
 use phasefront_command::networks::{self, Precision};
@@ -20,7 +20,7 @@ impl Networks {
             let (layers, input) = (network.layers(), network.input().to_string());
             rows.push((model.name, layers, input, "any offset".to_owned()));
         }
-        // The pairs have one name; the display's offset chooses among them.
+        // All pairs have the same name. The display's offset selects the pair.
         if let Some(first) = PAIRS.first() {
             let network = first.networks(Precision::Int8).ok_or_else(missing)?.hologram;
             let offsets: Vec<_> = PAIRS.iter().map(|pair| pair.offset_mm.to_string()).collect();

@@ -1,4 +1,4 @@
-//! `phasefront pack` and `phasefront unpack`: holograms to what a modulator's input takes, and back.
+//! `phasefront pack` and `phasefront unpack`: convert holograms to frames for a modulator's input, and back.
 
 use clap::Args;
 use phasefront::output::Packing;
@@ -10,18 +10,18 @@ use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Put a hologram into the frame that a modulator's input takes
+/// Convert a hologram to the frame that a modulator's input takes
 #[derive(Args)]
 pub(crate) struct Pack {
-    /// A hologram PNG; several for one frame of bit planes, shown one after another
+    /// A hologram PNG; several for one frame of bit planes that shows them one after another
     #[arg(required = true)]
     holograms: Vec<PathBuf>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Of several holograms the colour that is shown; not for one laser
+    /// The one colour to show of several holograms; not for one laser
     #[arg(long, value_parser = packed::COLOURS)]
     colour: Option<String>,
-    /// The frame: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
+    /// Output frame: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
     #[arg(short, value_name = "FRAME.png")]
     output: PathBuf,
 }
@@ -58,7 +58,7 @@ impl Pack {
         Ok(())
     }
 
-    /// One colour of all holograms, one after another in the planes of a frame.
+    /// Packs one colour of all holograms into the planes of a frame, one after another.
     fn planes(&self, display: &DisplayFile, colour: usize) -> Result<packed::Image> {
         let Packing::BitPlanes(cells) = &display.device.packing else {
             return Err(Error::Input(
@@ -91,18 +91,18 @@ impl Pack {
     }
 }
 
-/// Read the levels back from the frame that a modulator's input takes: the inverse of `pack`
+/// Read the levels back from the frame that a modulator's input takes, as the inverse of `pack`
 #[derive(Args)]
 pub(crate) struct Unpack {
-    /// The frame: one PNG or BMP, or one each of red, green and blue
+    /// The frame: one PNG or BMP, or one each for red, green and blue
     #[arg(required = true, num_args = 1..=3)]
     frames: Vec<PathBuf>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Size of the hologram in the modulator's middle [default: the modulator's]
+    /// Size of the hologram in the modulator's middle [default: the modulator's size]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(usize, usize)>,
-    /// The hologram: a PNG of modulator levels
+    /// Output hologram: a PNG of modulator levels
     #[arg(short, value_name = "OUT.png")]
     output: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! `phasefront refocus`: what an eye focused at z would see of a hologram file.
+//! `phasefront refocus`: writes the view of a hologram file that an eye focused at z sees.
 
 use clap::Args;
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag};
@@ -8,7 +8,7 @@ use phasefront_io::{Error, Result, hologram, output};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Look at a hologram with the eye focused at z
+/// Write the view of a hologram that an eye focused at z sees
 #[derive(Args)]
 #[command(mut_arg("display", |display| display.help(
     "TOML file of the display that the hologram was made for, or a modulator's name [default: what the hologram says of it]"
@@ -25,15 +25,15 @@ pub(crate) struct Refocus {
         conflicts_with = "stack"
     )]
     z_mm: Option<f64>,
-    /// That many views from the near end of the volume to the far one
+    /// Number of views from the near end of the volume to the far end
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
     stack: Option<u32>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Width of the pictures, pixels; their sides keep their proportion [default: the hologram's]
+    /// Width of the pictures, pixels; they keep their proportions [default: the hologram's width]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=16384))]
     width: Option<u32>,
-    /// For one z a .png, .jpg or .webp; for a stack a folder, or a .gif or .webp that moves
+    /// Output: a .png, .jpg or .webp for one z; a folder, or an animated .gif or .webp, for a stack
     #[arg(short, value_name = "OUT")]
     output: PathBuf,
     #[command(flatten)]

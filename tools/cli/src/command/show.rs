@@ -1,4 +1,4 @@
-//! `phasefront show` and `phasefront screens`: frames on a modulator that is a screen to the computer.
+//! `phasefront show` and `phasefront screens`: show frames on a modulator that is a screen to the computer.
 
 use clap::Args;
 use phasefront_cli::modulator::show::{self, Screen, Showing};
@@ -11,25 +11,25 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Show frames on a screen: full, unscaled, at its rate; Escape or Q ends it
+/// Show frames on a screen, full and unscaled, at its rate; Escape or Q ends it
 #[derive(Args)]
 pub(crate) struct Show {
-    /// Images as the modulator's input takes them, or with --display holograms, which are packed for it; several are
-    /// shown one after another, a folder's in the order of their names
+    /// Images for the modulator's input, or with --display holograms, which are packed for it; several are shown one
+    /// after another, those of a folder in the order of their names
     #[arg(required = true)]
     frames: Vec<PathBuf>,
-    /// The screen, counted from 1, as `phasefront screens` lists them
+    /// The screen's number, counted from 1, as in `phasefront screens`
     #[arg(long, value_name = "N", default_value_t = 1)]
     screen: usize,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Of holograms that take an image a colour, the one colour that is shown
+    /// The one colour to show of holograms that take one image for each colour
     #[arg(long, value_parser = packed::COLOURS, requires = "display")]
     colour: Option<String>,
-    /// Frames a second [default: the screen's]
+    /// Frames per second [default: the screen's rate]
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// Stop after so many seconds
+    /// Stop after this many seconds
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
 }
@@ -75,7 +75,7 @@ impl Show {
         Ok(images)
     }
 
-    /// The images of a hologram, or that of the one colour.
+    /// Packs a hologram and returns its images, or the image of the selected colour.
     fn packed(&self, path: &Path, display: &DisplayFile) -> Result<Vec<packed::Image>> {
         let mut images = packed::pack(&hologram::read_hologram(path)?, display).map_err(|e| Error::file(path, e))?;
         let Some(name) = &self.colour else {
@@ -90,7 +90,7 @@ impl Show {
     }
 }
 
-/// The image files of a folder in the order of their names, or the one file.
+/// Returns the image files of a folder in the order of their names, or the one file.
 fn images_of(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);

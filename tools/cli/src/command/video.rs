@@ -1,4 +1,4 @@
-//! `phasefront video`: RGB-D frames to phase maps and previews, one after another or as a live stream.
+//! `phasefront video`: makes phase maps and previews of RGB-D frames, one after another or as a live stream.
 
 mod sink;
 mod source;
@@ -31,87 +31,87 @@ use std::time::{Duration, Instant};
 #[derive(Args)]
 pub(crate) struct Video {
     /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …, of folders rgb and depth with equal names,
-    /// or as TUM's and Redwood's data sets are laid; a film (.mp4, by ffmpeg); or - for raw frames on stdin. All frames
-    /// have one size
+    /// or in the layout of TUM's or Redwood's data sets; a film (.mp4, by ffmpeg); or - for raw frames on stdin. All
+    /// frames must have one size
     input: PathBuf,
-    /// Names of a folder's colour and depth files, whose * stand for the same: 'left_*.png,left_*_z.png'
+    /// Names of a folder's colour and depth files, where each * stands for the same text: 'left_*.png,left_*_z.png'
     #[arg(long, value_name = "COLOUR,DEPTH")]
     pairs: Option<String>,
-    /// Depth of a film: another film, in grey
+    /// Film in grey with the depth of the input film
     #[arg(long, value_name = "FILE")]
     depth_video: Option<PathBuf>,
-    /// Depth of a film: the right half of its pictures, in grey
+    /// Take the depth of a film from the right half of its pictures, in grey
     #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_beside: bool,
     #[command(flatten)]
     seen: SeenDepthFlags,
-    /// Raw frames on stdin: size of their colour, rows of RGB bytes
+    /// Size of the colour of raw frames on stdin, rows of RGB bytes
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     raw: Option<(usize, usize)>,
-    /// Raw frames on stdin: size of their depth, rows of 16-bit little-endian numbers [default: the colour's]
+    /// Size of the depth of raw frames on stdin, rows of 16-bit little-endian numbers [default: the colour's]
     #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "raw")]
     raw_depth: Option<(usize, usize)>,
     #[command(flatten)]
     depth: DepthFlags,
-    /// How the holograms are made
+    /// Method for the holograms
     #[arg(long, value_enum, default_value_t = CoreMethod::Network)]
     method: CoreMethod,
     /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
-    /// Numbers that a bundled network computes in [default: int8]
+    /// Number type of a bundled network [default: int8]
     #[arg(long, value_enum)]
     precision: Option<PrecisionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
-    /// Size of the holograms [default: the first frame's colour]
+    /// Size of the holograms [default: the size of the first frame's colour]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(usize, usize)>,
     #[command(flatten)]
     display: DisplayFlags,
     #[command(flatten)]
     backend: BackendFlags,
-    /// Which amplitude full light stands for
+    /// Amplitude that full light stands for
     #[arg(long, value_enum, default_value_t = BrightnessName::Smoothed)]
     brightness: BrightnessName,
-    /// Frames a second of the input [default: a film's own; else 30]
+    /// Frames per second of the input [default: a film's own rate, else 30]
     #[arg(long, value_name = "N")]
     rate: Option<f64>,
-    /// Submit frames at that rate and drop those for which there is no time
+    /// Submit frames at the input's rate and drop those for which there is no time
     #[arg(long)]
     live: bool,
-    /// Let a live stream step down to half and a quarter of the resolution where it cannot hold the rate
+    /// Let a live stream step down to half and a quarter of the resolution if it cannot hold the rate
     #[arg(long, requires = "live")]
     adaptive: bool,
-    /// Show the frames of a folder so many times
+    /// Number of times to show the frames of a folder
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
-    /// Write a preview of each hologram too, focused at this z
+    /// Also write a preview of each hologram, focused at this z
     #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "output")]
     preview_mm: Option<f64>,
-    /// Go on where an earlier run with the same flags and input was left
+    /// Continue an earlier run with the same flags and input
     #[arg(long, requires = "output", conflicts_with_all = ["live", "overwrite"])]
     resume: bool,
-    /// Replace what an earlier run made
+    /// Replace the files of an earlier run
     #[arg(long, requires = "output")]
     overwrite: bool,
-    /// Folder of what comes out: phase_000000.png …, preview_000000.png …, request.json, statistics.json; for NAME.mp4
-    /// the folder NAME, with a film of the previews and NAME-phases.mp4, without loss, beside it. It is needed but for
-    /// --live and --json, which report without it
+    /// Output folder: phase_000000.png …, preview_000000.png …, request.json, statistics.json; for NAME.mp4 the folder
+    /// NAME, with a film of the previews and the lossless NAME-phases.mp4 beside it. Required unless --live or --json
+    /// is given, which report without it
     #[arg(short, value_name = "DIR|NAME.mp4")]
     output: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum BrightnessName {
-    /// What all but one pixel of a thousand stay under, smoothed over time
+    /// 99.9th percentile of the amplitudes, smoothed over time
     Smoothed,
-    /// Each frame's largest
+    /// Largest amplitude of each frame
     Max,
 }
 
-/// Warms a session up whose options asked for the backend `asked`. Warns where the GPU was asked for and does not
-/// serve; where it does, keeps what was compiled for it.
+/// Warms up a session and keeps the compiled programs of its GPU. Warns if `asked` is the GPU and the session runs on
+/// the CPU.
 fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
     session.warm_up()?;
     match session.gpu() {
@@ -157,13 +157,13 @@ impl Video {
         self.report(json, &statistics, seconds, &sink, [memory, memory_mb()])
     }
 
-    /// z of the previews; a film is made of them.
+    /// Returns the z of the previews. A film needs previews, so it has a default z.
     fn preview_mm(&self) -> Option<f64> {
         let film = self.output.as_deref().filter(|path| film::is_film(path));
         self.preview_mm.or(film.map(|_| 0.0))
     }
 
-    /// All flags that decide what is written, but for what frames are of: each is recognised by itself.
+    /// Records all flags that affect the output. The input is left out, because each frame is identified by itself.
     fn record(&self, display: &phasefront::Display, rate: f64) -> Result<RunRecord> {
         let Video {
             input: _,
@@ -178,7 +178,7 @@ impl Video {
             network,
             precision,
             encoder,
-            size: _, // It is the display's.
+            size: _, // Part of the display.
             display: flags,
             backend,
             brightness,
@@ -208,7 +208,7 @@ impl Video {
         Ok(record)
     }
 
-    /// Frames a second of the input.
+    /// Returns the frames per second of the input.
     fn rate_hz(&self) -> Result<f64> {
         let films = || film::is_film(&self.input).then(|| film::about(&self.input)).flatten();
         let rate = self.rate.or_else(|| Some(films()?.rate_hz)).unwrap_or(30.0);
@@ -301,7 +301,7 @@ impl Video {
         Ok((options, info))
     }
 
-    /// Every frame answered.
+    /// Processes every frame in sequence.
     fn one_by_one(
         &self,
         options: SessionOptions,
@@ -322,7 +322,7 @@ impl Video {
             let written = if resuming { sink.written(&read)? } else { None };
             resuming = written.is_some();
             match written {
-                // These remember more than a replay tells them, so that their frames are made again.
+                // These sessions keep more state than a replay restores, so their frames are made again.
                 Some(scale) if self.method == CoreMethod::Auto || midpoint_steps > 0 => {
                     session.process(&image).map_err(named)?;
                     sink.skip(scale);
@@ -339,7 +339,7 @@ impl Video {
         Ok(session.statistics())
     }
 
-    /// Frames at their rate, as a camera gives them.
+    /// Submits frames at their rate, as a camera does.
     fn live(
         &self,
         options: SessionOptions,
@@ -348,7 +348,7 @@ impl Video {
         bar: &indicatif::ProgressBar,
         rate: f64,
     ) -> Result<Statistics> {
-        // Results are written beside the session's thread; where writing is too slow, it waits and drops frames.
+        // Another thread writes the results. If writing is too slow, the session's thread waits and drops frames.
         let (sender, results) = mpsc::sync_channel::<Hologram>(2);
         let failure = Arc::new(Mutex::new(None));
         let listener = {
@@ -356,7 +356,7 @@ impl Video {
             move |event| match event {
                 Event::Processed(hologram) => {
                     bar.inc(1);
-                    // The writer ends only when this thread does.
+                    // The writer ends only when this thread does, so sending does not fail.
                     let _ = sender.send(hologram);
                 }
                 Event::Dropped { .. } => bar.inc(1),
@@ -387,7 +387,7 @@ impl Video {
             let submitted = submit_all(&session, source, rate);
             session.close();
             let statistics = session.statistics();
-            // The listener, and with it the channel, goes with the session.
+            // Dropping the session drops the listener and the channel, so the writer ends.
             drop(session);
             let written = writer.join();
             (submitted.map(|()| statistics), written)
@@ -461,7 +461,7 @@ fn submit_all(session: &LiveSession, source: &mut Source, rate_hz: f64) -> Resul
     while let Some(image) = source.next()? {
         let timestamp = timestamp_ns(frame, rate_hz);
         if paced {
-            // A pipe's own rate is a camera's; files come when they are due.
+            // A pipe delivers frames at its camera's rate. Frames from files wait until they are due.
             let due = start + Duration::from_nanos(timestamp);
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         }
@@ -471,7 +471,7 @@ fn submit_all(session: &LiveSession, source: &mut Source, rate_hz: f64) -> Resul
     Ok(())
 }
 
-/// Memory in use, MB; None where the system does not say.
+/// Returns the memory in use in MB, or `None` if the system does not report it.
 fn memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;

@@ -1,4 +1,4 @@
-//! `phasefront view`: one HTML file to look at holograms in.
+//! `phasefront view`: makes one HTML file that shows holograms.
 
 use crate::flags::frame::FrameFlags;
 use crate::make::{HologramRequest, Image, Judged, infos, judge};
@@ -17,47 +17,47 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Make one HTML file to look at holograms in: no server, no network
+/// Make one HTML file that shows holograms, without a server or a network
 ///
 /// The holograms are files, or one is made of an image by the flags of `hologram`.
 #[derive(Args)]
 pub(crate) struct View {
-    /// Holograms (.png, or .npy with its .json), folders of `video`, pages of this command: all become one page
+    /// Holograms (.png, or .npy with its .json), folders of `video`, or pages of this command, all joined in one page
     #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = FrameFlags::NAMES, conflicts_with_all = HologramRequest::NAMES)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     request: HologramRequest,
-    /// Views from the near end of the volume to the far one [default: 25; 5 a frame of video]
+    /// Number of views from the near end of the volume to the far end [default: 25; 5 for each frame of video]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=200))]
     views: Option<u8>,
-    /// Frames that a video is shown with, evenly chosen [default: 24]
+    /// Number of frames of a video to show, evenly chosen [default: 24]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     frames: Option<u16>,
-    /// What a hologram is called on the page [default: its file's name]
+    /// Title of the hologram on the page [default: its file's name]
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
-    /// Size that the page keeps under, MB; its pictures are made smaller for it, but those of joined pages are kept
+    /// Size limit of the page, MB; pictures are made smaller to fit, but those of joined pages stay as they are
     /// [default: 5, and the size of joined pages]
     #[arg(long, value_name = "MB")]
     max_mb: Option<f64>,
-    /// The page
+    /// Output page
     #[arg(short, value_name = "OUT.html")]
     output: PathBuf,
 }
 
-/// Views of a still and of a frame of video.
+/// The default number of views of a still and of a frame of video.
 const STILL_VIEWS: u8 = 25;
 const FRAME_VIEWS: u8 = 5;
-/// Frames of a video.
+/// The default number of frames of a video.
 const VIDEO_FRAMES: u16 = 24;
-/// Size of a page that joins none, MB.
+/// The default size limit of a page without joined pages, in MB.
 const DEFAULT_MB: f64 = 5.0;
-/// Bytes of a page besides its views: itself, phases, depths.
+/// The bytes of a page besides its views: the page itself, phases and depths.
 const BESIDE_VIEWS: usize = 400_000;
-/// Views that are computed at a time.
+/// The number of views that are computed at a time.
 const CHUNK: usize = 5;
 
-/// What a scene is made of.
+/// The content of a scene.
 struct Parts {
     title: String,
     /// The displayed views of each frame.
@@ -118,7 +118,7 @@ impl View {
         Ok(())
     }
 
-    /// Refuses flags that no input takes.
+    /// Refuses flags that no input uses.
     fn check_flags(&self) -> Result<()> {
         let is_page = |path: &PathBuf| output::has_extension(path, "html");
         let made = self.inputs.is_empty() || !self.inputs.iter().all(is_page);
@@ -159,7 +159,7 @@ impl View {
             .unwrap_or_else(|| name.to_string_lossy().into_owned())
     }
 
-    /// The image of the flags: its hologram is made, and shown beside its field.
+    /// Makes the hologram of the image that the flags give, with its field for comparison.
     fn of_image(&mut self) -> Result<Parts> {
         let file = self.request.display()?;
         let image = self.request.image(&file)?;
@@ -195,7 +195,7 @@ impl View {
         })
     }
 
-    /// The display that a hologram file was made for.
+    /// Returns the display that a hologram file was made for.
     fn display_of(&self, info: &HologramInfo) -> Result<DisplayFile> {
         match self.request.display_if_given()? {
             Some(display) => Ok(display),
@@ -230,7 +230,7 @@ impl View {
         })
     }
 
-    /// A folder that `video` wrote.
+    /// Reads a folder that `video` wrote.
     fn of_video(&self, dir: &Path) -> Result<Parts> {
         let refuse = |e: &dyn std::fmt::Display| Error::file(dir, e);
         let mut all = Vec::new();
@@ -282,7 +282,7 @@ impl View {
 }
 
 impl Parts {
-    /// The scene, its views packed into `budget` bytes.
+    /// Makes the scene, with its views packed into `budget` bytes.
     fn scene(self, budget: usize) -> Result<Scene> {
         let last = (self.z_m.len() - 1) as f32;
         let depth = match &self.depth {
@@ -306,7 +306,7 @@ impl Parts {
     }
 }
 
-/// The views of `hologram` at `z_m`, no wider than a page shows them.
+/// Computes the views of `hologram` at `z_m`, no wider than a page shows them.
 fn views(hologram: &Hologram, file: &DisplayFile, z_m: &[f64], bar: &ProgressBar) -> Result<Vec<RgbImage>> {
     let mut all = Vec::with_capacity(z_m.len());
     for z_m in z_m.chunks(CHUNK) {

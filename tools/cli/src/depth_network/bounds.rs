@@ -1,5 +1,5 @@
-//! What a depth network may make tract allocate and compute, checked before it does: a file of a few bytes may name a
-//! tensor of any size.
+//! Bounds on the memory and time that tract may spend on a depth network, checked in advance, because a file of a few
+//! bytes may name a tensor of any size.
 
 use phasefront_core::method::network::bounds;
 use std::path::Path;
@@ -8,24 +8,27 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_core::internal::Cost;
 use tract_onnx::tract_hir::infer::{Factoid, InferenceOp};
 
-/// Most nodes of a network; large public ones have one to three thousand. The time that tract takes to prepare them
-/// grows with the square: minutes for as many.
+/// The largest number of nodes in a network. Large public networks have one to three thousand. The time that tract
+/// takes to prepare nodes grows with the square of their number, to minutes at this bound.
 const MOST_NODES: usize = 1 << 12;
-/// Most bytes of one tensor.
+/// The largest size of one tensor in bytes.
 const MOST_TENSOR: u64 = 1 << 30;
-/// Most bytes of all tensors that are needed at one time.
+/// The largest size in bytes of all tensors that are needed at one time.
 const MOST_LIVE: u64 = 1 << 32;
-/// Most bytes that a node may make of constants whose size tract learns only by computing.
+/// The largest size in bytes of a node's constant inputs if tract learns the size of its output only by computing it.
 const MOST_UNKNOWN: u64 = 1 << 16;
-/// Most products that are summed for one picture: some minutes.
+/// The largest number of products that are summed for one picture: some minutes of work.
 const MOST_PRODUCTS: u64 = 1 << 44;
-/// How often the sizes are gone through: what a later node says of an earlier one is rarely needed, and once.
+/// The largest number of passes over the sizes. Earlier nodes rarely need information from later ones, and then one
+/// more pass is enough.
 const MOST_PASSES: usize = 8;
 
-/// The messages of `file`, where they are not too many, and what lies in other files is in the same folder.
+/// Decodes the messages of `file`, if there are not too many, and checks that its external data lies in the same
+/// folder.
 ///
 /// # Errors
-/// Too many parts or nodes; branches and loops; other files that cannot be read.
+/// Returns an error if there are too many parts or nodes, if there are branches or loops, or if other files cannot be
+/// read.
 pub(super) fn messages(file: &[u8], path: &Path) -> std::result::Result<ModelProto, String> {
     bounds::check_parts(file).map_err(|why| why.to_string())?;
     let proto: ModelProto = prost_message(file)?;
@@ -75,11 +78,10 @@ fn prost_message(file: &[u8]) -> std::result::Result<ModelProto, String> {
     decoded.map_err(|why| format!("is no ONNX file that tract reads: {}", super::one_line(&why)))
 }
 
-/// What is known of the model's tensors, as tract's own analysis finds it, but with each size checked before a constant
-/// of it is made.
+/// Infers the model's tensors like tract's own analysis, but checks each size before making a constant of that size.
 ///
 /// # Errors
-/// A tensor that is too large, and what tract refuses.
+/// Returns an error if a tensor is too large or tract refuses the model.
 pub(super) fn analyse(model: &mut InferenceModel) -> TractResult<()> {
     for node in model.nodes() {
         for output in &node.outputs {
@@ -87,7 +89,7 @@ pub(super) fn analyse(model: &mut InferenceModel) -> TractResult<()> {
         }
     }
     let mut order = model.eval_order()?;
-    // tract analyses what no output needs as well.
+    // tract also analyses nodes that no output needs.
     order.extend((0..model.nodes().len()).filter({
         let needed: std::collections::HashSet<usize> = order.iter().copied().collect();
         move |node| !needed.contains(node)
@@ -104,7 +106,7 @@ pub(super) fn analyse(model: &mut InferenceModel) -> TractResult<()> {
     Ok(())
 }
 
-/// Whether something was learned from one node.
+/// Analyses one node and returns whether this gave new information.
 fn analyse_node(model: &mut InferenceModel, id: usize) -> TractResult<bool> {
     let node = model.node(id);
     let name = format!("{} ({})", node.name, node.op.name());
@@ -116,7 +118,7 @@ fn analyse_node(model: &mut InferenceModel, id: usize) -> TractResult<bool> {
     let (inputs, outputs, seen) = (facts(&node.inputs)?, facts(&places)?, facts(&observed)?);
     let from = node.inputs.clone();
 
-    // Sizes alone, on a copy; then what tract makes of it, which computes constants.
+    // First infer only sizes, on a copy. Then let tract infer everything, which computes constants.
     let mut op: Box<dyn InferenceOp> = node.op.clone();
     let (known_inputs, sizes, _) =
         op.infer_facts(inputs.iter().collect(), outputs.iter().collect(), seen.iter().collect())?;
@@ -159,7 +161,7 @@ fn analyse_node(model: &mut InferenceModel, id: usize) -> TractResult<bool> {
     Ok(is_new)
 }
 
-/// The bytes of a tensor, none where its size is not known yet.
+/// Checks the size of a tensor and returns it in bytes, or returns `None` if it is not known yet.
 fn check(node: &str, fact: &InferenceFact) -> TractResult<Option<u64>> {
     let mut bytes = fact.datum_type.concretize().map_or(8, |kind| kind.size_of()) as u64;
     let mut is_known = !fact.shape.is_open();
@@ -188,10 +190,10 @@ fn bail(why: String) -> TractResult<()> {
     Err(TractError::msg(why))
 }
 
-/// Checks the sizes of all tensors of `model`, what of them is needed at one time, and its products.
+/// Checks the sizes of all tensors of `model`, the memory that is needed at one time, and the number of products.
 ///
 /// # Errors
-/// What is over a bound, or a size that depends on the picture.
+/// Returns an error if a bound is exceeded or a size depends on the picture.
 pub(super) fn check_sizes(model: &TypedModel) -> TractResult<()> {
     let order = model.eval_order()?;
     let mut last = vec![0; model.nodes().len()];

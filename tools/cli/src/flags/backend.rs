@@ -1,4 +1,4 @@
-//! The flags of where frames are made.
+//! The flags for the device that makes frames.
 
 use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
@@ -6,23 +6,23 @@ use phasefront_cli::gpu;
 use phasefront_gpu::DeviceOptions;
 use phasefront_io::{Error, Result};
 
-/// Where frames are made.
+/// The device that makes frames.
 #[derive(Default, Args)]
 pub(crate) struct BackendFlags {
-    /// Where frames are made
+    /// Device that makes frames
     #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
     backend: BackendName,
-    /// A part of the GPU's name [default: the fastest; drivers in software are taken by name only]
+    /// Part of the GPU's name [default: the fastest; drivers in software are taken by name only]
     #[arg(long, value_name = "NAME")]
     gpu: Option<String>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 enum BackendName {
-    /// The processor
+    /// The CPU
     #[default]
     Cpu,
-    /// The graphics processor, by Vulkan, Metal or DirectX 12
+    /// The GPU, by Vulkan, Metal or DirectX 12
     Gpu,
 }
 
@@ -33,7 +33,7 @@ impl BackendFlags {
         record.set("--gpu", gpu.as_ref());
     }
 
-    /// Which GPU, if one is wanted.
+    /// Returns the options of the GPU, if one is requested.
     pub(crate) fn device(&self) -> Result<Option<DeviceOptions>> {
         match (self.backend, &self.gpu) {
             (BackendName::Gpu, name) => Ok(Some(gpu::options(name.as_deref()))),

@@ -1,4 +1,4 @@
-//! The flags of what the numbers of a depth image mean.
+//! The flags for the meaning of a depth image's values.
 
 use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
@@ -7,19 +7,19 @@ use phasefront_core::depth::DepthUnit;
 use phasefront_io::frame::DepthOptions;
 use phasefront_io::{Error, Result};
 
-/// What the numbers of a depth image mean, and which are shown where.
+/// The unit of a depth image's values, and the range of depth to show.
 #[derive(Default, Args)]
 pub(crate) struct DepthFlags {
-    /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth [default: normalized]
+    /// Unit of the depth values; 0 and NaN are missing readings, except in normalized depth [default: normalized]
     #[arg(long, value_enum)]
     depth_unit: Option<UnitName>,
-    /// Units in a metre, for --depth-unit raw
+    /// Units per metre, for --depth-unit raw
     #[arg(long, value_name = "N", required_if_eq("depth_unit", "raw"))]
     depth_scale: Option<f64>,
-    /// Metres shown nearest, whatever the unit of the depth's numbers [default: the 1st percentile]
+    /// Depth shown nearest, in metres for any --depth-unit [default: the 1st percentile]
     #[arg(long, value_name = "M")]
     near: Option<f32>,
-    /// Metres shown farthest, whatever the unit of the depth's numbers [default: the 99th percentile]
+    /// Depth shown farthest, in metres for any --depth-unit [default: the 99th percentile]
     #[arg(long, value_name = "M")]
     far: Option<f32>,
 }
@@ -27,7 +27,7 @@ pub(crate) struct DepthFlags {
 #[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 enum UnitName {
     #[default]
-    /// 0 nearest to the largest number farthest
+    /// From 0, nearest, to the largest number, farthest
     Normalized,
     /// Metres
     M,
@@ -35,7 +35,7 @@ enum UnitName {
     Mm,
     /// Inverse metres
     Disparity,
-    /// --depth-scale units a metre
+    /// --depth-scale units per metre
     Raw,
 }
 
@@ -53,7 +53,7 @@ impl DepthFlags {
         record.set("--far", *far);
     }
 
-    /// --near and --far of video, metres.
+    /// Returns --near and --far of video, in metres.
     pub(crate) fn range(&self) -> Result<Option<(f32, f32)>> {
         match (self.near, self.far) {
             (None, None) => Ok(None),

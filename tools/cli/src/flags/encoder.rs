@@ -1,4 +1,4 @@
-//! The flags of how a field becomes phases.
+//! The flags for the encoder that turns a field into phases.
 
 use crate::record::RunRecord;
 use clap::Args;
@@ -9,28 +9,28 @@ use phasefront_io::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
 
-/// How the field becomes phases.
+/// The encoder that turns a field into phases.
 #[derive(Default, Args)]
 pub(crate) struct EncoderFlags {
-    /// How the field becomes phases [default: anti-alias; deep with --network ddpm-8]
+    /// Encoder that turns the field into phases [default: anti-alias; deep with --network ddpm-8]
     #[arg(long, value_enum)]
     encoder: Option<EncoderName>,
-    /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: the one of --network ddpm-8]
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: that of --network ddpm-8]
     #[arg(long, value_name = "FILE")]
     prefilter: Option<String>,
-    /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0
-    /// with --encoder deep]
+    /// Fraction of full light, 0 to 1, below which phases are drawn to 0 to reduce speckle in dark areas [default: 0.4;
+    /// 0 with --encoder deep]
     #[arg(long, value_name = "D")]
     dark_threshold: Option<f32>,
-    /// Steps that draw the displayed image toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
+    /// Steps that bring the displayed image closer to the wanted field, 0 to 8 [default: 1; 0 with --encoder deep]
     #[arg(long, value_name = "N")]
     local_steps: Option<usize>,
-    /// Steps of correction at the midpoint after them, for stills; 1 brings most at the midpoint, 10 all
+    /// Further steps of correction at the midpoint, for stills; 1 brings most of the gain at the midpoint, 10 all of it
     #[arg(long, value_name = "N", default_value_t = 0)]
     midpoint_steps: usize,
 }
 
-/// How a field becomes phases, and what it is called.
+/// The options of an encoder, and its name.
 #[derive(Clone)]
 pub(crate) struct Encoder {
     pub(crate) options: EncoderOptions,
@@ -80,7 +80,7 @@ impl EncoderFlags {
         Ok(())
     }
 
-    /// For fields that no network of a pair makes.
+    /// Makes the encoder for fields that are not made by the network of a pair.
     pub(crate) fn read(&self) -> Result<Encoder> {
         let prefilter = match &self.prefilter {
             Some(file) => Some(networks::network(file, None)?),
@@ -108,13 +108,13 @@ impl EncoderFlags {
         }
     }
 
-    /// Whether the pre-filter is asked for by name.
+    /// Checks whether --encoder deep is given.
     pub(crate) fn is_deep(&self) -> bool {
         self.encoder == Some(EncoderName::DEEP)
     }
 
-    /// The network called `network`, and the encoder that belongs to it or is asked for: the bundled pair for
-    /// `display` by its name or for --encoder deep, else 8 layers.
+    /// Returns the network called `network` and its encoder. The bundled pair for `display` is used if its name or
+    /// --encoder deep is given; otherwise the default is the network of 8 layers.
     pub(crate) fn with_network(
         &self,
         network: Option<&str>,

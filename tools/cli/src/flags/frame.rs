@@ -1,5 +1,5 @@
-//! The flags of an RGB-D image: from two files, from a photo with depth inside, or from any picture by a network that
-//! sees depth; and how it lies on the modulator.
+//! The flags for an RGB-D image: from two files, from a photo with depth inside, or from any picture by a network that
+//! estimates depth. Further flags place the image on the modulator.
 
 use crate::flags::depth::DepthFlags;
 use crate::record::RunRecord;
@@ -14,7 +14,7 @@ use phasefront_io::picture::{self, photo};
 use phasefront_io::{Error, Result, frame};
 use std::path::{Path, PathBuf};
 
-/// An RGB-D image, what its depth means, and how it lies on the modulator.
+/// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
 pub(crate) struct FrameFlags {
     #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}; or a folder of them"))]
@@ -32,25 +32,25 @@ pub(crate) struct FrameFlags {
     photo: Option<PathBuf>,
     #[command(flatten)]
     seen: SeenDepthFlags,
-    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with
-    /// --photo]. An image of another size than the modulator's is told of: with --display any, without it one that is
-    /// larger than the default display
+    /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: unchanged;
+    /// contain with --photo]. A warning appears if the image's size differs from that of the --display, or, without
+    /// --display, if the image is larger than the default display
     #[arg(long, value_enum)]
     fit: Option<FitName>,
     #[command(flatten)]
     depth_numbers: DepthFlags,
 }
 
-/// Depth that a network sees, and which way depth goes.
+/// Depth that a network estimates, and the direction of depth.
 #[derive(Clone, Default, Args)]
 pub(crate) struct SeenDepthFlags {
-    /// ONNX file of a network that sees relative inverse depth in colour alone (docs/depth.md)
+    /// ONNX file of a network that estimates relative inverse depth from colour alone (docs/depth.md)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_network: Option<PathBuf>,
-    /// Numbers that the colours are for --depth-network
+    /// Scaling of the colours for --depth-network
     #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network")]
     depth_network_colours: ColoursName,
-    /// Take near for far: for depth that is larger where it is nearer, and for --depth-network that gives distance
+    /// Swap near and far: for depth that is larger where it is nearer, and for --depth-network that gives distance
     #[arg(long)]
     invert: bool,
 }
@@ -76,7 +76,7 @@ impl SeenDepthFlags {
         self.invert
     }
 
-    /// What `network` sees in `rgb`, larger where it is farther.
+    /// Returns the depth that `network` estimates for `rgb`, larger where it is farther.
     pub(crate) fn farther(&self, network: &DepthNetwork, rgb: &Array3<f32>) -> Result<Array2<f32>> {
         let seen = network.see(rgb.view(), self.depth_network_colours.colours())?;
         Ok(match self.invert {
@@ -89,7 +89,7 @@ impl SeenDepthFlags {
 #[derive(Clone, Copy, Default, ValueEnum)]
 enum ColoursName {
     #[default]
-    /// Of ImageNet's mean and spread: MiDaS, DPT, Depth Anything
+    /// By ImageNet's mean and spread: MiDaS, DPT, Depth Anything
     Imagenet,
     /// From 0 to 1
     Unit,
@@ -109,9 +109,9 @@ impl ColoursName {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum FitName {
-    /// The whole image, in the middle of black
+    /// The whole image, in the middle, with black around it
     Contain,
-    /// As much of it as fills the modulator
+    /// The part of the image that fills the modulator
     Cover,
     /// Pixel for pixel, in the middle
     Centre,
@@ -127,11 +127,11 @@ impl FitName {
     }
 }
 
-/// A picture of a folder.
+/// A picture in a folder.
 pub(crate) struct Picture {
-    /// Its file's name without what follows the last dot.
+    /// The file's name without its last extension.
     pub name: String,
-    /// Colour, and depth where that is a file of its own; one of them alone where the other is missing.
+    /// The colour file, and the depth file if depth is separate. If one of them is missing, only the other.
     pub(crate) files: Vec<PathBuf>,
     pub(crate) is_whole: bool,
 }
@@ -160,8 +160,8 @@ fn of_two_folders(colour: &Path, depth: &Path) -> Result<Vec<Picture>> {
     Ok(pairs.chain(alone).collect())
 }
 
-/// Says that a hologram of (H, W) pixels is not the size of its modulator, which `flag` would make it. A display that
-/// nobody `named` is a stand-in, in whose middle any smaller hologram may lie.
+/// Warns if a hologram of (H, W) pixels does not have the size of its modulator, and suggests `flag`. If no display was
+/// `named`, the default display stands in, and any smaller hologram may lie in its middle.
 pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, named: bool, flag: &str) {
     let (rows, columns) = (display.height(), display.width());
     let larger = height > rows || width > columns;
@@ -174,7 +174,7 @@ pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, n
 }
 
 impl FrameFlags {
-    /// The names of the flags, for what takes their place.
+    /// The names of the flags, for flags that conflict with them.
     pub(crate) const NAMES: [&str; 11] = [
         "rgb",
         "depth",
@@ -189,7 +189,7 @@ impl FrameFlags {
         "far",
     ];
 
-    /// Notes all but which picture it is.
+    /// Records all flags except those that name the picture.
     pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
         let FrameFlags {
             rgb: _,
@@ -205,7 +205,7 @@ impl FrameFlags {
         Ok(())
     }
 
-    /// The pictures of the folders that --rgb and --depth, or --photo, name; `None` where they name files.
+    /// Returns the pictures of the folders that --rgb and --depth, or --photo, name, or `None` if they name files.
     pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
         let is_folder = |path: &Option<PathBuf>| path.as_ref().is_some_and(|path| path.is_dir());
         let (rgb, depth) = (is_folder(&self.rgb), is_folder(&self.depth));
@@ -222,14 +222,14 @@ impl FrameFlags {
         }
     }
 
-    /// The folders that [`Self::pictures`] reads.
+    /// Returns the folders that [`Self::pictures`] reads.
     pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
         [&self.rgb, &self.depth, &self.photo]
             .into_iter()
             .filter_map(|path| path.as_deref())
     }
 
-    /// The same for one picture of a folder.
+    /// Selects one picture of a folder.
     pub(crate) fn take(&mut self, picture: &Picture) {
         let mut files = picture.files.iter().cloned();
         if self.photo.is_some() {
@@ -240,12 +240,13 @@ impl FrameFlags {
         }
     }
 
-    /// The file of the picture.
+    /// Returns the file of the picture.
     pub(crate) fn source(&self) -> Option<&Path> {
         self.photo.as_deref().or(self.rgb.as_deref())
     }
 
-    /// The frame for `display`, in the colours of its lasers; `named` where the display was asked for.
+    /// Reads the frame for `display`, in the colours of its lasers. `named` tells whether the display was given by a
+    /// flag.
     pub(crate) fn read(&self, display: &Display, named: bool) -> Result<RgbdFrame> {
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
@@ -285,7 +286,7 @@ impl FrameFlags {
         }
     }
 
-    /// The frame of a photo: by its distances where --near or --far ask for them, else d_n as it is.
+    /// Makes the frame of a photo: from its distances if --near or --far is given, else from d_n unchanged.
     fn of_photo(&self, path: &Path, photo: &photo::Photo, display: &Display) -> Result<RgbdFrame> {
         let options = self.depth_numbers.options()?;
         let depth = match (options.near_m, options.far_m, photo.metres()) {

@@ -1,4 +1,4 @@
-//! The methods of the core, by the names that the commands have for them.
+//! The core's methods, with their names on the command line.
 
 use crate::flags::encoder::{Encoder, EncoderFlags};
 use clap::ValueEnum;
@@ -7,22 +7,22 @@ use phasefront_command::flags::{PrecisionName, check_used};
 use phasefront_command::networks;
 use phasefront_io::Result;
 
-/// A method on RGB-D images.
+/// A method for RGB-D images.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub(crate) enum CoreMethod {
     /// A trained network on the RGB-D image
     Network,
-    /// The plane sweep on the RGB-D image: waves by short filters, any display
+    /// The plane sweep on the RGB-D image: waves by short filters, for any display
     Sweep,
     /// The plane sweep if depth is clean, a network if it is noisy or incomplete
     Auto,
 }
 
-/// What a method is made of, besides its name.
+/// The inputs of a method besides its name.
 pub(crate) struct Parts<'a> {
-    /// --network.
+    /// The value of --network.
     pub(crate) network: Option<&'a str>,
-    /// --precision.
+    /// The value of --precision.
     pub(crate) precision: Option<PrecisionName>,
     pub(crate) display: &'a Display,
     pub(crate) sweep: Sweep,
@@ -38,7 +38,7 @@ impl CoreMethod {
         }
     }
 
-    /// The method, and how its fields become phases.
+    /// Makes the method and the encoder of its fields.
     pub(crate) fn of(self, parts: &Parts<'_>) -> Result<(Method, Encoder)> {
         let Parts {
             network,

@@ -1,4 +1,4 @@
-//! The core's methods on an RGB-D image, on the CPU.
+//! The core's methods for RGB-D images, on the CPU.
 
 use super::levels::{Out, described, levels_by, stack};
 use super::{HologramRequest, HologramResult};
@@ -27,7 +27,7 @@ impl HologramRequest {
         let shape = field.dim();
         let values = field.as_slice_mut().expect("standard layout");
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
-        // The encoder filters the field that it is given, so a copy is kept where it is asked for.
+        // The encoder filters the field in place, so keep a copy if it is requested.
         let kept = self.keeps_field.then(|| values.to_vec());
         let (levels, words, modulation) = levels_by(&target.display, (height, width), |out| match out {
             Out::Bytes(bytes) => pipeline.modulate(values, bytes, &mut scratch),

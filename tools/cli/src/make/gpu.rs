@@ -1,4 +1,4 @@
-//! The core's methods on an RGB-D image, on a GPU.
+//! The core's methods for RGB-D images, on a GPU.
 
 use super::{HologramRequest, HologramResult};
 use crate::flags::encoder::Encoder;
@@ -11,7 +11,7 @@ use phasefront_io::{Error, Result};
 use std::sync::Arc;
 
 impl HologramRequest {
-    /// On a GPU that was tried out before.
+    /// Makes a hologram on a GPU, after a test of the GPU.
     pub(super) fn on_gpu(
         &self,
         stage: &'static str,

@@ -1,4 +1,4 @@
-//! How close a hologram comes to its own wave.
+//! The comparison of a hologram with its own wave.
 
 use super::{HologramResult, infos};
 use phasefront_exact::truth;
@@ -6,14 +6,14 @@ use phasefront_io::display::DisplayFile;
 use phasefront_io::{Result, hologram};
 use serde::Serialize;
 
-/// How near what a hologram shows is to its own wave.
+/// The quality of the displayed image, compared with the hologram's own wave.
 #[derive(Serialize)]
 pub(crate) struct Judged {
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
     pub(crate) stack_psnr_db: f64,
     pub(crate) stack_ssim: f64,
-    /// Mean amplitude over the wave's.
+    /// The mean amplitude divided by the wave's.
     pub(crate) brightness: f64,
 }
 
@@ -26,7 +26,7 @@ impl Judged {
     }
 }
 
-/// How close `made` comes to its own wave, which it must keep.
+/// Compares the displayed image of `made` with its own wave. `made` must keep its field.
 pub(crate) fn judge(display: &DisplayFile, made: &HologramResult) -> Result<Judged> {
     let (levels, field) = infos(display, made);
     let wave = made.field.clone().expect("kept for this");

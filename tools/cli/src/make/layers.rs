@@ -20,10 +20,10 @@ use phasefront_io::{Error, Result};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Planes of the methods of exact waves.
+/// The default number of planes for the methods of exact waves.
 const DEFAULT_PLANES: usize = 256;
 
-/// A field that a method made.
+/// A field, with the names of its stage and engine.
 struct Wave {
     stage: &'static str,
     field: Array3<Complex32>,
@@ -40,7 +40,7 @@ impl HologramRequest {
         encoder: Encoder,
     ) -> Result<HologramResult> {
         let (height, width) = ldi.shape();
-        // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
+        // A correction that is the same for all depths is part of the offset. Only SM-LBM handles others.
         let (target, varying) = match (method, file.corrected()) {
             (_, Ok(target)) => (target, None),
             (Method::Layers, Err(_)) => (file.target.clone(), file.aberration.as_ref()),
@@ -82,7 +82,7 @@ impl HologramRequest {
         })
     }
 
-    /// The field that `method` makes of `ldi`, corrected for an aberration that varies over depth or over the frame.
+    /// Computes the field of `ldi` with `method`, corrected for an aberration that varies over depth or over the frame.
     fn wave(&self, method: Method, ldi: &Ldi, display: &Display, varying: Option<&AberrationFile>) -> Result<Wave> {
         let (height, width) = ldi.shape();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
@@ -124,7 +124,7 @@ impl HologramRequest {
         Ok(Wave { stage, field, engine })
     }
 
-    /// The network of --network, which must take layers and be for `display`.
+    /// Reads the network of --network, which must take layers and suit `display`.
     fn network_for_layers(&self, display: &Display) -> Result<Arc<Network>> {
         let name = self.network.as_deref().ok_or_else(|| {
             Error::Input("--method network with --ldi needs a --network for layered depth images".into())

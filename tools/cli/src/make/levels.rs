@@ -1,18 +1,18 @@
-//! Memory for the levels of a modulator: bytes, and words where it has over 8 bits.
+//! Memory for the levels of a modulator: bytes, and words for over 8 bits.
 
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront_core::method::network::Engine;
 use phasefront_core::pipeline::display_plan::Modulation;
 
-/// Where levels are put.
+/// The memory that levels are written to.
 pub(super) enum Out<'a> {
     Bytes(&'a mut [u8]),
-    /// With memory for phases.
+    /// Memory for phases, and the words.
     Words(&'a mut [f32], &'a mut [u16]),
 }
 
-/// Levels of the bits of `display` for (H, W) pixels, which `modulate` makes: bytes, and words where there are over 8.
+/// Makes levels of `display` for (H, W) pixels by calling `modulate`: bytes, and words if they have over 8 bits.
 pub(super) fn levels_by(
     display: &phasefront::Display,
     (height, width): (usize, usize),
@@ -31,12 +31,12 @@ pub(super) fn levels_by(
     (upper, Some(words), modulation)
 }
 
-/// The stack of `shape` that `values` are.
+/// Makes a stack of `shape` from `values`.
 pub(super) fn stack(values: Vec<Complex32>, shape: (usize, usize, usize)) -> Array3<Complex32> {
     Array3::from_shape_vec(shape, values).expect("a stack of the frame's shape")
 }
 
-/// What computes a network, and why.
+/// Describes the engine of a network and why it was chosen.
 pub(super) fn described(engine: &Engine) -> String {
     format!("{} ({})", engine.name, engine.why)
 }

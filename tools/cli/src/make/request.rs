@@ -1,4 +1,4 @@
-//! The request of a hologram: the flags that say of what it is made, and how.
+//! The request for a hologram: the flags for its image and its method.
 
 use crate::flags::backend::BackendFlags;
 use crate::flags::encoder::EncoderFlags;
@@ -16,7 +16,7 @@ use phasefront_io::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-/// What a hologram is made of, and how.
+/// The flags for a hologram's image and method.
 #[derive(Args)]
 pub(crate) struct HologramRequest {
     #[command(flatten)]
@@ -24,35 +24,35 @@ pub(crate) struct HologramRequest {
     /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
     #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
     pub(super) ldi: Option<PathBuf>,
-    /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi
-    /// and no --network]
+    /// Method for the midpoint hologram [default: auto; network with --network or --encoder deep, layers with --ldi and
+    /// no --network]
     #[arg(long, value_enum)]
     pub(super) method: Option<Method>,
     /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     pub(super) network: Option<String>,
-    /// Numbers that a bundled network computes in [default: int8]
+    /// Number type of a bundled network [default: int8]
     #[arg(long, value_enum)]
     pub(super) precision: Option<PrecisionName>,
-    /// Planes of --method layers and points [default: 256] and sweep [default: what suits the display]
+    /// Number of planes for --method layers and points [default: 256] and sweep [default: chosen for the display]
     #[arg(long, value_name = "N")]
     pub(super) planes: Option<usize>,
-    /// Taps of the filter from plane to plane, for --method sweep [default: what suits planes and display]
+    /// Number of taps of the filter from plane to plane, for --method sweep [default: chosen for planes and display]
     #[arg(long, value_name = "N")]
     pub(super) taps: Option<usize>,
-    /// What keeps light from where it should not go, for --method points [default: geometric]
+    /// Treatment of occlusion for --method points [default: geometric]
     #[arg(long, value_enum)]
     pub(super) occlusion: Option<OcclusionName>,
     #[command(flatten)]
     pub(super) encoder: EncoderFlags,
-    /// The amplitude that full light stands for [default: the largest of the image]
+    /// Amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     pub(super) scale: Option<f32>,
     #[command(flatten)]
     pub(super) backend: BackendFlags,
     #[command(flatten)]
     pub(super) display: DisplayFlags,
-    /// Whether the field is asked for too.
+    /// Whether the result keeps the field.
     #[arg(skip)]
     pub(crate) keeps_field: bool,
 }
@@ -84,11 +84,11 @@ impl ValueEnum for Method {
 
 #[derive(Clone, Copy, Default, ValueEnum)]
 pub(super) enum OcclusionName {
-    /// Nothing: every point of every layer lights its whole sub-hologram
+    /// None: every point of every layer lights its whole sub-hologram
     None,
-    /// The image: only points of the front layer shine
+    /// By the image: only points of the front layer shine
     Input,
-    /// Rays: every point shines where no nearer surface is in the way
+    /// By rays: every point shines where no nearer surface is in the way
     #[default]
     Geometric,
 }
@@ -103,7 +103,7 @@ impl OcclusionName {
     }
 }
 
-/// What a hologram is made of.
+/// The image of a hologram.
 pub(crate) enum Image {
     /// An RGB-D image.
     Rgbd(RgbdFrame),
@@ -112,7 +112,7 @@ pub(crate) enum Image {
 }
 
 impl HologramRequest {
-    /// The names of the flags besides those of [`FrameFlags`] and the display, for what takes their place.
+    /// The names of these flags, except those of [`FrameFlags`] and the display, for flags that conflict with them.
     pub(crate) const NAMES: [&str; 15] = [
         "ldi",
         "method",
@@ -131,7 +131,7 @@ impl HologramRequest {
         "gpu",
     ];
 
-    /// The request for `display` of images that are read already.
+    /// Creates a request for `display` without flags for an image.
     pub(crate) fn of(display: DisplayFlags) -> Self {
         HologramRequest {
             frame: FrameFlags::default(),
@@ -150,18 +150,18 @@ impl HologramRequest {
         }
     }
 
-    /// The same image another way.
+    /// Changes the method, network and encoder for the same image.
     pub(crate) fn set_method(&mut self, method: Method, network: Option<String>, encoder: EncoderFlags) {
         (self.method, self.network, self.encoder) = (Some(method), network, encoder);
         (self.planes, self.precision) = (None, None);
     }
 
-    /// With so many planes.
+    /// Sets the number of planes.
     pub(crate) fn with_planes(&mut self, planes: usize) {
         self.planes = Some(planes);
     }
 
-    /// By a network in floating point.
+    /// Selects floating point for the network.
     pub(crate) fn in_float32(&mut self) {
         self.precision = Some(PrecisionName::F32);
     }
@@ -170,11 +170,11 @@ impl HologramRequest {
         self.display.read()
     }
 
-    /// Notes all but which picture it is of.
+    /// Records all flags except those that name the picture.
     pub(crate) fn record(&self, display: &phasefront::Display, record: &mut RunRecord) -> Result<()> {
         let HologramRequest {
             frame,
-            ldi: _, // It is one picture.
+            ldi: _, // Names the picture.
             method,
             network,
             precision,
@@ -200,17 +200,17 @@ impl HologramRequest {
         record.display(flags.name(), display)
     }
 
-    /// The pictures of folders, where folders are given.
+    /// Returns the pictures of the folders, or `None` if the flags name no folders.
     pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
         self.frame.pictures()
     }
 
-    /// The folders that pictures are from.
+    /// Returns the folders of the pictures.
     pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
         self.frame.folders()
     }
 
-    /// Turns to one picture of a folder.
+    /// Selects one picture of a folder.
     pub(crate) fn take(&mut self, picture: &Picture) {
         self.frame.take(picture);
     }
@@ -223,12 +223,12 @@ impl HologramRequest {
         self.display.read_if_given()
     }
 
-    /// The file that the image is from.
+    /// Returns the file of the image.
     pub(crate) fn source(&self) -> Option<&Path> {
         self.ldi.as_deref().or(self.frame.source())
     }
 
-    /// What the flags ask for.
+    /// Returns the method that the flags select.
     pub(super) fn method(&self) -> Method {
         self.method.unwrap_or(match (&self.ldi, &self.network) {
             (Some(_), None) => Method::Layers,
@@ -264,7 +264,7 @@ impl HologramRequest {
         ])
     }
 
-    /// The image for `display`.
+    /// Reads the image for `display`.
     pub(crate) fn image(&self, display: &DisplayFile) -> Result<Image> {
         self.check_flags()?;
         if let (Some(Method::Core(method)), Some(_)) = (self.method, &self.ldi)

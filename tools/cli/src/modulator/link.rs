@@ -1,8 +1,8 @@
-//! The way from computer to modulator: a pattern that shows what cable, driver and converter do to pixels, and its
+//! The link from computer to modulator: a pattern that shows how cable, driver and converter change pixels, and its
 //! reading from a captured image. Limited range, YCbCr, scaled pixels and tone curves all ruin phase.
 //!
-//! The pattern is six bands from above, of equal height: ramps of grey, red, green and blue, 256 steps from left to
-//! right; columns of one pixel, black and white; columns of one pixel, red and green.
+//! The pattern has six bands of equal height. From top to bottom, they are ramps of grey, red, green and blue with 256
+//! steps from left to right, then one-pixel columns of black and white, then one-pixel columns of red and green.
 
 use phasefront_io::hologram::packed::{Image, Kind};
 use serde::Serialize;
@@ -10,40 +10,41 @@ use serde::Serialize;
 const BANDS: usize = 6;
 const STEPS: usize = 256;
 
-/// What a link does to pixels.
+/// The effects of a link on pixels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
-    /// Size of the capture against the pattern's, where they differ.
+    /// The width and height of the capture, then of the pattern, if they differ.
     pub size: Option<[usize; 4]>,
-    /// How grey levels arrive.
+    /// The range of the arriving grey levels.
     pub range: Range,
-    /// Mean and largest distance of grey levels from where they should be, after the range is taken away.
+    /// The mean and the largest error of grey levels, after correcting for the range.
     pub grey_error: [f64; 2],
-    /// The same of the levels of red, green and blue ramps, all three channels.
+    /// The mean and the largest error of the red, green and blue ramps in all three channels, after correcting for the
+    /// range.
     pub colour_error: [f64; 2],
-    /// Contrast of columns of one pixel of black and white, 1 where it is whole.
+    /// The contrast of one-pixel columns of black and white; 1 if it is complete.
     pub fine_grey: f64,
-    /// Contrast of columns of one pixel of red and green.
+    /// The contrast of one-pixel columns of red and green.
     pub fine_colour: f64,
-    /// What is wrong, each with what to do; empty where every pixel arrives as it is.
+    /// The faults, each with a remedy; empty if every pixel arrives unchanged.
     pub faults: Vec<String>,
 }
 
-/// How grey levels 0 to 255 arrive.
+/// The range in which grey levels 0 to 255 arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Range {
-    /// As 0 to 255.
+    /// 0 to 255, unchanged.
     Full,
-    /// As 16 to 235: full levels on a limited link.
+    /// 16 to 235: full levels on a limited link.
     Limited,
-    /// 16 to 235 as 0 to 255, what is beyond them is lost: limited levels taken for full.
+    /// 16 to 235 arrive as 0 to 255 and the levels beyond are lost: limited levels were taken for full ones.
     Expanded,
-    /// Otherwise.
+    /// Another range.
     Other,
 }
 
-/// The pattern of (H, W) pixels.
+/// Makes the pattern of (H, W) pixels.
 pub fn pattern((height, width): (usize, usize)) -> Image {
     let mut bytes = Vec::with_capacity(3 * height * width);
     for y in 0..height {
@@ -71,7 +72,7 @@ fn pixel((y, x): (usize, usize), (height, width): (usize, usize)) -> [u8; 3] {
     }
 }
 
-/// Reads a capture of the pattern of (H, W) = `sent` pixels. A capture of another size is read, and said to be scaled.
+/// Reads a capture of the pattern of (H, W) = `sent` pixels. A capture of another size is read and reported as scaled.
 pub fn read(capture: &Image, sent: (usize, usize)) -> Reading {
     let seen = Seen { capture };
     let ramps: [Vec<[f64; 3]>; 4] = std::array::from_fn(|band| seen.ramp(band));
@@ -142,7 +143,7 @@ impl Reading {
     }
 }
 
-/// A capture, by places of the pattern.
+/// A capture, addressed by places in the pattern.
 struct Seen<'a> {
     capture: &'a Image,
 }
@@ -160,7 +161,7 @@ impl Seen<'_> {
         }
     }
 
-    /// Rows in the middle of a band, away from its neighbours.
+    /// Returns the rows in the middle of a band, away from its neighbours.
     fn rows(&self, band: usize) -> std::ops::Range<usize> {
         let height = self.capture.shape.0;
         let (first, last) = (band * height / BANDS, (band + 1) * height / BANDS);
@@ -168,7 +169,7 @@ impl Seen<'_> {
         first + margin..(last - margin).max(first + margin + 1).min(height)
     }
 
-    /// The mean colour of each step of a ramp, from its middle column.
+    /// Returns the mean colour of each step of a ramp, from the step's middle column.
     fn ramp(&self, band: usize) -> Vec<[f64; 3]> {
         let width = self.capture.shape.1;
         (0..STEPS)
@@ -185,7 +186,7 @@ impl Seen<'_> {
             .collect()
     }
 
-    /// How much of the contrast of columns of one pixel is left: of black and white, and of red and green.
+    /// Returns the remaining contrast of one-pixel columns: of black and white, and of red and green.
     fn fine(&self, range: Range) -> (f64, f64) {
         let whole = if range == Range::Limited { 219.0 } else { 255.0 };
         let contrast = |band: usize, value: fn([f64; 3]) -> f64| {
@@ -204,7 +205,7 @@ impl Seen<'_> {
     }
 }
 
-/// Level `step` on a link of `range`.
+/// Returns the arriving level of `step` on a link of `range`.
 fn arrives(range: Range, step: f64) -> f64 {
     match range {
         Range::Limited => 16.0 + step * 219.0 / 255.0,
@@ -213,7 +214,7 @@ fn arrives(range: Range, step: f64) -> f64 {
     }
 }
 
-/// Mean and largest distance of `values` from those that `want` gives each step.
+/// Returns the mean and the largest distance between the two values of each pair.
 fn errors(values: impl Iterator<Item = (f64, f64)>) -> [f64; 2] {
     let (mut sum, mut most, mut count) = (0.0f64, 0.0f64, 0.0f64);
     for (value, want) in values {
@@ -238,7 +239,7 @@ fn range(grey: &[f64]) -> (Range, [f64; 2]) {
         .fold((Range::Other, [f64::INFINITY; 2]), |best, of| {
             if of.1[0] < best.1[0] { of } else { best }
         });
-    // A link rounds; a tone curve bends.
+    // Rounding on a link stays below this error; a tone curve exceeds it.
     if best.1[0] <= 2.0 {
         best
     } else {
@@ -264,7 +265,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (96, 640);
 
-    /// What arrives of each pixel.
+    /// Makes the pattern as it arrives through `link`.
     fn through(link: impl Fn([f64; 3]) -> [f64; 3]) -> Image {
         let mut image = pattern(SIZE);
         for pixel in image.bytes.as_chunks_mut::<3>().0 {
@@ -273,7 +274,7 @@ mod tests {
         image
     }
 
-    /// BT.709, of the full range.
+    /// Converts RGB to full-range BT.709 YCbCr.
     fn to_ycbcr([r, g, b]: [f64; 3]) -> [f64; 3] {
         let y = 0.2126 * r + 0.7152 * g + 0.0722 * b;
         [y, (b - y) / 1.8556 + 128.0, (r - y) / 1.5748 + 128.0]
@@ -284,7 +285,7 @@ mod tests {
         [y + 1.5748 * cr, y - 0.1873 * cb - 0.4681 * cr, y + 1.8556 * cb]
     }
 
-    /// YCbCr of 8 bits whose colours are those of two pixels (4:2:2), or of one (4:4:4).
+    /// Makes the pattern as it arrives in 8-bit YCbCr whose colours are shared by two pixels (4:2:2), or not (4:4:4).
     fn ycbcr(pixels: usize) -> Image {
         let mut image = pattern(SIZE);
         for run in image.bytes.chunks_exact_mut(3 * pixels) {
@@ -350,7 +351,7 @@ mod tests {
         // A capture of another size.
         let larger = pattern((SIZE.0, SIZE.1 + 64));
         assert!(faults(&larger).contains("704×96 arrive of 640×96"));
-        // Scaled to 90 % and back on the way, as a screen that is not at its own resolution does.
+        // Scaled to 90 % and back on the way, as by a screen that is not at its own resolution.
         let mut blurred = whole.clone();
         let width = SIZE.1;
         let at = |row: &[u8], x: f64, c: usize| {

@@ -1,10 +1,9 @@
-//! Time multiplexing: several phase maps of one wave, shown so fast one after another that the eye sees their mean
-//! intensity.
+//! Time multiplexing: several phase maps of one wave, shown so fast that the eye sees their mean intensity.
 //!
-//! Maps differ in what an encoder may choose freely: which pixels of the checkerboard get φ + acos A (its parity), and
-//! a constant phase, by which levels round otherwise. With feedback each map is made for what the mean of those before
-//! it lacks: after k maps of intensities I₁ … I_k the next one is to show (k + 1)·I − ΣI_j at the midpoint, where I is
-//! the wave's, with the wave's phase.
+//! Maps differ in the free choices of an encoder: which pixels of the checkerboard get φ + acos A (the parity), and a
+//! constant phase, which changes how levels round. With feedback, each map compensates for the error in the mean of the
+//! maps before it: after k maps of intensities I₁ … I_k, the next map aims at (k + 1)·I − ΣI_j at the midpoint, where I
+//! is the wave's intensity, with the wave's phase.
 
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -17,41 +16,41 @@ use phasefront_exact::truth::{self, Figures};
 use phasefront_io::Result;
 use std::f32::consts::TAU;
 
-/// What differs from map to map.
+/// The differences between maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Differ {
-    /// Parity and constant phase.
+    /// Whether maps differ in parity and constant phase.
     pub start: bool,
-    /// Each map is made for what the mean of those before it lacks.
+    /// Whether each map compensates for the error in the mean of the maps before it.
     pub feedback: bool,
 }
 
-/// Makes the maps of one wave after another.
+/// Makes several maps of one wave.
 pub struct Multiplex<'a> {
     shape: (usize, usize),
     target: &'a Target,
     encoder: Encoder,
-    /// From the modulator to the midpoint through the aperture, and back.
+    /// The propagation from the modulator to the midpoint through the aperture, and back.
     ways: [Vec<Propagator>; 2],
 }
 
-/// One phase map.
+/// A phase map.
 #[derive(Debug, Clone)]
 pub struct Map {
-    /// Levels, (C, H, W).
+    /// The levels, (C, H, W).
     pub levels: Array3<u8>,
     /// The amplitude that full light stands for.
     pub scale: f32,
 }
 
-/// How far feedback goes: what a map is to show is at most so many times the wave's intensity.
+/// The limit of feedback: the largest intensity that a map aims at, relative to the wave's.
 const MOST: f32 = 4.0;
 
 impl<'a> Multiplex<'a> {
-    /// Plans maps of (C, H, W) = `shape` waves for `target`.
+    /// Plans maps of waves of (H, W) = `shape` for `target`.
     ///
     /// # Errors
-    /// What the encoder refuses; an offset too far away.
+    /// Returns an error if the encoder refuses its options or the offset is too large.
     pub fn new(shape: (usize, usize), target: &'a Target, options: &EncoderOptions) -> Result<Self> {
         let display = &target.display;
         let way = |distance_m: f64| {
@@ -66,7 +65,7 @@ impl<'a> Multiplex<'a> {
         })
     }
 
-    /// `count` maps of `wave`, (C, H, W), at the modulator.
+    /// Makes `count` maps of `wave`, (C, H, W), at the modulator.
     pub fn maps(&self, wave: &Array3<Complex32>, count: usize, differ: Differ) -> Vec<Map> {
         let wave = wave.as_slice().expect("standard layout");
         let [there, back] = &self.ways;
@@ -95,11 +94,11 @@ impl<'a> Multiplex<'a> {
                 true => (n % 2 == 1, (n as f32 * GOLDEN).fract() * TAU),
                 false => (false, 0.0),
             };
-            // Double phase of the conjugate, taken back, is double phase with the other parity.
+            // Double phase of the conjugate, conjugated back, is double phase with the other parity.
             if odd {
                 field.iter_mut().for_each(|value| *value = value.conj());
             }
-            // The scale of the first, so that all maps are of one brightness.
+            // Use the scale of the first map, so that all maps have the same brightness.
             let used = self.encoder.encode(&mut field, scale, &mut phases, &mut scratch);
             scale = Some(used);
             let response = &self.target.response;
@@ -121,7 +120,7 @@ impl<'a> Multiplex<'a> {
         maps
     }
 
-    /// The light behind the modulator.
+    /// Computes the light behind the modulator.
     fn shown(&self, map: &Map) -> Vec<Complex32> {
         let mut field = vec![Complex32::ZERO; map.levels.len()];
         let levels = map.levels.as_slice().expect("standard layout");
@@ -136,11 +135,11 @@ impl<'a> Multiplex<'a> {
         }
     }
 
-    /// What the eye sees of the first of `maps`, as many as each of `counts` says, against `wave` itself: the midpoint,
-    /// and a stack of four depths.
+    /// Compares the mean of the first n of `maps` with `wave`, for each n in `counts`: at the midpoint, and over a
+    /// stack of four depths.
     ///
     /// # Errors
-    /// A depth too far away.
+    /// Returns an error if a depth is too far away.
     pub fn judge(&self, wave: &Array3<Complex32>, maps: &[Map], counts: &[usize]) -> Result<Vec<Figures>> {
         let (height, width) = self.shape;
         let display = &self.target.display;
@@ -177,7 +176,7 @@ impl<'a> Multiplex<'a> {
     }
 }
 
-/// Multiples of it lie evenly in a turn, however many there are.
+/// The golden ratio minus 1. Its multiples spread evenly over a turn, for any number of maps.
 const GOLDEN: f32 = 0.618_034;
 
 #[cfg(test)]
@@ -186,7 +185,7 @@ mod tests {
     use super::*;
     use phasefront::{Display, Encoding};
 
-    /// A wave of smooth light with edges.
+    /// Makes a wave of smooth light with edges.
     fn wave((height, width): (usize, usize)) -> Array3<Complex32> {
         Array3::from_shape_fn((3, height, width), |(c, y, x)| {
             let edge = if (x / 16 + y / 12 + c) % 2 == 0 { 0.8 } else { 0.25 };

@@ -1,7 +1,7 @@
-//! Frames on a screen: full, unscaled, each pixel as the file has it.
+//! Frames on a screen: full screen, unscaled, each pixel as in the file.
 //!
-//! A modulator is a screen to the computer. What stands between the two can still change pixels: `phasefront link`
-//! finds that out.
+//! A modulator is a screen to the computer. The link between the two can still change pixels; `phasefront link` detects
+//! this.
 
 use phasefront_io::hologram::packed::{Image, Kind};
 use phasefront_io::{Error, Result};
@@ -20,60 +20,61 @@ use winit::window::{Fullscreen, Window, WindowId};
 /// A screen of this computer.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Screen {
-    /// Counted from 1.
+    /// The screen's number, counted from 1.
     pub number: usize,
-    /// What the system calls it.
+    /// The system's name for the screen.
     pub name: String,
-    /// Pixels along x.
+    /// The width in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height in pixels.
     pub height: u32,
-    /// Place of its upper left pixel on the desktop.
+    /// The position of the upper left pixel on the desktop.
     pub at: [i32; 2],
-    /// Frames a second, where the system says it.
+    /// The frames per second, if the system reports them.
     pub rate_hz: Option<f64>,
-    /// Of 1, pixels of the desktop are the screen's own; others are enlarged by the system.
+    /// The scale factor of the desktop. At 1, its pixels are the screen's own; otherwise the system enlarges them.
     pub scale: f64,
 }
 
-/// How frames are shown.
+/// The options for showing frames.
 #[derive(Debug, Clone)]
 pub struct Showing {
-    /// The screen, counted from 1.
+    /// The screen's number, counted from 1.
     pub screen: usize,
-    /// Frames a second; None: the screen's own.
+    /// The frames per second, or `None` for the screen's own rate.
     pub rate_hz: Option<f64>,
-    /// When to stop; None: by Escape.
+    /// The time after which to stop, or `None` to show frames until Escape is pressed.
     pub length: Option<Duration>,
 }
 
-/// What became of it.
+/// The result of showing frames.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Shown {
-    /// Where.
+    /// The screen that showed the frames.
     pub screen: Screen,
-    /// How many frames were put onto the screen.
+    /// The number of frames that were shown.
     pub frames: u64,
-    /// For how many its time had passed before they were there.
+    /// The number of frames that were not shown because their time had passed.
     pub late: u64,
-    /// Frames a second that were asked for.
+    /// The frames per second that were asked for.
     pub rate_hz: f64,
 }
 
-/// The screens of this computer.
+/// Returns the screens of this computer.
 ///
 /// # Errors
-/// No desktop to ask.
+/// Returns an error if there is no desktop.
 pub fn screens() -> Result<Vec<Screen>> {
     let mut list = List::default();
     run(&mut list)?;
     Ok(list.0)
 }
 
-/// Shows `frames` one after another, again and again, until the length has passed or Escape or Q is pressed.
+/// Shows `frames` one after another in a loop, until the length has passed or Escape or Q is pressed.
 ///
 /// # Errors
-/// No such screen, frames larger than it, pixels of 16 bits, no desktop.
+/// Returns an error if the screen does not exist, if the frames are larger than it or have pixels of 16 bits, or if
+/// there is no desktop.
 pub fn show(frames: &[Image], showing: &Showing) -> Result<Shown> {
     let first = frames
         .first()
@@ -107,7 +108,7 @@ fn run(app: &mut impl ApplicationHandler) -> Result<()> {
     EventLoop::new().map_err(refuse)?.run_app(app).map_err(refuse)
 }
 
-/// Words of a screen's pixels: 0, red, green, blue.
+/// Converts an image to the words of a screen's pixels: 0, red, green, blue.
 fn pixels(image: &Image) -> Result<Vec<u32>> {
     let word = |[r, g, b]: [u8; 3]| u32::from_be_bytes([0, r, g, b]);
     Ok(match image.kind {
@@ -147,7 +148,7 @@ impl ApplicationHandler for List {
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, _: WindowEvent) {}
 }
 
-/// Rates of a screen that says nothing of it.
+/// The rate of a screen that reports none.
 const DEFAULT_RATE_HZ: f64 = 60.0;
 
 struct Player {
@@ -164,7 +165,7 @@ struct Player {
 struct Open {
     window: Rc<Window>,
     surface: Surface<Rc<Window>, Rc<Window>>,
-    /// The frame that was put there last.
+    /// The number of the frame that was drawn last.
     current: Option<u64>,
 }
 
@@ -212,7 +213,7 @@ impl Player {
         Ok(())
     }
 
-    /// Puts the frame whose time it is into the window, where it is not there yet.
+    /// Draws the frame that is due, unless the window already shows it.
     fn draw(&mut self, again: bool) -> Result<()> {
         let (Some(open), Some(shown)) = (&mut self.window, &mut self.shown) else {
             return Ok(());
@@ -253,7 +254,8 @@ impl Player {
     }
 }
 
-/// Puts a `frame` of (H, W) = `shape` pixels into the middle of a window, black around it; what does not fit is cut.
+/// Draws a `frame` of (`height`, `width`) pixels in the middle of a window, with black around it. Cuts off what does
+/// not fit.
 fn place(frame: &[u32], (height, width): (usize, usize), window: &mut [u32], (rows, columns): (usize, usize)) {
     window.fill(0);
     let (top, left) = (rows.saturating_sub(height) / 2, columns.saturating_sub(width) / 2);

@@ -1,4 +1,4 @@
-//! `phasefront calibrate` as a user runs it, on photographs of a simulated display.
+//! Tests `phasefront calibrate` as a user runs it, on photographs of a simulated display.
 use crate::folder;
 
 use folder::Folder;
@@ -13,7 +13,7 @@ use phasefront_io::display::calibration;
 use phasefront_io::{metrics, picture};
 use std::fs;
 
-/// The table from the rehearsal's photographs, by hand.
+/// Arguments that compute the table from the rehearsal's photographs.
 const LUT: [&str; 12] = [
     "calibrate",
     "lut",
@@ -69,7 +69,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     ] {
         assert!(folder.path("out").join(name).is_file(), "{name}");
     }
-    // Nothing is written over.
+    // Existing files are not overwritten.
     assert!(folder.fails(&rehearse, 1).contains("--overwrite"));
 
     the_same_by_hand(&folder);
@@ -82,7 +82,7 @@ fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
     fs::read(folder.path(name)).unwrap()
 }
 
-/// The same photographs by hand give the same files.
+/// Calibrating the same photographs with separate commands gives the same files.
 fn the_same_by_hand(folder: &Folder) {
     fs::write(folder.path("bare.toml"), "width = 144\nheight = 64").unwrap();
     let said = folder.succeeds(&LUT);
@@ -107,7 +107,7 @@ fn the_same_by_hand(folder: &Folder) {
     assert_eq!(bytes(folder, "laser.png"), bytes(folder, "out/laser.png"));
 }
 
-/// Each by its name, and the table that was there stays.
+/// Bad photographs are reported by name, and an existing table stays.
 fn bad_captures_are_named(folder: &Folder) {
     let captures = folder.path("out/captures");
     fs::remove_file(captures.join("green/capture_007.png")).unwrap();
@@ -132,7 +132,7 @@ fn bad_captures_are_named(folder: &Folder) {
     assert_eq!(bytes(folder, "table.pfp"), bytes(folder, "out/table.pfp"));
 }
 
-/// A hologram for the calibrated display, and its view on it.
+/// Creates a hologram for the calibrated display and views it on that display.
 fn holograms_are_for_it(folder: &Folder) {
     let rgb = image::RgbImage::from_fn(96, 48, |x, y| image::Rgb([(x * 2) as u8, (y * 5) as u8, 90]));
     rgb.save(folder.path("rgb.png")).unwrap();
@@ -308,7 +308,7 @@ fn a_rehearsal_that_cannot_end_is_refused_before_it_begins() {
         ];
         let said = folder.fails(&rehearse, 1);
         assert!(said.contains(word), "{said}");
-        // Its first photographs come after this folder is made.
+        // The first photographs are taken only after this folder is created.
         assert!(!folder.path("out").exists(), "{said}");
     }
 }

@@ -1,4 +1,4 @@
-//! The command as a user runs it: what it makes, and one line for each thing that is wrong.
+//! Tests the command as a user runs it: its outputs, and the one-line error for each wrong input.
 use crate::driver;
 use crate::folder;
 use crate::ldi;
@@ -16,12 +16,13 @@ const SAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../samples");
 const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
 
 impl Folder {
-    /// The command fails with `code` and one line that holds each of `words`; it leaves no file behind.
+    /// Asserts that the command fails with `code` and one line that contains each of `words`, and leaves no file
+    /// behind.
     fn refuses(&self, arguments: &[&str], code: i32, words: &[&str]) {
         self.refuses_as(&arguments.join(" "), arguments, code, words);
     }
 
-    /// [`Folder::refuses`] for cases with names, of code 1.
+    /// Asserts [`Folder::refuses`] with code 1 for each named case.
     fn refuses_each(&self, cases: &[(&str, Vec<&str>, &[&str])]) {
         for (name, arguments, words) in cases {
             self.refuses_as(name, arguments, 1, words);
@@ -173,7 +174,7 @@ fn pictures_are_what_their_names_say() {
     let gif = fs::File::open(folder.path("s.gif")).unwrap();
     let decoder = image::codecs::gif::GifDecoder::new(std::io::BufReader::new(gif)).unwrap();
     let frames = image::AnimationDecoder::into_frames(decoder).collect_frames().unwrap();
-    // There and back again.
+    // The animation runs forward and back.
     assert_eq!(frames.len(), 4);
     assert_eq!(frames[0].buffer().dimensions(), (24, 16));
     let moving = fs::read(folder.path("s.webp")).unwrap();
@@ -219,7 +220,7 @@ fn an_image_is_fitted_to_the_modulator() {
         folder.succeeds(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"]);
         let view = picture::read_rgb(&folder.path("v.png")).unwrap();
         let light = |y: usize, x: usize| view.slice(s![.., y..y + 6, x..x + 6]).mean().unwrap();
-        // Black above the picture, or the picture.
+        // The space above the picture is black, or the picture fills it.
         assert_eq!(light(2, 46) > 0.1, fit == "cover", "{fit}");
         assert!(light(46, 46) > 0.15, "{fit}");
         assert_eq!(light(46, 4) > 0.1, fit != "centre", "{fit}");
@@ -244,7 +245,7 @@ fn a_hologram_of_another_size_than_its_modulator_is_told_of() {
         assert!(output.status.success());
         String::from_utf8(output.stderr).unwrap()
     };
-    // The default display is a stand-in: smaller is silent, larger is not.
+    // The default display is a placeholder, so a smaller frame gives no warning and a larger one does.
     assert_eq!(told("whole", &[]), "");
     let larger = told("wide", &[]);
     assert!(
@@ -319,7 +320,7 @@ fn the_object_in_focus_matches_the_sample_there_and_not_elsewhere() {
         "h.png",
     ]);
     let image = picture::read_rgb(Path::new(&rgb)).unwrap();
-    // The board with the text stands at d ≈ 0.1, the clock on the wall at d ≈ 0.92.
+    // The board with the text lies at d ≈ 0.1 and the clock on the wall at d ≈ 0.92.
     let (near, far) = ("2.38", "-2.5");
     let board = (580..860, 130..600);
     let clock = (200..400, 1480..1680);
@@ -384,12 +385,12 @@ fn depth_of_another_size_is_resampled_with_a_warning() {
     assert!(warnings.contains("warn") && warnings.contains("24×16"), "{warnings}");
 }
 
-/// Arguments that make a hologram of these files.
+/// Returns arguments that create a hologram from these files.
 fn hologram<'a>(rgb: &'a str, depth: &'a str) -> Vec<&'a str> {
     vec!["hologram", "--rgb", rgb, "--depth", depth, "-o", "h.png"]
 }
 
-/// Arguments that make a hologram of the default frame, and `more`.
+/// Returns arguments that create a hologram from the default frame, and `more`.
 fn made<'a>(more: &[&'a str]) -> Vec<&'a str> {
     with(&[more, &["-o", "h.png"]].concat())
 }
@@ -454,7 +455,7 @@ fn a_depth_that_promises_more_than_there_is_is_named() {
     folder.refuses(&hologram("rgb.png", "/dev/zero.npy"), 1, &["/dev/zero.npy"]);
 }
 
-/// What the command does where it cannot print, and with names and rights of files.
+/// Tests the command without a usable stdout, with unusual file names, and with restricted permissions.
 #[cfg(unix)]
 #[test]
 fn it_lives_with_the_system_around_it() {
@@ -482,7 +483,7 @@ fn it_lives_with_the_system_around_it() {
         assert_eq!(output.status.code(), Some(code), "{errors}");
         assert!(errors.contains(words) && !errors.contains("panicked"), "{errors}");
     };
-    // A reader that has gone: this end of the pipe is closed before anything is printed.
+    // The reader is gone: this end of the pipe is closed before anything is printed.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let mut closed = command();
@@ -563,7 +564,7 @@ fn depth_that_means_nothing_is_named() {
     let told = |arguments: &[&str]| String::from_utf8(folder.run(arguments).stderr).unwrap();
     assert!(told(&near_far("mm", "0.5", "0.6")).contains("96 % of the depth"));
     assert_eq!(told(&near_far("mm", "0.5", "4")), "");
-    // Holes are filled; in metres infinity is one.
+    // Holes are filled. In metres, infinity is a hole.
     depth[(3, 4)] = f32::NAN;
     folder.depth_npy("hole.npy", &depth);
     folder.succeeds(&hologram("rgb.png", "hole.npy"));
@@ -629,7 +630,7 @@ fn options_that_cannot_be_meant_are_named() {
             &["h.jpg", ".png"],
         ),
     ]);
-    // What the arguments alone tell is code 2.
+    // Errors that follow from the arguments alone have code 2.
     let raw = made(&["--depth-unit", "raw"]);
     let cases: [(&str, &[&str], &str); 3] = [
         ("raw depth without a scale", &raw, "--depth-scale"),
@@ -670,7 +671,7 @@ fn a_flag_that_would_change_nothing_is_refused() {
             &[*flags.iter().rfind(|flag| flag.starts_with("--")).unwrap(), with],
         );
     }
-    // Automatic choice may take the network, so it accepts the network's flags.
+    // Automatic selection may choose the network, so it accepts the network's flags.
     folder.succeeds(&made(&[
         "--method",
         "auto",
@@ -702,7 +703,7 @@ fn a_flag_of_other_calls_is_refused() {
     for (call, word) in cases {
         folder.refuses(&call.split(' ').collect::<Vec<_>>(), 1, &[word]);
     }
-    // What the arguments alone tell is code 2.
+    // Errors that follow from the arguments alone have code 2.
     for (call, word) in [
         ("hologram --ldi ldi --invert -o h.png", "--invert"),
         ("hologram --ldi ldi --depth-unit mm -o h.png", "--depth-unit"),
@@ -817,7 +818,7 @@ fn networks_that_cannot_be_used_are_named() {
     ]);
 }
 
-/// What the command does on a GPU, its cache in `folder`.
+/// Runs the command on a GPU, with its cache in `folder`.
 fn on_gpu(folder: &Folder, arguments: &[&str]) -> std::process::Output {
     Command::new(env!("CARGO_BIN_EXE_phasefront"))
         .args(arguments)
@@ -828,11 +829,11 @@ fn on_gpu(folder: &Folder, arguments: &[&str]) -> std::process::Output {
         .unwrap()
 }
 
-/// The report of a command on the driver in software.
+/// Returns the report of a command on the software driver.
 fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> serde_json::Value {
     let gpu = ["--backend", "gpu", "--gpu", "llvmpipe", "--json"];
     let made = on_gpu(folder, &[arguments, &gpu].concat());
-    // Drivers write to stderr where no desktop runs.
+    // Drivers write to stderr without a desktop.
     let errors = String::from_utf8(made.stderr).unwrap();
     let succeeded = if made.status.success() {
         Ok(())
@@ -843,7 +844,7 @@ fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_slice(&made.stdout).unwrap()
 }
 
-/// Few levels of two pictures are more than neighbours.
+/// Asserts that few levels of two pictures differ by more than 1.
 fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
     let levels = |name| image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
     let apart = |(a, b): (&u8, &u8)| (a.wrapping_sub(*b) as i8).unsigned_abs() > 1;

@@ -1,4 +1,5 @@
-//! From an image to what each modulator takes, and back; one line for each thing that is wrong.
+//! Tests the conversion from an image to the input of each modulator and back, and the one-line error for each wrong
+//! input.
 use crate::folder;
 
 use folder::Folder;
@@ -33,7 +34,7 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
     for name in ModulatorSpec::names() {
         let device = ModulatorSpec::shipped(name).unwrap();
         let folder = Folder::new();
-        // Cells need every pixel; elsewhere a small hologram stands in the middle.
+        // Bit-plane cells need every pixel. Elsewhere a small hologram is centred.
         let (size, fit) = match device.packing {
             Packing::BitPlanes(_) => (
                 (device.display.width(), device.display.height()),
@@ -67,7 +68,7 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
         let most = hologram.iter().max().unwrap();
         let highest = (1u16 << device.display.bits()) - 1;
         assert!(*most <= highest && *most > highest / 2, "{name}: {most}");
-        // By hand it is the same frame.
+        // The separate command gives the same frame.
         folder.succeeds(&["pack", "hologram.png", "--display", name, "-o", "frame_.png"]);
         let again = frames[0].replace("frame", "frame_");
         let [packed, again] = [frames[0], &again].map(|name| fs::read(folder.path(name)).unwrap());
@@ -116,7 +117,7 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
         let alike = phasefront_io::metrics::compare(other.view(), views[0].view()).unwrap();
         assert!(alike.psnr_overall > 35.0, "{}", alike.psnr_overall);
     }
-    // Without its file such a hologram cannot be looked at.
+    // A view of this hologram needs the display file.
     let errors = folder.fails(&["refocus", "added.png", "--z-mm", "0", "-o", "v.png"], 1);
     assert!(errors.contains("--display"), "{errors}");
 }
@@ -151,7 +152,7 @@ fn maps_of_one_image_become_bit_planes() {
     let shown = told["shown"].as_array().unwrap();
     assert_eq!(shown.len(), 4);
     assert!(shown[3]["psnr_db"].as_f64() > shown[0]["psnr_db"].as_f64());
-    // The first plane of each channel is the first map of its colour, also by hand.
+    // The first plane of each channel is the first map of its colour, with the separate command too.
     folder.succeeds(&["unpack", "frame.png", "--display", "plm.toml", "-o", "first.png"]);
     assert_eq!(
         levels(&folder.path("first.png")),
@@ -211,7 +212,7 @@ fn what_is_wrong_is_one_line() {
         );
         assert!(!folder.path("h.png").exists());
     }
-    // A panel under 2π is encoded for what it can, and that is told.
+    // A panel with a range below 2π is encoded for its range, with a warning.
     fs::write(folder.path("short.toml"), "width = 48\nheight = 32\nrange_turns = 0.8").unwrap();
     let output = folder.run(&[&hologram[..], &["--display", "short.toml"]].concat());
     let told = String::from_utf8(output.stderr).unwrap();
@@ -245,7 +246,7 @@ fn what_is_wrong_is_one_line() {
     }
 }
 
-/// Writes the files of a display and of displays that differ from it.
+/// Writes the file of a display and the files of displays that differ from it.
 fn write_displays(folder: &Folder) {
     for (name, text) in [
         ("own", ""),
@@ -330,10 +331,10 @@ fn a_hologram_is_for_the_display_that_it_was_made_for() {
         "n.png",
     ];
     assert!(folder.fails(&planes, 1).contains("levels of 4 bits"));
-    // A field has no levels, and an offset can be said.
+    // A field has no levels, and an offset can be given.
     succeeds("refocus f.npy --z-mm 0 --display bits.toml -o n.png");
     succeeds("refocus moved.png --z-mm 0 --display own.toml --offset-mm 3 -o n.png");
-    // What a hologram needs a display for is not made up.
+    // The command does not guess calibration data that a hologram needs.
     succeeds(&format!("{} -o c.png", make.replace("own", "calibrated")));
     let errors = folder.fails(&["view", "c.png", "-o", "c.html"], 1);
     assert!(
@@ -351,7 +352,7 @@ fn devices_are_listed_with_their_sources() {
     }
     let one = folder.succeeds(&["devices", "ti-plm-p67"]);
     assert!(one.contains("unconfirmed") && one.contains("width: "), "{one}");
-    // One of the user's stands beside them, before one of the same name.
+    // The user's own devices are listed too, and one with the name of a bundled device replaces it.
     fs::create_dir_all(folder.path("phasefront/devices")).unwrap();
     fs::write(folder.path("phasefront/devices/mine.toml"), "width = 123\nheight = 99").unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
@@ -369,7 +370,7 @@ fn the_links_pattern_goes_through_files() {
     folder.succeeds(&["link", "pattern", "--size", "640x96", "-o", "pattern.png"]);
     let read = ["link", "read", "pattern.png", "--size", "640x96"];
     assert_eq!(folder.succeeds(&read), "every pixel arrives as it is\n");
-    // What a link of limited range makes of it.
+    // A link with limited range changes the pattern like this.
     let pattern = image::open(folder.path("pattern.png")).unwrap().into_rgb8();
     let limited = image::RgbImage::from_fn(640, 96, |x, y| {
         image::Rgb(pattern.get_pixel(x, y).0.map(|v| 16 + (u32::from(v) * 219 / 255) as u8))

@@ -1,4 +1,4 @@
-//! `phasefront doctor` says what a machine offers and tests it.
+//! Tests that `phasefront doctor` describes a machine and tests it.
 use crate::driver;
 use crate::folder;
 
@@ -55,7 +55,7 @@ fn what_is_chosen_is_for_the_display_that_is_asked_for() {
     let tested = default["self_test"].as_array().unwrap();
     assert!(tested.iter().all(|check| check["passed"] != false), "{tested:?}");
 
-    // No network was trained for such a volume.
+    // No network was trained for this volume.
     std::fs::write(
         folder.path("deep.toml"),
         "width = 64\nheight = 48\nvolume_depth_mm = 20",

@@ -1,4 +1,4 @@
-//! Pictures and depth maps that people have, in all formats that are read; and files that nobody should read.
+//! Tests common pictures and depth maps in all supported formats, and files that must be refused.
 use crate::folder;
 
 use exr::prelude::WritableImage;
@@ -35,7 +35,7 @@ fn colour16() -> image::ImageBuffer<image::Rgb<u16>, Vec<u16>> {
     })
 }
 
-/// Depth of a frame: a step, and a slope along y.
+/// Returns the depth of a frame: a step, and a slope along y.
 fn depth(x: u32, y: u32) -> u16 {
     if x < WIDTH / 2 { 8000 + 16 * y as u16 } else { 56_000 }
 }
@@ -50,7 +50,7 @@ fn metres() -> Array2<f32> {
     })
 }
 
-/// A TIFF of `sides`, with an orientation where it is not 0.
+/// Writes a TIFF of `sides`, with an orientation unless it is 0.
 fn tiff<C: ColorType>(path: &Path, (width, height): (u32, u32), values: &[C::Inner], orientation: u16)
 where
     [C::Inner]: TiffValue,
@@ -76,7 +76,7 @@ fn exr(path: &Path, channels: Vec<(&str, FlatSamples)>) {
     Image::from_layer(layer).write().to_file(path).unwrap();
 }
 
-/// Exif, big-endian, one tag in its directory: orientation (0x0112, one short).
+/// Returns big-endian Exif with one tag in its directory: orientation (0x0112, one short).
 fn exif(orientation: u8) -> Vec<u8> {
     [
         &b"MM\0\x2A\0\0\0\x08\0\x01"[..],
@@ -85,7 +85,7 @@ fn exif(orientation: u8) -> Vec<u8> {
     .concat()
 }
 
-/// A JPEG of `image` with an orientation.
+/// Encodes `image` as a JPEG with an orientation.
 fn jpeg(image: &DynamicImage, orientation: u8) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
@@ -122,7 +122,7 @@ fn colour_is_the_same_from_every_format() {
         let read = picture::read_rgb(&folder.path(name)).unwrap();
         assert!((&read - &want).iter().all(|v| v.abs() < 1e-6), "{name}");
     }
-    // A calibration's photographs are read by the same function.
+    // The same function reads a calibration's photographs.
     let photograph = Photograph::read(&folder.path("w.tiff"), 0).unwrap();
     assert_eq!((photograph.values[1], photograph.full), (2570, 65535));
 }
@@ -185,7 +185,7 @@ fn depth_is_the_same_from_every_format() {
         let read = depth_map::read_depth(&folder.path(name), true).unwrap();
         assert!((&read - &want).iter().all(|v| v.abs() < 1e-6), "{name}");
     }
-    // Eight bits, as colours.
+    // The same depth with 8 bits, as equal colours.
     let bytes = DynamicImage::from(words.clone()).into_luma8();
     bytes.save(folder.path("b.png")).unwrap();
     let want = depth_map::read_depth(&folder.path("b.png"), true).unwrap();
@@ -269,7 +269,7 @@ fn colours_are_no_depth_and_the_formats_are_listed() {
     refused(depth_map::read_depth(&folder.path("two.exr"), true).map(|_| ()), "U, V");
     refused(picture::read_rgb(&folder.path("two.exr")).map(|_| ()), "U, V");
     refused(picture::read_rgb(&folder.path("t.png")).map(|_| ()), COLOUR_FORMATS);
-    // What --help and the guide say is what is read.
+    // --help and the guide list exactly the supported formats.
     let squeezed = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let help = squeezed(&folder.succeeds(&["hologram", "--help"]));
     let guide = squeezed(include_str!("../../../../docs/depth.md"));
@@ -283,7 +283,7 @@ fn colours_are_no_depth_and_the_formats_are_listed() {
 fn pictures_are_upright_as_their_exif_says() {
     let folder = Folder::new();
     let upright = DynamicImage::from(colour());
-    // What a camera that was held otherwise stores.
+    // The picture that a rotated camera stores.
     let stored = |orientation: u8| match orientation {
         3 => upright.rotate180(),
         6 => upright.rotate270(),
@@ -300,11 +300,11 @@ fn pictures_are_upright_as_their_exif_says() {
         fs::write(folder.path(&name), jpeg(&stored(orientation), orientation)).unwrap();
         let read = picture::read_rgb(&folder.path(&name)).unwrap();
         assert_eq!(read.dim(), want.dim());
-        // Blocks of the codec lie elsewhere.
+        // The codec's blocks lie elsewhere.
         let apart = (&read - &want).mapv(f32::abs).mean().unwrap();
         assert!(apart < 0.02, "{orientation}: {apart}");
     }
-    // Depth that was stored alike and says so is turned as well; depth that does not is refused.
+    // Depth with the same stored orientation and tag is turned too. Depth without the tag is refused.
     let turned = DynamicImage::from(depth16()).rotate270().into_luma16();
     let sides = turned.dimensions();
     tiff::<colortype::Gray16>(&folder.path("turned.tif"), sides, turned.as_raw(), 6);
@@ -326,7 +326,7 @@ fn pictures_are_upright_as_their_exif_says() {
     }
     let why = read("stored.tif").unwrap_err().to_string();
     assert!(why.contains("Exif data turn it"), "{why}");
-    // Half a turn cannot be told by sizes.
+    // A rotation by 180° cannot be detected from the sizes.
     let output = folder.run(&[
         "hologram",
         "--rgb",
@@ -385,7 +385,7 @@ fn pictures_that_are_not_read_say_what_to_do() {
     }
 }
 
-/// Heads of pictures of 65,535 × 65,535 pixels.
+/// Returns the headers of pictures of 65,535 × 65,535 pixels.
 fn large() -> Vec<(&'static str, Vec<u8>)> {
     let side = 65_535u32;
     let mut png = Vec::new();
@@ -428,7 +428,7 @@ fn large() -> Vec<(&'static str, Vec<u8>)> {
         vec![0; 4],
     ]
     .concat();
-    // A lossy picture of WebP: 14 bits a side.
+    // A lossy WebP picture has 14 bits per side.
     let webp = {
         let data = [&[0x30, 1, 0][..], &[0x9d, 1, 0x2a], &[0xFF, 0x3F, 0xFF, 0x3F], &[0; 20]].concat();
         let chunk = [&b"VP8 "[..], &(data.len() as u32).to_le_bytes(), &data].concat();
@@ -453,7 +453,7 @@ fn large_pictures_are_refused_before_memory_is_taken() {
     }
 }
 
-/// Calls that name what is no regular file.
+/// Calls that name files that are not regular.
 #[cfg(unix)]
 const NO_REGULAR_FILES: &[&str] = &[
     "hologram --rgb c.png --depth d.png --method sweep -o h.png --display lut.toml",
@@ -513,7 +513,7 @@ fn only_regular_files_are_read() {
         assert_eq!(errors.lines().count(), 1, "{call}: {errors}");
         assert!(errors.contains("not a regular file"), "{call}: {errors}");
     }
-    // A file that is no table is not shown.
+    // The contents of a file that is not a table are not printed.
     fs::write(
         folder.path("passwd.toml"),
         "width = 24\nheight = 16\nlut = \"/etc/passwd\"",

@@ -1,5 +1,5 @@
-//! The tests of this crate in one program, which links once. Those that count memory or threads, or install a handler
-//! for the whole process, are programs of their own beside it.
+//! The tests of this crate in one program, which links once. Tests that count memory or threads, or install a
+//! process-wide handler, are separate programs beside it.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../../../tests/driver.rs"]

@@ -1,5 +1,5 @@
-//! The command on a display of one laser: from a picture to a hologram, to what is seen of it, to the modulator's input
-//! and back; and one line for what is not for it.
+//! Tests the command on a display with one laser: from a picture to a hologram, to its view, to the modulator's input
+//! and back, and the one-line error for unsuitable input.
 use crate::folder;
 
 use folder::Folder;
@@ -20,7 +20,7 @@ const W: usize = 48;
 const H: usize = 32;
 const FRAME: [&str; 6] = ["--rgb", "rgb.png", "--depth", "depth.png", "--display", "one.toml"];
 
-/// A picture with depth, and displays of one laser.
+/// Creates a folder with a picture with depth, and displays with one laser.
 fn folder() -> Folder {
     let folder = Folder::new();
     let rgb = image::RgbImage::from_fn(W as u32, H as u32, |x, y| {
@@ -44,7 +44,7 @@ fn folder() -> Folder {
     folder
 }
 
-/// The call `command` with the picture and the display.
+/// Returns the arguments of `command` with the picture and the display.
 fn of<'a>(command: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&[command], &FRAME[..], more].concat()
 }
@@ -61,7 +61,7 @@ fn levels(folder: &Folder, name: &str) -> Array3<u16> {
     }
 }
 
-/// A grey picture's plane.
+/// Reads a grey picture as one plane.
 fn seen(folder: &Folder, name: &str) -> Array3<f32> {
     let view = picture::read_rgb(&folder.path(name)).unwrap();
     assert!(
@@ -95,7 +95,7 @@ fn every_method_goes_from_a_picture_to_a_view_and_to_the_modulator_and_back() {
         let (view, field) = (seen(&folder, "view.png"), seen(&folder, "field.png"));
         let alike = metrics::compare(view.slice(inner), field.slice(inner)).unwrap();
         assert!(alike.psnr_overall > 20.0, "{method}: {}", alike.psnr_overall);
-        // One image of grey, which is the levels.
+        // The frame is one grey image that contains the levels.
         let frame = Image::read(&folder.path("frame.png")).unwrap();
         assert_eq!((frame.shape, frame.kind), ((H, W), Kind::Grey));
         assert!(
@@ -268,7 +268,7 @@ fn what_a_bench_knows_of_one_laser_is_packed_for_an_app() {
     }
 }
 
-/// Displays that cannot be, or that what is at hand is not for.
+/// Tests displays that are invalid or unsuitable for the given input.
 fn others(folder: &Folder) {
     let one = fs::read_to_string(folder.path("one.toml")).unwrap();
     let light = Array3::<f32>::ones((3, 3, 4));

@@ -1,4 +1,4 @@
-//! What a command writes: no input and no foreign file is lost, whatever the outputs are named.
+//! Tests that a command never destroys an input or an unrelated file, whatever names its outputs have.
 use crate::folder;
 use crate::ldi;
 
@@ -20,7 +20,7 @@ const SMALL: [&str; 9] = [
     "8",
 ];
 
-/// A folder with a small frame, `rgb.png` and `depth.png`, and its hologram, `h.png`, `h.npy` and `h.json`.
+/// Creates a folder with a small frame, `rgb.png` and `depth.png`, and its hologram, `h.png`, `h.npy` and `h.json`.
 fn folder() -> Folder {
     let folder = Folder::new().with_frame();
     folder.succeeds(&with(&SMALL, &["--complex", "h.npy", "-o", "h.png"]));
@@ -31,7 +31,7 @@ fn with<'a>(call: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
     [call, more].concat()
 }
 
-/// All that lies below `at`: files with their bytes, other things with what they are.
+/// Returns everything below `at`: files with their bytes, and other entries with their kind.
 fn contents(at: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     for entry in fs::read_dir(at).unwrap() {
@@ -51,7 +51,7 @@ fn contents(at: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// The command fails with one line that holds each of `words`, and nothing has changed.
+/// Asserts that the command fails with one line that contains each of `words` and changes nothing.
 fn refuses(folder: &Folder, arguments: &[&str], words: &[&str]) {
     let before = contents(folder.0.path());
     let errors = folder.fails(arguments, 1);
@@ -273,7 +273,7 @@ fn folders_and_special_files_are_never_replaced() {
     }
     let null = fs::metadata("/dev/null").unwrap();
     assert!(null.file_type().is_char_device());
-    // The three files of a packed hologram.
+    // A packed hologram has three files.
     fs::create_dir(folder.path("frame-blue.png")).unwrap();
     let pack = ["pack", "h.png", "--display", "holoeye-pluto", "-o", "frame.png"];
     refuses(&folder, &pack, &["frame-blue.png", "is a folder"]);
@@ -290,7 +290,7 @@ fn a_description_that_is_not_a_holograms_is_kept() {
     fs::write(folder.path("notes.json"), r#"{"mine": true}"#).unwrap();
     let call = with(&SMALL, &["--complex", "notes.npy", "-o", "new.png"]);
     refuses(&folder, &call, &["notes.json", "another name"]);
-    // Its own is replaced.
+    // The files of an earlier hologram are replaced.
     folder.succeeds(&with(
         &SMALL,
         &["--complex", "h.npy", "-o", "new.png", "--offset-mm", "1"],
@@ -302,7 +302,7 @@ fn a_description_that_is_not_a_holograms_is_kept() {
     );
 }
 
-/// Calls whose outputs cannot be, and a word of what they are told.
+/// Calls with invalid outputs, and a word of each error.
 const BAD_OUTPUTS: &[(&str, &str)] = &[
     (
         "hologram --rgb none.png --depth none.png -o missing/h.png",
@@ -360,7 +360,7 @@ const BAD_OUTPUTS: &[(&str, &str)] = &[
     ),
 ];
 
-/// What is wrong with an output is told before an input is looked at, so before anything is computed.
+/// Errors in outputs are reported before an input is read, and therefore before any computation.
 #[test]
 fn outputs_are_checked_before_any_work() {
     let folder = Folder::new();
@@ -371,7 +371,7 @@ fn outputs_are_checked_before_any_work() {
     }
 }
 
-/// A place where not even the superuser makes files.
+/// A place where not even the superuser can create files.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_that_cannot_be_written_to_is_told_before_any_work() {

@@ -1,4 +1,4 @@
-//! Photos with depth inside, made byte by byte from the specifications, and depth by a network that the user brings.
+//! Tests photos with embedded depth, built byte by byte from the specifications, and depth from the user's own network.
 use crate::folder;
 
 use base64::Engine;
@@ -17,7 +17,7 @@ use tract_onnx::pb::*;
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 32;
 
-/// A photo: blue where it is near, on the left.
+/// Creates a photo that is blue on the left, where it is near.
 fn colour() -> DynamicImage {
     image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match x < WIDTH / 2 {
         true => image::Rgb([40, 4 * y as u8, 220]),
@@ -26,7 +26,7 @@ fn colour() -> DynamicImage {
     .into()
 }
 
-/// Its depth at half the size: near on the left.
+/// Creates the photo's depth at half the size, near on the left.
 fn depth() -> image::GrayImage {
     image::GrayImage::from_fn(WIDTH / 2, HEIGHT / 2, |x, y| {
         image::Luma([if x < WIDTH / 4 { 10 + y as u8 } else { 230 }])
@@ -39,13 +39,13 @@ fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// `content` as an APP1 segment of a JPEG.
+/// Wraps `content` in an APP1 segment of a JPEG.
 fn app1(content: &[u8]) -> Vec<u8> {
     let length = u16::try_from(content.len() + 2).unwrap().to_be_bytes();
     [&[0xFF, 0xE1], &length[..], content].concat()
 }
 
-/// The photo with `segments` behind its start.
+/// Returns the photo with `segments` after its start marker.
 fn jpeg(segments: &[Vec<u8>]) -> Vec<u8> {
     let plain = encoded(colour(), ImageFormat::Jpeg);
     [&plain[..2], &segments.concat(), &plain[2..]].concat()
@@ -58,7 +58,7 @@ fn xmp(description: &str) -> Vec<u8> {
     [&b"http://ns.adobe.com/xap/1.0/\0"[..], packet.as_bytes()].concat()
 }
 
-/// GDepth's attributes; `data` with them where it is short enough.
+/// Returns GDepth's attributes with `more`, which holds the data if it is short enough.
 fn gdepth(more: &str) -> Vec<u8> {
     xmp(&format!(
         r#"<rdf:Description rdf:about="" xmlns:GDepth="http://ns.google.com/photos/1.0/depthmap/" xmlns:xmpNote="http://ns.adobe.com/xmp/note/" GDepth:Format="RangeInverse" GDepth:Near="0.5" GDepth:Far="4" GDepth:Units="m" GDepth:Mime="image/png" {more}/>"#
@@ -67,7 +67,7 @@ fn gdepth(more: &str) -> Vec<u8> {
 
 const GUID: &str = "36BE52D449F3E6B9760D7602FF75168D";
 
-/// Extended XMP in parts of `size`.
+/// Returns extended XMP in parts of `size`.
 fn extended(text: &[u8], size: usize) -> Vec<Vec<u8>> {
     let total = (text.len() as u32).to_be_bytes();
     let parts = text.chunks(size).enumerate().map(|(i, part)| {
@@ -101,13 +101,13 @@ fn short_gdepth() -> Vec<u8> {
 
 fn long_gdepth() -> Vec<u8> {
     let main = app1(&gdepth(&format!(r#"xmpNote:HasExtendedXMP="{GUID}""#)));
-    // Out of order, as nothing forbids.
+    // The parts are out of order, which the specification permits.
     let mut parts = extended_gdepth(60);
     parts.reverse();
     jpeg(&[&[main], &parts[..]].concat())
 }
 
-/// Dynamic Depth: a depth image and another item stand behind the photo.
+/// Creates a Dynamic Depth photo, followed by a depth image and another item.
 fn dynamic_depth() -> Vec<u8> {
     let image = encoded(depth(), ImageFormat::Png);
     let other = [7; 99];
@@ -165,7 +165,7 @@ fn each_kind_of_photo_gives_its_depth_and_becomes_a_hologram() {
 
 #[test]
 fn a_photo_and_its_depth_are_turned_upright_together() {
-    // Exif, big-endian, one tag in its directory: orientation (0x0112, one short) 6, a quarter turn.
+    // Big-endian Exif with one tag in its directory: orientation (0x0112, one short) 6, a quarter turn.
     let exif = [
         &b"Exif\0\0MM\0\x2A\0\0\0\x08\0\x01"[..],
         &[0x01, 0x12, 0, 3, 0, 0, 0, 1, 0, 6, 0, 0, 0, 0, 0, 0],
@@ -178,7 +178,7 @@ fn a_photo_and_its_depth_are_turned_upright_together() {
     let read = photo::read(&folder.path("p.jpg")).unwrap();
     assert_eq!(read.rgb.dim(), (3, WIDTH as usize, HEIGHT as usize));
     assert_eq!(read.depth.dim(), (WIDTH as usize / 2, HEIGHT as usize / 2));
-    // What was on the left is above: near, and blue.
+    // The left side of the stored photo is now the top: near, and blue.
     assert!(read.depth[(2, 5)] < 0.2 && read.depth[(20, 5)] > 0.8);
     assert!(read.rgb[(2, 5, 9)] > 0.7 && read.rgb[(2, 40, 9)] < 0.3);
 }
@@ -202,7 +202,7 @@ fn photos_that_cannot_be_used_get_one_line() {
     ]
     .concat();
     let broken = |data: &str| jpeg(&[app1(&gdepth(&format!(r#"GDepth:Data="{data}""#)))]);
-    // A few bytes that would be 17 GB, and a few that would be 4.
+    // A few bytes would decode to 17 GB, and another few to 4 GB.
     let gif = [&b"GIF89a"[..], &[0xFF; 4], &[0x80, 0, 0], &[0; 30]].concat();
     let mut png = Vec::new();
     let mut encoder = png::Encoder::new(&mut png, 1 << 15, (1 << 11) + 1);
@@ -265,10 +265,10 @@ fn photos_that_cannot_be_used_get_one_line() {
     assert_eq!(errors.lines().count(), 1, "{errors}");
 }
 
-/// What the small network sees.
+/// The weights of the small network.
 const WEIGHTS: [f32; 3] = [-0.25, 0.0, 1.0];
 
-/// A depth network: one convolution of 1×1 over the colours, of pictures of `sides`.
+/// Creates a depth network: one 1×1 convolution over the colours, for pictures of `sides`.
 fn network(sides: Option<(i64, i64)>, interleaved: bool) -> Vec<u8> {
     let dim = |value: Option<i64>, name: &str| tensor_shape_proto::Dimension {
         value: Some(match value {
@@ -382,7 +382,7 @@ fn any_photo_becomes_a_hologram_by_a_network() {
         hologram::read_hologram(&folder.path("h.png")).unwrap()
     };
     let near_left = by(&["--rgb", "rgb.png"], &[]);
-    // Blue is near: the hologram is that of the same image whose depth is near on the left.
+    // Blue is near, so the hologram equals that of the same image with depth that is near on the left.
     let depth = image::GrayImage::from_fn(WIDTH, HEIGHT, |x, _| image::Luma([if x < WIDTH / 2 { 0 } else { 255 }]));
     depth.save(folder.path("depth.png")).unwrap();
     folder.succeeds(&[

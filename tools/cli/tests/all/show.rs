@@ -1,4 +1,4 @@
-//! `phasefront show` and `screens` on virtual X servers, whose pixels are read back.
+//! Tests `phasefront show` and `screens` on virtual X servers, whose pixels are read back.
 use crate::folder;
 
 use folder::Folder;
@@ -8,17 +8,17 @@ use std::io::{BufRead, BufReader, Write, stderr};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// An X server that no monitor belongs to.
+/// An X server without a physical monitor.
 struct Server {
     process: Child,
     display: String,
-    /// (W, H) of all its screens together.
+    /// The size of all its screens together, (W, H).
     size: (usize, usize),
     folder: tempfile::TempDir,
 }
 
 impl Server {
-    /// Xvfb with one screen, which keeps in a file what it displays.
+    /// Starts Xvfb with one screen, which stores the displayed image in a file.
     fn with_one_screen((width, height): (usize, usize)) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new("Xvfb");
@@ -27,7 +27,7 @@ impl Server {
         Server::start(command, (width, height), folder, "xvfb")
     }
 
-    /// Xorg with screens of 640×480 and, right of it, 640×400: Xvfb has never more than one that a program can tell.
+    /// Starts Xorg with a screen of 640×480 and one of 640×400 to its right. Xvfb never reports more than one screen.
     fn with_two_screens() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let config = folder.path().join("xorg.conf");
@@ -54,7 +54,7 @@ impl Server {
             .stderr(Stdio::null())
             .spawn()
             .unwrap_or_else(|e| panic!("{command:?}: {e}: apt-get install {packages}"));
-        // Once it takes connections it prints the number of a display that was free.
+        // Once the server accepts connections, it prints the number of the free display that it took.
         let mut number = String::new();
         let stdout = process.stdout.take().unwrap();
         BufReader::new(stdout).read_line(&mut number).unwrap();
@@ -72,7 +72,7 @@ impl Server {
         }
     }
 
-    /// What a program of X's prints.
+    /// Returns the output of an X client program.
     fn client(&self, program: &str, arguments: &[&str], package: &str) -> Vec<u8> {
         let run = Command::new(program)
             .args(arguments)
@@ -95,7 +95,7 @@ impl Server {
         command
     }
 
-    /// What the command prints as JSON.
+    /// Returns the JSON output of the command.
     fn told(&self, folder: &Folder, arguments: &[&str]) -> serde_json::Value {
         let output = self.command(folder, arguments).arg("--json").output().unwrap();
         let errors = String::from_utf8_lossy(&output.stderr);
@@ -103,7 +103,7 @@ impl Server {
         serde_json::from_slice(&output.stdout).unwrap()
     }
 
-    /// The one line with which the command fails.
+    /// Returns the one-line error of the command.
     fn refusal(&self, folder: &Folder, arguments: &[&str], display: &str) -> String {
         let output = self
             .command(folder, arguments)
@@ -116,7 +116,7 @@ impl Server {
         errors
     }
 
-    /// Rows of red, green, blue of what it displays, from X's window dump.
+    /// Returns the displayed pixels as rows of red, green and blue, from X's window dump.
     fn pixels(&self) -> Vec<u8> {
         let file = self.folder.path().join("Xvfb_screen0");
         let dump = if file.exists() {
@@ -125,7 +125,7 @@ impl Server {
             self.client("xwd", &["-root", "-silent"], "x11-apps")
         };
         let number = |n: usize| u32::from_be_bytes([0, 1, 2, 3].map(|i| dump[4 * n + i])) as usize;
-        // Header, its colour map of 12 bytes an entry, then lines of words, blue first.
+        // The dump has a header, a colour map with 12 bytes per entry, and rows of words with blue first.
         let (header, colours, line) = (number(0), number(19), number(12));
         let (width, height) = self.size;
         assert_eq!((number(4), number(5), number(11)), (width, height, 32));
@@ -135,7 +135,7 @@ impl Server {
             .collect()
     }
 
-    /// Runs `show` until the server has displayed each of `frames`, every pixel as it is.
+    /// Runs `show` until the server has displayed each of `frames` without a changed pixel.
     fn displays(&self, folder: &Folder, arguments: &[&str], frames: &[&[u8]]) {
         let arguments = [&["show", "--seconds", "60"], arguments].concat();
         let mut player = self.command(folder, &arguments).spawn().unwrap();
@@ -163,7 +163,7 @@ impl Drop for Server {
     }
 }
 
-/// What a failure to open a window may be.
+/// A hint for failures to open a window.
 const WINDOWS: &str = "; windows need apt-get install libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0";
 
 const XORG: &str = r#"
@@ -190,7 +190,7 @@ Section "Screen"
 EndSection
 "#;
 
-/// A frame in which neighbours differ.
+/// Creates a frame whose neighbouring pixels differ.
 fn noise(seed: u32, (width, height): (usize, usize)) -> Image {
     let byte = |i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(seed * 977) >> 13) as u8;
     Image {
@@ -200,7 +200,7 @@ fn noise(seed: u32, (width, height): (usize, usize)) -> Image {
     }
 }
 
-/// A black desktop of (`width`, `height`) pixels with a frame at (`left`, `top`).
+/// Creates a black desktop of (`width`, `height`) pixels with a frame at (`left`, `top`).
 fn amid_black(frame: &Image, (width, height): (usize, usize), (left, top): (usize, usize)) -> Vec<u8> {
     let mut desktop = vec![0; 3 * width * height];
     for (y, row) in frame.bytes.chunks(3 * frame.shape.1).enumerate() {
@@ -209,7 +209,7 @@ fn amid_black(frame: &Image, (width, height): (usize, usize), (left, top): (usiz
     desktop
 }
 
-/// Writes past the test harness, which hides what passing tests print.
+/// Bypasses the test harness, which hides the output of passing tests.
 #[allow(clippy::explicit_write)]
 fn say(line: &str) {
     writeln!(stderr(), "{line}").unwrap();
@@ -229,7 +229,7 @@ fn a_screen_shows_exactly_what_it_is_given() {
     assert_eq!(list.as_array().unwrap().len(), 1);
     assert_eq!((&list[0]["width"], &list[0]["height"]), (&640.into(), &480.into()));
 
-    // One frame, then both at 5 a second: what is displayed is one of them, whole, and each is seen.
+    // One frame, then both at 5 Hz: the displayed image is always one whole frame, and each frame appears.
     let [first, second] = frames.each_ref().map(|frame| &frame.bytes[..]);
     server.displays(&folder, &["frames/0.png"], &[first]);
     server.displays(&folder, &["frames", "--rate", "5"], &[first, second]);
@@ -238,12 +238,12 @@ fn a_screen_shows_exactly_what_it_is_given() {
         640 * 480
     ));
 
-    // A smaller frame lies in the middle with black around it.
+    // A smaller frame is centred on black.
     let small = noise(3, (200, 100));
     small.write(&folder.path("small.png")).unwrap();
     server.displays(&folder, &["small.png"], &[&amid_black(&small, size, (220, 190))]);
 
-    // The pattern of the link arrives as it is.
+    // The link pattern arrives unchanged.
     folder.succeeds(&["link", "pattern", "--size", "640x480", "-o", "pattern.png"]);
     let pattern = image::open(folder.path("pattern.png")).unwrap().into_rgb8();
     server.displays(&folder, &["pattern.png"], &[&pattern]);
@@ -275,7 +275,7 @@ fn the_second_screen_shows_exactly_what_it_is_given() {
         "640×400 on screen 2: all {} pixels read back exactly, screen 1 black",
         640 * 400
     ));
-    // On the first there is room around it.
+    // On the first screen there is space around the frame.
     let desktop = amid_black(&frame, server.size, (0, 40));
     server.displays(&folder, &["frame.png", "--screen", "1"], &[&desktop]);
 }
@@ -305,7 +305,7 @@ fn what_a_screen_cannot_show_is_refused() {
         let said = folder.fails(&["show", "fits.png", flag, "0"], 1);
         assert!(said.contains(&format!("{flag} 0: it must lie above 0")), "{said}");
     }
-    // Without a desktop too.
+    // The error also appears without a desktop.
     for arguments in [&["screens"][..], &["show", "fits.png"]] {
         for display in ["", ":60000"] {
             let said = server.refusal(&folder, arguments, display);

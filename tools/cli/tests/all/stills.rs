@@ -1,10 +1,10 @@
-//! `phasefront hologram` on folders of pictures: each by itself, under its own name.
+//! Tests `phasefront hologram` on folders of pictures. Each picture is processed separately under its own name.
 use phasefront_io::hologram;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Pictures, and their sizes.
+/// The pictures and their sizes.
 const PICTURES: [(&str, u32, u32); 3] = [("cat", 64, 48), ("dog 2", 40, 56), ("eel", 64, 48)];
 
 fn phasefront(arguments: &[&str]) -> Output {
@@ -36,7 +36,7 @@ fn refusal(arguments: &[&str]) -> String {
 struct Folder(tempfile::TempDir);
 
 impl Folder {
-    /// Of `PICTURES` in `rgb` and `depth`.
+    /// Creates a folder with the `PICTURES` in `rgb` and `depth`.
     fn new() -> Self {
         let folder = Folder(tempfile::tempdir().unwrap());
         for name in ["rgb", "depth"] {
@@ -138,7 +138,7 @@ fn holograms_of_the_same_request_are_kept() {
     assert!(
         refusal(&borrowed(&folder.call(&["--resume", "--dark-threshold", "0.1"]))).contains("--dark-threshold 0.1")
     );
-    // One is missing, and one picture has changed.
+    // One output is missing, and one picture has changed.
     std::fs::remove_file(folder.path("out/cat.png")).unwrap();
     let dog = std::fs::read(folder.path("out/dog 2.png")).unwrap();
     for name in ["rgb", "depth"] {

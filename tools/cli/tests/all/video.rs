@@ -1,4 +1,5 @@
-//! `phasefront video`: folders and pipes, one by one and live; every frame answered or reported dropped.
+//! Tests `phasefront video` with folders and pipes, frame by frame and live. Every frame is processed or reported
+//! dropped.
 use crate::skip;
 
 use phasefront_io::hologram::{self, Hologram};
@@ -31,7 +32,7 @@ fn refusal(arguments: &[&str]) -> String {
     errors
 }
 
-/// Colour and depth in millimetres of a square that moves over a wall.
+/// Creates colour, and depth in millimetres, of a square that moves over a wall.
 fn frame(index: u32) -> (image::RgbImage, image::ImageBuffer<image::Luma<u16>, Vec<u16>>) {
     let square = |x: u32, y: u32| (8 + index * 4..24 + index * 4).contains(&x) && (12..30).contains(&y);
     let colour = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match square(x, y) {
@@ -58,7 +59,7 @@ fn folder(frames: u32) -> (tempfile::TempDir, PathBuf) {
     (dir, input)
 }
 
-/// Every frame is reported exactly once.
+/// Asserts that every frame is reported exactly once.
 fn sums_agree(report: &Value) {
     let count = |v: &Value| v.as_u64().unwrap();
     let dropped: u64 = report["dropped"].as_object().unwrap().values().map(count).sum();
@@ -100,14 +101,14 @@ fn a_folder_becomes_phase_maps_previews_and_statistics() {
         };
         assert_eq!(levels.dim(), (3, HEIGHT as usize, WIDTH as usize));
         assert!(info.scale.unwrap() > 0.0 && info.display.offset_m() == 1e-3);
-        // The square is bright where it is, the wall is not.
+        // The square is bright at its position, and the wall is not.
         let preview = image::open(out.join(format!("preview_{index:06}.png")))
             .unwrap()
             .into_rgb8();
         let at = |x: u32| preview.get_pixel(x, 21)[0];
         assert!(at(16 + index * 4) > 150 && at(48 + index * 4 % 8) < 90, "{index}");
     }
-    // A frame's phase map can be looked at like any hologram.
+    // A frame's phase map can be viewed like any hologram.
     let phase = out.join("phase_000002.png");
     let seen = dir.path().join("seen.png");
     let refocused = phasefront(&["refocus", phase.to_str().unwrap(), "--z-mm", "3", "-o"])
@@ -180,7 +181,7 @@ fn wrong_input_is_named() {
     assert!(refusal(&[name, "--rate", "0"]).contains("--rate"));
     let normalized = refusal(&[name, "--near", "1", "--far", "2"]);
     assert!(normalized.contains("name the unit by --depth-unit"), "{normalized}");
-    // What would change nothing.
+    // Arguments without an effect are refused.
     for (arguments, word) in [
         (
             &["-", "--raw", "64x48", "--repeat", "2"][..],
@@ -205,7 +206,7 @@ fn wrong_input_is_named() {
         let said = refusal(arguments);
         assert!(said.contains(word), "{arguments:?}: {said}");
     }
-    // Millimetres are no normalized depth.
+    // Depth in millimetres is not normalized.
     std::fs::remove_file(input.join("depth_1.png")).unwrap();
     assert!(refusal(&[name]).contains("no partner"));
     let empty = dir.path().join("empty");
@@ -247,7 +248,7 @@ fn depth_beyond_near_and_far_and_another_size_are_told_of() {
     assert_eq!(told(&["--display", display.to_str().unwrap(), "--size", "96x48"]), "");
 }
 
-/// A real sensor's holes, noise and misaligned colour, as video and as a live stream.
+/// Tests a real sensor's holes, noise and misaligned colour, as video and as a live stream.
 #[test]
 fn a_captured_sequence_runs_as_video_and_live() {
     let redwood = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/redwood");
@@ -268,7 +269,7 @@ fn a_captured_sequence_runs_as_video_and_live() {
     sums_agree(&report);
 }
 
-/// All files of a folder and what they hold, but for the statistics.
+/// Returns all files of a folder and their contents, without the statistics.
 fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<_> = std::fs::read_dir(dir)
         .unwrap()
@@ -285,7 +286,7 @@ fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// The holograms of a folder, whatever they were made of.
+/// Returns the holograms of a folder, without the records of their sources.
 fn holograms(dir: &Path) -> Vec<(String, Hologram)> {
     let read = |(name, _)| {
         let hologram = hologram::read_hologram(&dir.join(&name)).unwrap();
@@ -322,7 +323,7 @@ fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        // However far it came, it has to be less than all.
+        // The output of the interrupted run must be incomplete, however far it got.
         for index in 5..9 {
             let _ = std::fs::remove_file(cut.join(format!("phase_{index:06}.png")));
         }
@@ -346,7 +347,7 @@ fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
     }
 }
 
-/// Makes `path` of `from`: a film of pictures, or pictures of a film.
+/// Creates `path` from `from`: a film from pictures, or pictures from a film.
 fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
     let made = Command::new("ffmpeg")
         .args(["-v", "error", "-y"])
@@ -408,7 +409,7 @@ fn films_go_in_and_come_out() {
     );
     let (colour, depth) = (text(&at("colour.mkv")), text(&at("depth.mkv")));
     let call = ["video", &colour, "--depth-video", &depth, "--depth-unit", "mm", "-o"];
-    // Without loss a film is what its pictures are.
+    // A lossless film gives the same frames as its pictures.
     let films = text(&at("films"));
     json(&[&call[..], &[&films]].concat());
     let files = text(&at("files"));
@@ -423,7 +424,7 @@ fn films_go_in_and_come_out() {
         &files,
     ]);
     assert!(holograms(&at("films")) == holograms(&at("files")));
-    // Out: as it is seen, and its phases without loss.
+    // The outputs are a preview film and a lossless film of the phases.
     let out = text(&at("out.mp4"));
     json(&[&call[..], &[&out]].concat());
     assert!(refusal(&[&call[..], &[&out]].concat()).contains("--overwrite"));
@@ -489,7 +490,7 @@ fn folders_are_read_as_data_sets_lay_them() {
         )
         .unwrap();
         std::fs::copy(&colour, at(&format!("tum/rgb/{index}.png"))).unwrap();
-        // TUM's depth has five units a millimetre.
+        // TUM's depth has five units per millimetre.
         let mut raw = image::open(&depth).unwrap().into_luma16();
         raw.iter_mut().for_each(|v| *v *= 5);
         raw.save(at(&format!("tum/depth/{index}.png"))).unwrap();
@@ -518,7 +519,7 @@ fn folders_are_read_as_data_sets_lay_them() {
     assert!(made(&at("tum"), "d", &pairs) == plain);
     let out = at("e").to_str().unwrap().to_owned();
     assert!(refusal(&["video", input.to_str().unwrap(), "--pairs", "rgb_*", "-o", &out]).contains("comma"));
-    // Folders of equal names, and the names that the documentation of --pairs has.
+    // Folders with equal names, and the names in the documentation of --pairs.
     for name in ["plain/rgb", "plain/depth", "left"] {
         std::fs::create_dir_all(at(name)).unwrap();
     }
@@ -568,7 +569,7 @@ fn a_bad_frame_is_named() {
         error.contains("color_1.png") && error.contains("no usable reading"),
         "{error}"
     );
-    // A frame of another size would be stretched to that of the first.
+    // A frame of another size would be stretched to the size of the first.
     let (colour, depth) = frame(1);
     depth.save(input.join("depth_1.png")).unwrap();
     image::imageops::thumbnail(&colour, WIDTH / 2, HEIGHT / 2)
@@ -579,7 +580,7 @@ fn a_bad_frame_is_named() {
     assert!(error.contains("color_1.png") && error.contains("32×24"), "{error}");
     assert!(error.contains("64×48") && error.contains("hologram"), "{error}");
     assert!(out.join("phase_000000.png").exists() && !out.join("phase_000001.png").exists());
-    // The error is all that a folder of it knows: when it is mended, the run goes on.
+    // The error is the only trace of the bad frame, so the run can resume once the frame is repaired.
     colour.save(input.join("color_1.png")).unwrap();
     let mended = [&call[..call.len() - 1], &["--resume"]].concat();
     assert_eq!(json(&mended)["processed"], 3);
@@ -623,7 +624,7 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
             "{error}"
         );
     }
-    // Another picture in the place of one that was there.
+    // One picture is replaced by another.
     let second = std::fs::read(input.join("color_1.png")).unwrap();
     std::fs::copy(input.join("color_0.png"), input.join("color_1.png")).unwrap();
     let error = refused(&[]);
@@ -633,7 +634,7 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
     );
     std::fs::write(input.join("color_1.png"), second).unwrap();
     assert!(contents(&out) == before, "nothing was written");
-    // A folder of unknown flags is not resumed either.
+    // A folder whose flags are unknown is not resumed either.
     let request = std::fs::read(out.join("request.json")).unwrap();
     std::fs::remove_file(out.join("request.json")).unwrap();
     assert!(refused(&[]).contains("request.json"));
@@ -686,7 +687,7 @@ fn one_run_at_a_time_writes_into_a_folder() {
     assert!(first.wait().unwrap().success());
 }
 
-/// A film that ffmpeg complains about at length: more than a pipe holds.
+/// Tests a film about which ffmpeg complains at length: more than a pipe holds.
 #[cfg(unix)]
 #[test]
 fn what_ffmpeg_complains_about_stops_nothing() {
@@ -719,7 +720,7 @@ fn what_ffmpeg_complains_about_stops_nothing() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // A run that waits for ffmpeg, which waits for it, would never end.
+        // A deadlock between the run and ffmpeg would never end.
         let waits = std::time::Duration::from_millis(20);
         let ended = (0..3000).any(|_| {
             std::thread::sleep(waits);
@@ -773,12 +774,12 @@ fn films_have_any_names_and_are_films_alone() {
         assert_eq!(run(&["video", name, "--depth-beside", "-o", &out]), done, "{name}");
         assert!(contents(&at("out0")) == contents(&at(&out)), "{name}");
     }
-    // A text that names another film.
+    // A text file that names another film.
     std::fs::write(at("list.mp4"), "ffconcat version 1.0\nfile a.mp4\n").unwrap();
     let (code, errors) = run(&["video", "list.mp4", "--depth-beside", "-o", "no"]);
     assert!(code == Some(1) && errors.contains("list.mp4"), "{errors}");
     assert!(phasefront_io::film::about(&at("list.mp4")).is_none());
-    // Places that ffmpeg takes for patterns, options and protocols.
+    // Paths that ffmpeg would take for patterns, options or protocols.
     for folder in ["p%d", "%%"] {
         std::fs::create_dir(at(folder)).unwrap();
     }
@@ -811,13 +812,13 @@ fn films_replace_no_file_unasked() {
     std::fs::remove_file(at("x-phases.mp4")).unwrap();
     json(&call);
     assert_eq!(std::fs::read(at("x.half.mp4")).unwrap(), b"mine");
-    // Those of an earlier run are made again when it is resumed.
+    // The films of an earlier run are written again when it is resumed.
     std::fs::remove_file(at("x/phase_000001.png")).unwrap();
     json(&[&call[..], &["--resume"]].concat());
     std::fs::write(at("x-phases.mp4"), "old").unwrap();
     json(&[&call[..], &["--overwrite"]].concat());
     assert_ne!(std::fs::read(at("x-phases.mp4")).unwrap(), b"old");
-    // The film that is read is not replaced.
+    // The input film is not replaced.
     let film = std::fs::read(at("x.mp4")).unwrap();
     let error = refusal(&["video", &out, "--depth-beside", "--overwrite", "-o", &out]);
     assert!(error.contains("input"), "{error}");

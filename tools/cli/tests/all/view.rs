@@ -1,5 +1,5 @@
-//! `phasefront view` and `phasefront judge`: pages that keep their size, and a table. What a page does in a browser is
-//! `tests/browser`'s.
+//! Tests `phasefront view` and `phasefront judge`: the size limits of the pages, and the table. `tests/browser` tests
+//! the pages in a browser.
 use crate::folder;
 use crate::ldi;
 
@@ -7,7 +7,7 @@ use folder::Folder;
 use phasefront_cli::viewer;
 use serde_json::Value;
 
-/// A frame with something near on the left, 96×64.
+/// Creates a folder with a frame of 96×64 pixels that has something near on the left.
 fn with_frame() -> Folder {
     let folder = Folder::new();
     let near = |x: u32, y: u32| (12..40).contains(&x) && (16..48).contains(&y);
@@ -31,7 +31,7 @@ fn an_image_becomes_a_page_of_its_hologram_beside_its_field() {
     assert_eq!((said["views"].as_u64(), said["scenes"].as_u64()), (Some(14), Some(1)));
     let page = std::fs::read_to_string(folder.path("v.html")).unwrap();
     assert_eq!(said["bytes"].as_u64().unwrap(), page.len() as u64);
-    // Nothing is fetched from anywhere.
+    // The page loads nothing from the network.
     assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("src=\"/"));
     let scene = viewer::read(&folder.path("v.html")).unwrap().remove(0);
     assert_eq!(
@@ -92,7 +92,7 @@ fn a_page_takes_nothing_of_another_but_its_data() {
     folder.succeeds(&["view", "h.png", "--views", "2", "--title", title, "-o", "one.html"]);
     let one = std::fs::read_to_string(folder.path("one.html")).unwrap();
     assert!(one.contains("default-src 'none'; img-src data:;") && !one.contains("alert(1)</script>"));
-    // All around the data is the program's own.
+    // Everything around the data comes from the program itself.
     let visited = one.replace("<main>", "<img src=\"https://example.org/a.png\"><main>");
     std::fs::write(folder.path("visited.html"), visited).unwrap();
     folder.succeeds(&["view", "visited.html", "h.png", "-o", "joined.html"]);
@@ -150,7 +150,7 @@ fn ways_are_judged_by_the_best_wave_at_hand() {
     let said = judged(&[&FRAME[..], &["-o", "j.html"]].concat());
     assert!(said["truth"].as_str().unwrap().contains("there is no truth"), "{said}");
     let rows = said["rows"].as_array().unwrap();
-    // Sweep and network, three corrections each; the pair.
+    // Sweep and network with three corrections each, and the pair.
     assert_eq!(rows.len(), 7);
     let psnr = |row: &Value| row["psnr_db"].as_f64().unwrap();
     for of_method in rows[..6].chunks(3) {

@@ -1,15 +1,17 @@
-//! Aberrations that differ over the frame: calibrated at a grid of points (the paper has 15 in mind) and interpolated,
-//! and corrected by a convolution in space, as no filter in the Fourier domain can (Methods).
+//! Corrects aberrations that differ over the frame. They are calibrated at a grid of points (the paper proposes 15) and
+//! interpolated. A convolution in space corrects them, because no filter in the Fourier domain can (Methods).
 //!
 //! # The convolution
-//! Each pixel's light spreads by the point spread function of its place. Point spread functions are those of nodes
-//! every [`NODE`] pixels, linear between them in x and y: the field times each node's hat, convolved with the node's
-//! function, sums to that exactly. They end where no ray of the correction goes, and `RIM` pixels further; what is
-//! beyond them is left out, not wrapped around. [`convolve_reference`] is the sum over all pairs of pixels.
+//! The light of each pixel spreads by the point spread function of its position. Nodes every [`NODE`] pixels have point
+//! spread functions, which are interpolated linearly in x and y. The sum over the nodes of the field times the node's
+//! hat function, convolved with the node's point spread function, is exactly this interpolation. A point spread
+//! function ends `RIM` pixels beyond the farthest ray of the correction; the rest is dropped instead of wrapped around.
+//! [`convolve_reference`] computes the sum over all pairs of pixels.
 //!
 //! # Cost
-//! What differs over the frame does not commute with propagation, so every plane's content makes its own way: through
-//! the silhouettes before it, back to its plane, through the convolution, on to z = 0; N²/2 propagations for N planes.
+//! A correction that differs over the frame does not commute with propagation. The content of every plane therefore
+//! propagates on its own: through the silhouettes in front of it, back to its plane, through the convolution and on to
+//! z = 0. This takes N²/2 propagations for N planes.
 
 use super::{MAX_PROPAGATIONS, padded_shape_with};
 use crate::sm_lbm::{Planes, check_planes, crop, cross, place, plane_z_m};
@@ -24,52 +26,53 @@ use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 
-/// Pixels from node to node.
+/// The distance between nodes, in pixels.
 pub const NODE: usize = 16;
 
-/// Pixels that a point spread function has beyond where its rays go.
+/// The pixels by which a point spread function extends beyond its farthest ray.
 const RIM: usize = 12;
 
-/// What a convolution is of: a colour's field at a z in a frame of (H, W) pixels, at the top left of a larger plane.
+/// The position of a field to convolve: a colour's field at z, for a frame of (H, W) pixels at the top left of a larger
+/// plane.
 #[derive(Clone, Copy)]
 pub struct Place<'a> {
     /// The corrections.
     pub aberrations: &'a SpatialAberrations,
     /// The display.
     pub display: &'a Display,
-    /// 0 red to 2 blue.
+    /// The colour, from 0 (red) to 2 (blue).
     pub colour: usize,
-    /// z of the field, metres.
+    /// z of the field, in metres.
     pub z_m: f64,
-    /// (H, W) of the frame that the calibrated points lie in.
+    /// The shape, (H, W), of the frame that contains the calibrated points.
     pub frame: (usize, usize),
 }
 
 impl Place<'_> {
-    /// The correction of node (i, j).
+    /// Returns the correction of node (i, j).
     fn node(&self, i: usize, j: usize) -> Aberration {
         let part = |node: usize, n: usize| ((node * NODE) as f64 + 0.5) / n as f64;
         let (x, y) = (part(j, self.frame.1), part(i, self.frame.0));
         self.aberrations.at(x, y, self.z_m)
     }
 
-    /// Pixels beside its own that a point's light reaches.
+    /// Returns the number of pixels that a point's light reaches to each side.
     fn reach(&self) -> usize {
         let pitch = self.display.pitch_m();
         (self.aberrations.reach_m(pitch) / pitch).ceil() as usize + RIM
     }
 
-    /// The side of the plane of a node's convolution: its pixels and their light.
+    /// Returns the side of the plane for a node's convolution, which holds the node's pixels and their light.
     fn side(&self) -> usize {
         fast_size(2 * NODE + 2 * self.reach())
     }
 
-    /// Whether light of pixel 0 reaches pixel `at` of a periodic axis of [`Self::side`].
+    /// Checks whether light of pixel 0 reaches pixel `at` of a periodic axis of [`Self::side`].
     fn reaches(&self, at: usize) -> bool {
         at.min(self.side() - at) <= self.reach()
     }
 
-    /// Φ of node (i, j) at frequency bins (kx, ky) of a plane of `n`×`n`.
+    /// Returns Φ of `aberration` at the frequency bins (kx, ky) of a plane of `n`×`n`.
     fn kernel(&self, aberration: &Aberration, n: usize, kx: usize, ky: usize) -> Complex32 {
         let pitch = self.display.pitch_m();
         let frequency = |k: usize| {
@@ -81,14 +84,15 @@ impl Place<'_> {
     }
 }
 
-/// The field (H', W') after each of its points has spread as `place` says.
+/// Spreads each point of the field, (H', W'), by the point spread function of its position.
 pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32> {
     let (height, width) = field.dim();
     let nodes = |n: usize| (n - 1) / NODE + 2;
     let (side, reach) = (place.side(), place.reach());
     let fft = Fft2::new(side, side, side, side);
     let scale = 1.0 / (side * side) as f32;
-    // The spectrum of a node's point spread function, cut, and over side² as unnormalized transforms need it.
+    // Returns the spectrum of a node's point spread function after the cut, divided by side² because the transforms are
+    // unnormalized.
     let spectrum = |i: usize, j: usize, convolve: &mut ConvolveScratch, scratch: &mut Scratch| {
         let aberration = place.node(i, j);
         let mut point = vec![Complex32::ZERO; side * side];
@@ -113,7 +117,7 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
         .flat_map(|i| (0..nodes(width)).map(move |j| (i, j)))
         .collect();
     let mut out = Array2::from_elem((height, width), Complex32::ZERO);
-    // So many at a time that their planes stay small beside the field.
+    // Batches of 64 nodes keep their planes small compared with the field.
     for some in all.chunks(64) {
         let spread: Vec<Option<Vec<Complex32>>> = some
             .par_iter()
@@ -126,7 +130,7 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
                         for (x, wx) in hat(*j, width) {
                             let value = field[(y, x)] * (wy * wx);
                             lit |= value != Complex32::ZERO;
-                            // Pixel (i − 1)·NODE of the field stands at `reach` of the plane.
+                            // Pixel (i − 1)·NODE of the field is at position `reach` of the plane.
                             let (v, u) = (y + NODE + reach - i * NODE, x + NODE + reach - j * NODE);
                             plane[v * side + u] = value;
                         }
@@ -165,19 +169,20 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
     out
 }
 
-/// The pixels of an axis of `n` between the neighbours of a node, each with its share in the node.
+/// Returns the pixels of an axis of `n` between the neighbours of a node, each with its weight for the node.
 fn hat(node: usize, n: usize) -> impl Iterator<Item = (usize, f32)> {
     let centre = node * NODE;
     ((centre + 1).saturating_sub(NODE)..(centre + NODE).min(n))
         .map(move |at| (at, 1.0 - at.abs_diff(centre) as f32 / NODE as f32))
 }
 
-/// [`convolve`] as the sum over all pairs of pixels, point spread functions by direct sums: for small fields.
+/// Computes [`convolve`] as the sum over all pairs of pixels, with point spread functions from direct sums. It suits
+/// small fields only.
 pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32> {
     use num_complex::Complex64;
     let (height, width) = field.dim();
     let side = place.side();
-    // F⁻¹(Φ) of a node, its centre at (0, 0), periodic in `side`.
+    // Returns F⁻¹(Φ) of a node, centred at (0, 0) and periodic in `side`.
     let spread = |i: usize, j: usize| {
         let aberration = place.node(i, j);
         let kernel = Array2::from_shape_fn((side, side), |(ky, kx)| {
@@ -212,11 +217,11 @@ pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2
     out.mapv(|v| Complex32::new(v.re as f32, v.im as f32))
 }
 
-/// The midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes, each corrected from place to place.
-/// `progress` hears of the propagations done, of all.
+/// Returns the midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes, with a correction that differs
+/// over the frame. `progress` receives the number of finished propagations and their total.
 ///
 /// # Errors
-/// No planes, or more propagations than [`MAX_PROPAGATIONS`] a colour.
+/// Returns an error if there are no planes, or if a colour needs more propagations than [`MAX_PROPAGATIONS`].
 pub fn hologram(
     ldi: &Ldi,
     display: &Display,
@@ -273,7 +278,7 @@ pub fn hologram(
                 z_m: z(*k),
                 frame,
             };
-            // Back to where the content started, and there its points spread.
+            // The wave goes back to the plane of its content, where its points spread.
             let back = transfer(z(*k) - z(front));
             spread(&fft, &mut scratch, &back, here);
             let home = transfer(-z(*k));
@@ -295,7 +300,7 @@ pub fn hologram(
     Ok(hologram)
 }
 
-/// Takes the wave, whose transformed rows `scratch` holds, `back` to a place, and spreads it `here`.
+/// Propagates the wave, whose transformed rows are in `scratch`, by `back` and spreads it as `here` says.
 fn spread(fft: &Fft2, scratch: &mut Scratch, back: &Transfer, here: Place<'_>) {
     fft.columns(
         &scratch.rows,

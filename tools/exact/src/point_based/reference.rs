@@ -1,5 +1,5 @@
-//! The point-based method once more, as it is defined: per point and pixel, in f64, without tables and
-//! with one ray cast at a time. Slow; the oracle of [`super::hologram`].
+//! The reference for [`super::hologram`]: the point-based method as it is defined, per point and pixel, in f64, without
+//! tables and with one ray at a time. It is slow.
 
 use super::{Occlusion, radius_px, sub_hologram};
 use crate::sm_lbm::{check_planes, plane_of_depth, plane_z_m};
@@ -9,13 +9,13 @@ use phasefront::Display;
 use phasefront_io::Result;
 use phasefront_io::ldi::Ldi;
 
-/// A point: its place, its plane, its colour.
+/// A point: its position, its plane and its colour.
 type Point = ([i64; 2], usize, [f32; 3]);
 
-/// As [`super::hologram`].
+/// Computes the hologram that [`super::hologram`] approximates.
 ///
 /// # Errors
-/// No planes.
+/// Returns an error if there are no planes.
 pub fn hologram(ldi: &Ldi, display: &Display, planes: usize, occlusion: Occlusion) -> Result<Array3<Complex64>> {
     check_planes(planes)?;
     let (height, width) = ldi.shape();
@@ -53,10 +53,11 @@ pub fn hologram(ldi: &Ldi, display: &Display, planes: usize, occlusion: Occlusio
     Ok(sum)
 }
 
-/// Whether the ray from a point to the pixel of z = 0 that lies `to` beside it meets another point on its
-/// way to the front.
+/// Checks whether the ray from a point to the pixel of z = 0 at offset `to` meets another point on its way to the
+/// front.
 fn blocked((from, plane, _): &Point, to: [i64; 2], points: &[Point], planes: usize) -> bool {
-    // In half planes, toward the viewer, as all plane centres are whole numbers there.
+    // Returns the z position in units of half a plane, positive toward the viewer. In these units all plane centres are
+    // integers.
     let z = |plane: usize| planes as f64 - (2 * plane + 1) as f64;
     points.iter().any(|(place, nearer, _)| {
         nearer < plane

@@ -1,11 +1,10 @@
-//! The files of a calibration, to which a display file refers: the per-pixel table, the laser map, the
-//! aberrations.
+//! The calibration files that a display file refers to: the per-pixel table, the laser map and the aberrations.
 //!
-//! * The table is [`phasefront_core::display::response::per_pixel`]'s bytes.
-//! * The laser map is a PNG of 8 or 16 bits, RGB, or grey for one laser: the lasers' amplitude at nodes spread evenly
-//!   from the first to the last pixel of each axis, each colour of any scale.
-//! * Aberrations are TOML, one `[[at]]` a calibrated distance, z ascending, with the coefficients a₃ to a₇ of the
-//!   correction in radians; `x` and `y`, from 0 to 1 over the frame, where they differ over it:
+//! * The table holds the bytes of [`phasefront_core::display::response::per_pixel`].
+//! * The laser map is an 8- or 16-bit PNG, RGB, or grey for one laser. It holds the lasers' amplitudes at nodes spread
+//!   evenly from the first to the last pixel of each axis. Each colour has an arbitrary scale.
+//! * The aberrations are TOML with one `[[at]]` for each calibrated distance, sorted by ascending z. Each has the
+//!   correction's coefficients a₃ to a₇ in radians, and `x` and `y`, from 0 to 1 over the frame, if they vary over it:
 //!
 //! ```toml
 //! [[at]]
@@ -15,7 +14,7 @@
 //! blue = [0.17, -1.2, 0.0, 0.07, 0.0]
 //! ```
 //!
-//! One laser has `laser = […]` in their place.
+//! A display with one laser uses `laser = […]` instead.
 
 use crate::display::spatial::SpatialAberrations;
 use crate::input::{self, MOST_ARRAY};
@@ -36,7 +35,7 @@ use std::path::Path;
 /// Reads a per-pixel table.
 ///
 /// # Errors
-/// A file that is missing or no such table.
+/// Returns an error if the file is missing or is not a per-pixel table.
 pub fn read_per_pixel(path: &Path) -> Result<PerPixel> {
     let bytes = input::bytes(path, MOST_ARRAY)?;
     PerPixel::from_bytes(&bytes).map_err(|e| Error::file(path, e))
@@ -45,7 +44,7 @@ pub fn read_per_pixel(path: &Path) -> Result<PerPixel> {
 /// Writes a per-pixel table.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_per_pixel(path: &Path, table: &PerPixel) -> Result<()> {
     write_atomically(path, |file| file.write_all(&table.to_bytes()))
 }
@@ -53,7 +52,7 @@ pub fn write_per_pixel(path: &Path, table: &PerPixel) -> Result<()> {
 /// Reads a laser map.
 ///
 /// # Errors
-/// A file that is missing, neither RGB nor grey, or a colour without light.
+/// Returns an error if the file is missing or is neither RGB nor grey, or if a colour has no light.
 pub fn read_laser(path: &Path) -> Result<Illumination> {
     let image = open_image(path)?;
     let colours = match image {
@@ -76,10 +75,10 @@ pub fn read_laser(path: &Path) -> Result<Illumination> {
     Illumination::new(amplitude.view()).map_err(|e| Error::file(path, e))
 }
 
-/// Writes a laser map of amplitudes, (C, Gh, Gw), each colour to its largest value, in 16 bits.
+/// Writes a laser map of amplitudes, (C, Gh, Gw), as a 16-bit PNG. Each colour is scaled to its largest value.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write_laser(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     let (colours, height, width) = amplitude.dim();
     let most: Vec<f32> = (amplitude.outer_iter())
@@ -105,34 +104,34 @@ pub fn write_laser(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     })
 }
 
-/// One `[[at]]`.
+/// One `[[at]]` entry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// z against the midpoint, mm.
+    /// The z coordinate relative to the midpoint, in mm.
     pub z_mm: f64,
-    /// Where in the frame, from its left, 0 to 1.
+    /// The horizontal position in the frame, from 0 at the left to 1 at the right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<f64>,
-    /// From its top.
+    /// The vertical position in the frame, from 0 at the top to 1 at the bottom.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<f64>,
-    /// a₃ to a₇ of red, radians.
+    /// The coefficients a₃ to a₇ for red, in radians.
     #[serde(default)]
     pub red: Coefficients,
-    /// Of green.
+    /// The coefficients a₃ to a₇ for green, in radians.
     #[serde(default)]
     pub green: Coefficients,
-    /// Of blue.
+    /// The coefficients a₃ to a₇ for blue, in radians.
     #[serde(default)]
     pub blue: Coefficients,
-    /// Of the laser of a display that has one, in the place of the three.
+    /// The coefficients for a display with one laser. They replace the other three.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<Coefficients>,
 }
 
 impl Entry {
-    /// The coefficients of one colour.
+    /// Returns the coefficients of one colour.
     pub fn colour_mut(&mut self, colour: usize) -> &mut Coefficients {
         match colour {
             0 => &mut self.red,
@@ -159,27 +158,27 @@ struct AberrationToml {
     at: Vec<Entry>,
 }
 
-/// What a file of aberrations says.
+/// The contents of an aberration file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AberrationFile {
-    /// The same over the whole frame.
+    /// Aberrations that are the same over the whole frame.
     Uniform(Aberrations),
-    /// Different from place to place, which only exact waves correct.
+    /// Aberrations that vary over the frame. Only exact waves correct them.
     Spatial(SpatialAberrations),
 }
 
 impl AberrationFile {
-    /// How many colours it corrects.
+    /// Returns the number of colours that it corrects.
     pub fn colours(&self) -> usize {
         let entries = self.entries();
         let laser = entries.first().is_some_and(|entry| entry.laser.is_some());
         if laser { 1 } else { 3 }
     }
 
-    /// Checks that it is for the lasers of `display`.
+    /// Checks that it has one correction for each laser of `display`.
     ///
     /// # Errors
-    /// Another number of colours.
+    /// Returns an error if the number of colours differs.
     pub fn check(&self, display: &Display) -> Result<()> {
         let (of, right) = (self.colours(), display.colours());
         match of == right {
@@ -190,7 +189,7 @@ impl AberrationFile {
         }
     }
 
-    /// What the file says, entry by entry.
+    /// Returns the entries of the file.
     pub fn entries(&self) -> Vec<Entry> {
         let entries = |all: &Aberrations, place: Option<[f64; 2]>| -> Vec<Entry> {
             let entry = |(z_m, a): &(f64, Aberration)| {
@@ -220,28 +219,29 @@ impl AberrationFile {
     }
 }
 
-/// Reads the entries of a file of aberrations.
+/// Reads the entries of an aberration file.
 ///
 /// # Errors
-/// A file that is missing, or not of this kind.
+/// Returns an error if the file is missing or is not an aberration file.
 pub fn read_entries(path: &Path) -> Result<Vec<Entry>> {
     let text = input::text(path)?;
     let parsed: AberrationToml = toml::from_str(&text).map_err(|e| Error::file(path, keys::message(&e)))?;
     Ok(parsed.at)
 }
 
-/// Reads a file of aberrations.
+/// Reads an aberration file.
 ///
 /// # Errors
-/// As [`read_entries`]; distances that do not ascend; entries some of which have a place and some none.
+/// Returns the errors of [`read_entries`], and an error if the distances do not ascend or if only some entries have a
+/// place.
 pub fn read_aberrations(path: &Path) -> Result<AberrationFile> {
     aberrations(&read_entries(path)?).map_err(|e| Error::file(path, e))
 }
 
-/// What entries say.
+/// Converts entries to aberrations.
 ///
 /// # Errors
-/// As [`read_aberrations`].
+/// Returns the errors of [`read_aberrations`] except those of reading the file.
 pub fn aberrations(entries: &[Entry]) -> Result<AberrationFile> {
     let placed = entries.iter().filter(|e| e.x.is_some() && e.y.is_some());
     if placed.count() == 0 && entries.iter().all(|e| e.x.is_none() && e.y.is_none()) {
@@ -266,15 +266,15 @@ pub fn aberrations(entries: &[Entry]) -> Result<AberrationFile> {
     Ok(AberrationFile::Spatial(SpatialAberrations::new(points?)?))
 }
 
-/// Writes a file of aberrations.
+/// Writes an aberration file.
 ///
 /// # Errors
-/// Entries that [`aberrations`] refuses, or a file that cannot be written.
+/// Returns an error if [`aberrations`] refuses the entries or the file cannot be written.
 pub fn write_aberrations(path: &Path, entries: &[Entry]) -> Result<()> {
     aberrations(entries).map_err(|e| Error::file(path, e))?;
     let mut text = String::new();
     for entry in entries {
-        // Rust writes f64 as TOML reads it, all digits kept.
+        // Rust formats an f64 as valid TOML with all its digits.
         text.push_str(&format!("[[at]]\nz_mm = {:?}\n", entry.z_mm));
         for (name, place) in [("x", entry.x), ("y", entry.y)] {
             if let Some(place) = place {
@@ -323,7 +323,7 @@ mod tests {
     fn aberrations_are_written_and_read_and_wrong_ones_named() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("aberration.toml");
-        // Places of one row.
+        // Places in a single row.
         let entry = |z_mm: f64, x: Option<f64>| Entry {
             z_mm,
             x,

@@ -1,16 +1,15 @@
-//! What a display's file says of its panel: a carrier, a lens, what makes it flat, and how colours are moved.
+//! The panel settings of a display file: carrier, lens, flatness correction, and the registration of colours.
 //!
 //! ```toml
 //! carrier_mrad = [4.0, 0.0]              # right and down, the same for all colours
-//! lens_mm = 300.0                        # positive draws light together toward the viewer
+//! lens_mm = 300.0                        # positive focuses light toward the viewer
 //! flatness = "CAL_LSH0802200_520nm.bmp"  # or one file for each colour
 //! shift_px = [[0.5, 0.0], [0.0, 0.0], [-0.25, 1.0]]   # red, green, blue, or the one laser: right and down
 //! scale = [1.001, 1.0, 0.998]
 //! ```
 //!
-//! A flatness file is a grey image of the modulator's size, whose full range is 2π, as makers give it (Hamamatsu's
-//! correction pattern), or a CSV of levels 0 to 1023 with a first row and column of coordinates (Santec). It is added
-//! to the phases, modulo 2π.
+//! A flatness file is a grey image of the modulator's size whose full range is 2π (Hamamatsu's correction pattern), or
+//! a CSV of levels 0 to 1023 whose first row and column are coordinates (Santec). It is added to the phases modulo 2π.
 
 use crate::input::{self, MOST_PICTURE};
 use crate::output::has_extension;
@@ -24,7 +23,7 @@ use phasefront_core::runtime::keys;
 use serde::Deserialize;
 use std::path::Path;
 
-/// The keys of a display's file that are read here.
+/// The keys of a display file that this module reads.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PanelToml {
@@ -44,10 +43,10 @@ enum FlatnessToml {
     Colours([String; 3]),
 }
 
-/// Their names.
+/// The names of these keys.
 pub(crate) const KEYS: [&str; 5] = ["carrier_mrad", "lens_mm", "flatness", "shift_px", "scale"];
 
-/// Takes the keys of the panel out of the `table` of the display's file at `path`.
+/// Removes the panel's keys from the `table` of the display file at `path` and parses them.
 pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
     let own: toml::Table = (KEYS.iter())
         .filter_map(|key| Some(((*key).to_owned(), table.remove(*key)?)))
@@ -62,7 +61,7 @@ pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
 }
 
 impl PanelToml {
-    /// Puts what the file at `path` says onto `target`.
+    /// Applies the settings from the file at `path` to `target`.
     pub(crate) fn onto(self, path: &Path, target: &mut Target) -> Result<()> {
         let panel = &mut target.panel;
         panel.carrier_rad = self.carrier_mrad.unwrap_or_default().map(|mrad| mrad / 1e3);
@@ -88,10 +87,10 @@ impl PanelToml {
     }
 }
 
-/// A maker's flatness map for a modulator of (H, W) pixels, in turns of 2π/65536.
+/// Reads a manufacturer's flatness map for a modulator of (H, W) pixels, in units of 2π/65536.
 ///
 /// # Errors
-/// A file that is missing, of another kind or size.
+/// Returns an error if the file is missing or has another format or size.
 fn read_flatness(path: &Path, (height, width): (usize, usize)) -> Result<Vec<u16>> {
     let (shape, turns) = match has_extension(path, "csv") {
         true => read_csv(path)?,
@@ -115,7 +114,7 @@ fn read_image(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
     let turns = match image {
         DynamicImage::ImageLuma16(grey) => grey.into_raw(),
         DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(|v| u16::from(v) << 8).collect(),
-        // A BMP of grey is often one of RGB whose colours are equal.
+        // A grey BMP is often stored as RGB with equal colours.
         DynamicImage::ImageRgb8(rgb) if rgb.pixels().all(|p| p.0[0] == p.0[1] && p.0[1] == p.0[2]) => {
             rgb.pixels().map(|p| u16::from(p.0[0]) << 8).collect()
         }

@@ -1,25 +1,25 @@
-//! Aberrations that differ over the frame, as a display file names them.
+//! Aberrations that vary over the frame, as a display file defines them.
 
 use crate::{Error, Result};
 use phasefront::target::Aberration;
 use phasefront_core::optics::zernike::Aberrations;
 
-/// Corrections at the points of a grid over the frame; between them linear in x and y, beyond them the nearest.
+/// Corrections on a grid over the frame: bilinear between the points, and constant beyond the outermost points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpatialAberrations {
-    /// Ascending, parts of the frame's width.
+    /// The columns in ascending order, as fractions of the frame's width.
     x: Vec<f64>,
-    /// Ascending, parts of its height.
+    /// The rows in ascending order, as fractions of the frame's height.
     y: Vec<f64>,
-    /// Row by row.
+    /// The corrections, row by row.
     at: Vec<Aberrations>,
 }
 
 impl SpatialAberrations {
-    /// From corrections at points (x, y), each from 0 to 1 over the frame, in any order.
+    /// Creates a grid from corrections at points (x, y), each from 0 to 1 over the frame, in any order.
     ///
     /// # Errors
-    /// Points outside the frame, or that are not all crossings of some columns and rows.
+    /// Returns an error if a point lies outside the frame or the points do not form a full grid.
     pub fn new(points: Vec<([f64; 2], Aberrations)>) -> Result<Self> {
         let axis = |i: usize| {
             let mut all: Vec<f64> = points.iter().map(|(place, _)| place[i]).collect();
@@ -48,14 +48,14 @@ impl SpatialAberrations {
         }
     }
 
-    /// The calibrated points, row by row, and their corrections.
+    /// Returns the calibrated points and their corrections, row by row.
     pub fn points(&self) -> impl Iterator<Item = ([f64; 2], &Aberrations)> {
         let columns = self.x.len();
         let place = move |i: usize| [self.x[i % columns], self.y[i / columns]];
         self.at.iter().enumerate().map(move |(i, a)| (place(i), a))
     }
 
-    /// The correction at (`x`, `y`), parts of the frame, and `z_m`.
+    /// Returns the correction at (`x`, `y`), in fractions of the frame, and at `z_m`.
     pub fn at(&self, x: f64, y: f64, z_m: f64) -> Aberration {
         let split = |axis: &[f64], v: f64| {
             let next = axis.partition_point(|a| *a <= v).clamp(1, axis.len().max(2) - 1);
@@ -76,7 +76,7 @@ impl SpatialAberrations {
         row(i0).mix(&row(i1), ty)
     }
 
-    /// How far sideways light is moved at most, metres.
+    /// Returns the largest sideways displacement of light, in metres.
     pub fn reach_m(&self, pitch_m: f64) -> f64 {
         (self.at.iter().flat_map(Aberrations::calibrated))
             .map(|(_, a)| a.reach_m(pitch_m))

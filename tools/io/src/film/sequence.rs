@@ -1,4 +1,4 @@
-//! Sequences of colour and depth files, as people and data sets lay them in folders.
+//! Sequences of colour and depth files in the folder layouts of data sets.
 
 use crate::film::video;
 use crate::{Error, Result, input, output};
@@ -7,29 +7,31 @@ use phasefront_core::depth::DepthUnit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Seconds that a depth image may lie from its colour image where both have times, as TUM's own tool pairs them.
+/// The largest time difference between a colour image and its depth image, in seconds. TUM's own tool uses the same
+/// value.
 const TUM_APART_S: f64 = 0.02;
-/// Units in a metre of the TUM RGB-D benchmark's depth.
+/// The depth units per metre in the TUM RGB-D benchmark.
 const TUM_UNITS_PER_M: f64 = 5000.0;
-/// Names of folders of colour beside a folder `depth`.
+/// The names of colour folders that may lie beside a folder `depth`.
 const COLOUR_FOLDERS: [&str; 3] = ["rgb", "color", "image"];
-/// Endings of the files of colour and depth. Others may lie beside them, as notes do.
+/// The file extensions of colour and depth. Files with other extensions are ignored.
 const IMAGES: [&str; 9] = ["png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff", "exr", "npy"];
 
-/// Frames in their order.
+/// Frames in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
-    /// Colour and depth of each.
+    /// The colour and depth files of each frame.
     pub frames: Vec<(PathBuf, PathBuf)>,
-    /// What the depth's numbers mean, where the layout says so.
+    /// The unit of the depth values, if the layout defines it.
     pub unit: Option<DepthUnit>,
 }
 
-/// The frames of `dir`: a sequence of the TUM RGB-D benchmark (`rgb.txt`, `depth.txt`), folders `rgb` and `depth` with
-/// the numbers of a scan of Redwood or with equal names, or numbered files ([`video::frames_of_folder`]).
+/// Returns the frames of `dir`: a sequence of the TUM RGB-D benchmark (`rgb.txt`, `depth.txt`), folders `rgb` and
+/// `depth` with the file numbers of a Redwood scan or with equal names, or numbered files
+/// ([`video::frames_of_folder`]).
 ///
 /// # Errors
-/// A folder that is none of these.
+/// Returns an error if the folder has none of these layouts.
 pub fn of_folder(dir: &Path) -> Result<Sequence> {
     if dir.join("rgb.txt").is_file() && dir.join("depth.txt").is_file() {
         return tum(dir);
@@ -49,12 +51,12 @@ pub fn of_folder(dir: &Path) -> Result<Sequence> {
     })
 }
 
-/// The frames of `dir` whose names are `colour` and `depth`, patterns with one `*` each that stands for the same in
-/// both, as `left_*.png` and `left_*_z.png`. Numbers are ordered as numbers. A file that both patterns match belongs to
-/// the longer one.
+/// Returns the frames of `dir` whose names match the patterns `colour` and `depth`, for example `left_*.png` and
+/// `left_*_z.png`. Each pattern has one `*`, which stands for the same text in both. Numbers are sorted numerically. A
+/// file that matches both patterns belongs to the longer pattern.
 ///
 /// # Errors
-/// A pattern that is none, files without a partner, or no files.
+/// Returns an error if a pattern is invalid, a file has no partner, or no file matches.
 pub fn by_pattern(dir: &Path, colour: &str, depth: &str) -> Result<Sequence> {
     let mut colours = matching(dir, colour)?;
     let mut depths = matching(dir, depth)?;
@@ -83,7 +85,7 @@ pub fn by_pattern(dir: &Path, colour: &str, depth: &str) -> Result<Sequence> {
     Ok(Sequence { frames, unit: None })
 }
 
-/// What a `*` stands for: a number before other words.
+/// The text that a `*` stands for. Numbers sort before other text.
 type Key = (Option<u64>, String);
 
 fn matching(dir: &Path, pattern: &str) -> Result<BTreeMap<Key, PathBuf>> {
@@ -116,20 +118,19 @@ fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
     entries.map(|entry| entry.map(|e| e.path()).map_err(refuse)).collect()
 }
 
-/// Pictures of two folders that have equal names but for what follows the last dot, in the order of their names with
-/// numbers as numbers.
+/// The pictures of two folders, paired by file name without extension, with numbers sorted numerically.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named {
-    /// The name, and the files of colour and depth.
+    /// The name and the colour and depth files of each pair.
     pub pairs: Vec<(String, PathBuf, PathBuf)>,
-    /// Files without a partner.
+    /// The files without a partner.
     pub alone: Vec<PathBuf>,
 }
 
-/// The pictures of the folders `colour` and `depth`, as `rgb/cat.jpg` and `depth/cat.png`.
+/// Pairs the pictures of the folders `colour` and `depth`, for example `rgb/cat.jpg` and `depth/cat.png`.
 ///
 /// # Errors
-/// A folder that cannot be read; two files of one name.
+/// Returns an error if a folder cannot be read or two of its files have the same name.
 pub fn by_name(colour: &Path, depth: &Path) -> Result<Named> {
     let colours = images(colour)?;
     let mut depths = images(depth)?;
@@ -144,10 +145,10 @@ pub fn by_name(colour: &Path, depth: &Path) -> Result<Named> {
     Ok(Named { pairs, alone })
 }
 
-/// The pictures of a folder by their names without what follows the last dot, in the order of these names.
+/// Returns the pictures of a folder, keyed and sorted by name without extension.
 ///
 /// # Errors
-/// A folder that cannot be read; two files of one name.
+/// Returns an error if the folder cannot be read or two files have the same name.
 pub fn images(dir: &Path) -> Result<BTreeMap<Name, PathBuf>> {
     let mut found = BTreeMap::new();
     for path in files_of(dir)? {
@@ -167,17 +168,17 @@ pub fn images(dir: &Path) -> Result<BTreeMap<Name, PathBuf>> {
     Ok(found)
 }
 
-/// A name whose numbers are ordered as numbers: `a2` before `a10`.
+/// A name that sorts its numbers numerically: `a2` before `a10`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Name {
     parts: Vec<Part>,
-    /// The name itself.
+    /// The name as text.
     pub text: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
-    /// Digits without leading zeros: the longer they are, the larger the number.
+    /// Digits without leading zeros, preceded by their count: more digits mean a larger number.
     Number(usize, String),
     Text(String),
 }
@@ -201,7 +202,7 @@ impl Name {
         }
     }
 
-    /// Whether it is a number, or a number and a time, as Redwood's are.
+    /// Checks whether the name is a number, or a number and a time, as in Redwood's scans.
     fn is_of_redwood(&self) -> bool {
         let (number, time) = self.text.split_once('-').unwrap_or((&self.text, "0"));
         let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
@@ -209,7 +210,7 @@ impl Name {
     }
 }
 
-/// The frames of a folder of colour and one of depth.
+/// Returns the frames of a colour folder and a depth folder.
 fn two_folders(colour: &Path, depth: &Path) -> Result<Sequence> {
     let names = [images(colour)?, images(depth)?];
     if names.iter().flat_map(BTreeMap::keys).all(Name::is_of_redwood) {
@@ -236,7 +237,7 @@ fn two_folders(colour: &Path, depth: &Path) -> Result<Sequence> {
     })
 }
 
-/// A sequence of the TUM RGB-D benchmark: each colour image with the depth image that is nearest in time.
+/// Reads a sequence of the TUM RGB-D benchmark and pairs each colour image with the depth image nearest in time.
 fn tum(dir: &Path) -> Result<Sequence> {
     let colours = timed(dir, "rgb.txt")?;
     let depths = timed(dir, "depth.txt")?;
@@ -265,7 +266,7 @@ fn tum(dir: &Path) -> Result<Sequence> {
     })
 }
 
-/// Lines of a time in seconds and a file's name, `#` before what is said of them.
+/// Parses lines of a time in seconds and a file name. Lines that begin with `#` are comments.
 fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
     let path = dir.join(list);
     let text = input::text(&path)?;
@@ -284,8 +285,9 @@ fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
         .collect()
 }
 
-/// A scan of Redwood or one like it: files whose names begin with the frame's number, as 0000012-000000366371.png.
-/// Those that have no partner are left out, as the scans' own depth may begin later.
+/// Reads a Redwood scan or a similar folder, whose file names begin with the frame's number, such as
+/// 0000012-000000366371.png. Files without a partner are skipped, because the depth of a scan may begin later than its
+/// colour.
 fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
     let numbered = |dir: &Path| -> Result<BTreeMap<u64, PathBuf>> {
         let mut found = BTreeMap::new();
@@ -317,12 +319,12 @@ fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
             frames.len()
         );
     }
-    // Millimetres need more than 8 bits.
+    // Depth in millimetres needs more than 8 bits.
     let unit = (!has_bytes(&frames[0].1)).then_some(DepthUnit::Millimetres);
     Ok(Sequence { frames, unit })
 }
 
-/// Whether a picture's numbers have 8 bits.
+/// Checks whether a picture has 8 bits per channel.
 fn has_bytes(path: &Path) -> bool {
     let decoder = ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
@@ -388,7 +390,7 @@ mod tests {
         let expected = [("0000002-000000033369.jpg", "0000002-000000040000.png")];
         assert_eq!(names(&found), pairs(&expected));
         assert_eq!(found.unit, Some(DepthUnit::Millimetres));
-        // 8 bits are no millimetres.
+        // An 8-bit picture cannot hold millimetres.
         let bytes = folder(&[("rgb/1.png", ""), ("depth/1.png", "")]);
         image::GrayImage::new(2, 2)
             .save(bytes.path().join("depth/1.png"))

@@ -1,4 +1,4 @@
-//! RGB-D video: frames from a folder or a pipe, as a camera would give them.
+//! RGB-D video: frames from a folder or a pipe, in place of a camera.
 
 use crate::fingerprint::Fingerprint;
 use crate::input::decode::{self, Reading};
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// One frame in memory: colour as rows of RGB bytes, depth as little-endian numbers of `format`.
+/// One frame in memory: colour as rows of RGB bytes, depth as little-endian values of `format`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoFrame {
     colour: Vec<u8>,
@@ -22,17 +22,17 @@ pub struct VideoFrame {
 }
 
 impl VideoFrame {
-    /// (H, W) of its colour.
+    /// Returns the height and width of the colour image, (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.colour_shape
     }
 
-    /// (h, w) of its depth.
+    /// Returns the height and width of the depth image, (h, w).
     pub fn depth_shape(&self) -> (usize, usize) {
         self.depth_shape
     }
 
-    /// Adds the frame to what `hasher` is of.
+    /// Adds the frame to the fingerprint in `hasher`.
     pub fn fingerprint(&self, hasher: &mut Fingerprint) {
         let (colour, depth) = (self.colour_shape, self.depth_shape);
         hasher.numbers(&[colour.0, colour.1, depth.0, depth.1]);
@@ -41,7 +41,8 @@ impl VideoFrame {
         hasher.bytes(&self.depth);
     }
 
-    /// Rows of RGB bytes, (H, W) = `colour_shape`, and of big-endian 16-bit numbers of `unit`, (h, w) = `depth_shape`.
+    /// Creates a frame from rows of RGB bytes, (H, W) = `colour_shape`, and big-endian 16-bit depth values of `unit`,
+    /// (h, w) = `depth_shape`.
     pub fn of_big_endian(
         colour_shape: (usize, usize),
         colour: Vec<u8>,
@@ -60,10 +61,11 @@ impl VideoFrame {
         }
     }
 
-    /// Colour in the left half of a picture, rows of RGB bytes, (H, W), and normalized depth in the right one.
+    /// Creates a frame from a picture of (H, W) RGB bytes with colour in its left half and normalized depth in its
+    /// right half.
     ///
     /// # Errors
-    /// A picture that has no two halves.
+    /// Returns an error if the picture cannot be split into two equal halves.
     pub fn of_halves((height, width): (usize, usize), picture: &[u8]) -> Result<Self> {
         let half = width / 2;
         if half == 0 || width % 2 == 1 {
@@ -86,7 +88,7 @@ impl VideoFrame {
         })
     }
 
-    /// Rows of RGB bytes, (H, W) = `colour_shape`, and normalized depth, (h, w).
+    /// Creates a frame from rows of RGB bytes, (H, W) = `colour_shape`, and normalized depth, (h, w).
     pub fn normalized(colour_shape: (usize, usize), colour: Vec<u8>, depth: &Array2<f32>) -> Self {
         let (format, bytes) = depth_bytes(depth, DepthUnit::Normalized);
         VideoFrame {
@@ -98,10 +100,10 @@ impl VideoFrame {
         }
     }
 
-    /// Takes near for far.
+    /// Swaps near and far.
     ///
     /// # Errors
-    /// Depth that is not normalized.
+    /// Returns an error if the depth is not normalized.
     pub fn invert(&mut self) -> Result<()> {
         if self.format != DepthFormat::NormalizedU16 {
             return Err(Error::Input(
@@ -112,7 +114,7 @@ impl VideoFrame {
         Ok(())
     }
 
-    /// The share of its readings that lie before `near_m` or beyond `far_m`.
+    /// Returns the fraction of depth readings that are nearer than `near_m` or farther than `far_m`.
     pub fn beyond(&self, near_m: f32, far_m: f32) -> f64 {
         let metres = self.depth.chunks_exact(self.format.pixel_bytes());
         let (mut all, mut beyond) = (0usize, 0usize);
@@ -123,10 +125,10 @@ impl VideoFrame {
         beyond as f64 / all.max(1) as f64
     }
 
-    /// What a session takes.
+    /// Returns the frame as a view that a session accepts.
     ///
     /// # Errors
-    /// Images that are too large.
+    /// Returns an error if the images are too large.
     pub fn camera_frame(&self, timestamp_ns: u64) -> Result<CameraFrame<'_>> {
         let (height, width) = self.colour_shape;
         let plane = Plane::new(&self.colour, 3 * width, 3);
@@ -139,11 +141,11 @@ impl VideoFrame {
     }
 }
 
-/// The colour and depth files of a folder, in the order of their numbers: `color_7.jpg` or `rgb_007.png` belongs to
+/// Returns the colour and depth files of a folder, sorted by their numbers. `color_7.jpg` or `rgb_007.png` belongs to
 /// `depth_7.png` or `depth_007.npy`.
 ///
 /// # Errors
-/// A folder that cannot be read, without frames, or with colour or depth that has no partner.
+/// Returns an error if the folder cannot be read or has no frames, or if a file has no partner.
 pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
     let mut colours = BTreeMap::new();
     let mut depths = BTreeMap::new();
@@ -178,10 +180,10 @@ pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
     Ok(colours.into_values().zip(depths.into_values()).collect())
 }
 
-/// Reads a frame's files.
+/// Reads the files of a frame.
 ///
 /// # Errors
-/// Files that cannot be read.
+/// Returns an error if a file cannot be read.
 pub fn read_frame(colour: &Path, depth: &Path, unit: DepthUnit) -> Result<VideoFrame> {
     let (image, orientation) = decode::open_picture(colour, Reading::UPRIGHT)?;
     let colour_shape = (image.height() as usize, image.width() as usize);
@@ -223,7 +225,7 @@ fn depth_bytes(readings: &Array2<f32>, unit: DepthUnit) -> (DepthFormat, Vec<u8>
     }
 }
 
-/// Little-endian 16-bit numbers of `unit` as a session takes them.
+/// Converts depths in `unit` to the little-endian 16-bit values that a session reads.
 fn of_numbers(depth: Vec<u8>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
     match unit {
         DepthUnit::Millimetres => (DepthFormat::MillimetresU16, depth),
@@ -240,22 +242,22 @@ fn of_numbers(depth: Vec<u8>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
     }
 }
 
-/// How raw frames follow each other in a pipe: rows of RGB bytes, then rows of 16-bit little-endian depth.
+/// The layout of raw frames in a pipe: rows of RGB bytes, then rows of 16-bit little-endian depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RawVideo {
-    /// (H, W) of colour.
+    /// The height and width of the colour image, (H, W).
     pub colour: (usize, usize),
-    /// (H, W) of depth.
+    /// The height and width of the depth image, (H, W).
     pub depth: (usize, usize),
-    /// What the numbers of depth mean.
+    /// The unit of the depth values.
     pub unit: DepthUnit,
 }
 
 impl RawVideo {
-    /// The next frame; None at the end.
+    /// Reads the next frame. Returns `None` at the end.
     ///
     /// # Errors
-    /// A pipe that breaks or ends within a frame.
+    /// Returns an error if the pipe breaks or ends within a frame.
     pub fn read(&self, from: &mut dyn Read) -> Result<Option<VideoFrame>> {
         let mut colour = vec![0; 3 * self.colour.0 * self.colour.1];
         let mut depth = vec![0; 2 * self.depth.0 * self.depth.1];
@@ -286,7 +288,7 @@ impl RawVideo {
     }
 }
 
-/// Reads until `bytes` is full or the pipe ends; gives how much.
+/// Reads until `bytes` is full or the pipe ends. Returns the number of bytes read.
 fn fill(from: &mut dyn Read, bytes: &mut [u8]) -> Result<usize> {
     let mut got = 0;
     while got < bytes.len() {

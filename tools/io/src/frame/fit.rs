@@ -1,4 +1,4 @@
-//! A picture onto a modulator of another size: the whole of it, as much as fills the modulator, or pixel for pixel.
+//! Placement of a picture on a modulator of another size: contained, covering, or pixel for pixel.
 
 use crate::Result;
 use image::imageops::{self, FilterType};
@@ -7,32 +7,32 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
 use phasefront::RgbdFrame;
 use phasefront_core::frame::Crop;
 
-/// How a picture lies on a modulator.
+/// How a picture is placed on a modulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
-    /// The whole picture, as large as it goes, in the middle of black.
+    /// The whole picture as large as possible, centred on black.
     Contain,
-    /// As much of the picture as fills the modulator.
+    /// The largest part of the picture that fills the modulator.
     Cover,
-    /// Pixel for pixel, in the middle: black around a smaller picture, a larger one cut.
+    /// Pixel for pixel and centred. A smaller picture is surrounded by black and a larger one is cropped.
     Centre,
 }
 
-/// Where the pixels of a picture go.
+/// The mapping of a picture's pixels to a modulator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// The part of the picture that is shown, in its pixels.
+    /// The visible part of the picture, in its pixels.
     crop: Crop,
-    /// (H, W) of that part on the modulator.
+    /// The size of that part on the modulator, (H, W).
     inner: (usize, usize),
-    /// Its top left corner there, (row, column).
+    /// The top left corner of that part on the modulator, (row, column).
     at: (usize, usize),
-    /// (H, W) of what comes out.
+    /// The size of the output, (H, W).
     out: (usize, usize),
 }
 
 impl Placement {
-    /// The picture as it is.
+    /// Creates a placement that leaves the picture unchanged.
     pub fn as_is(picture: (usize, usize)) -> Self {
         Placement {
             crop: Crop::cover(picture, picture),
@@ -42,7 +42,7 @@ impl Placement {
         }
     }
 
-    /// (H, W) = `picture` on (H, W) = `modulator`.
+    /// Places a picture of (H, W) = `picture` on a modulator of (H, W) = `modulator`.
     pub fn new(picture: (usize, usize), modulator: (usize, usize), fit: Fit) -> Self {
         let whole = Crop::cover(picture, picture);
         let (h, w) = (picture.0 as f64, picture.1 as f64);
@@ -72,18 +72,18 @@ impl Placement {
         }
     }
 
-    /// (H, W) of the picture's part on the modulator.
+    /// Returns the size of the picture's part on the modulator, (H, W).
     pub fn inner(&self) -> (usize, usize) {
         self.inner
     }
 
-    /// The part of a depth image of (H, W) = `depth` that lies behind the shown part of a picture of (H, W) =
-    /// `picture` and the same field of view.
+    /// Returns the part of a depth image, (H, W) = `depth`, that corresponds to the visible part of a picture, (H, W) =
+    /// `picture`, with the same field of view.
     pub fn depth_crop(&self, depth: (usize, usize), picture: (usize, usize)) -> Crop {
         (self.crop).scaled(depth.1 as f64 / picture.1 as f64, depth.0 as f64 / picture.0 as f64)
     }
 
-    /// The shown part of `rgb`, (3, H, W), at its size on the modulator; means where it shrinks.
+    /// Resamples the visible part of `rgb`, (3, H, W), to its size on the modulator. Shrinking averages pixels.
     pub fn colour(&self, rgb: ArrayView3<'_, f32>) -> Array3<f32> {
         let (_, height, width) = rgb.dim();
         if *self == Self::as_is((height, width)) {
@@ -104,8 +104,8 @@ impl Placement {
         })
     }
 
-    /// The shown part of `depth`, (H, W), of the picture's shape: nearest samples, for a mean across an edge would be a
-    /// depth where nothing is.
+    /// Resamples the visible part of `depth`, (H, W), which has the picture's shape. It takes the nearest samples,
+    /// because an average across an edge would be a depth that no surface has.
     pub fn depth(&self, depth: ArrayView2<'_, f32>) -> Array2<f32> {
         let (height, width) = depth.dim();
         Array2::from_shape_fn(self.inner, |(y, x)| {
@@ -118,11 +118,11 @@ impl Placement {
         })
     }
 
-    /// The frame of the modulator's shape: black around `rgb`, (3, h, w), and the depth of the nearest pixel around
-    /// `depth`, (h, w), both of the shape of [`Self::inner`].
+    /// Creates the frame of the modulator's shape. Both `rgb`, (3, h, w), and `depth`, (h, w), have the shape of
+    /// [`Self::inner`]. Black surrounds `rgb`, and the depth of the nearest pixel surrounds `depth`.
     ///
     /// # Errors
-    /// Numbers that are no frame's.
+    /// Returns an error if a value is not valid in a frame.
     pub fn frame(&self, rgb: Array3<f32>, depth: Array2<f32>) -> Result<RgbdFrame> {
         if self.inner == self.out {
             return Ok(RgbdFrame::new(rgb, depth)?);
@@ -182,7 +182,7 @@ mod tests {
         assert!(whole.rgb().slice(s![1.., 4..12, ..]).iter().all(|v| *v > 0.0));
         let full = placed((4, 6), (8, 8), Fit::Cover);
         assert!(full.rgb().slice(s![1.., .., ..]).iter().all(|v| *v > 0.0));
-        // Of six columns the middle four are shown, each twice.
+        // The middle four of six columns are visible, each twice.
         let (_, depth) = picture(4, 6);
         assert_eq!(full.depth()[(0, 0)], depth[(0, 1)]);
         assert_eq!(full.depth()[(7, 7)], depth[(3, 4)]);

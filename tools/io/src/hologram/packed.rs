@@ -1,6 +1,6 @@
-//! Holograms as the image files that a modulator's input takes, and back.
+//! Conversion of holograms to and from the image files for a modulator's input.
 //!
-//! A packing of all colours in one image is one PNG, and so is one laser's. One of a colour after the other is three,
+//! A layout with all colours in one image, or with one laser, uses one PNG. A layout with separate colours uses three:
 //! `NAME-red.png`, `NAME-green.png` and `NAME-blue.png`.
 
 use crate::display::DisplayFile;
@@ -14,13 +14,13 @@ use phasefront::output::Packing;
 use phasefront::output::{BitPlanes, Layout, Levels, Output, Placement};
 use std::path::{Path, PathBuf};
 
-/// The names of the colours, in their order.
+/// The names of the colours, in order.
 pub const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
-/// Which of `colours` is called `name`.
+/// Returns the index of the colour called `name` among `colours`.
 ///
 /// # Errors
-/// Those of a display of one laser, which has no red, green and blue.
+/// Returns an error if the name is unknown or the display has one laser, and therefore no red, green and blue.
 pub fn colour(name: &str, colours: usize) -> Result<usize> {
     let known = COLOURS.iter().take(colours).position(|known| *known == name);
     known.filter(|_| colours == COLOURS.len()).ok_or_else(|| {
@@ -33,30 +33,30 @@ pub fn colour(name: &str, colours: usize) -> Result<usize> {
 /// The pixels of one image file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
-    /// (H, W).
+    /// The height and width, (H, W).
     pub shape: (usize, usize),
-    /// Rows of pixels, words big-endian.
+    /// The rows of pixels, with 16-bit values big-endian.
     pub bytes: Vec<u8>,
-    /// What a pixel is.
+    /// The pixel format.
     pub kind: Kind,
 }
 
-/// What a pixel of an image is.
+/// The pixel format of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Red, green, blue, a byte each.
+    /// RGB with one byte per channel.
     Rgb,
-    /// A byte.
+    /// Grey with 8 bits.
     Grey,
-    /// A word.
+    /// Grey with 16 bits.
     Grey16,
 }
 
 impl Image {
-    /// Writes it as a PNG.
+    /// Writes the image as a PNG.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         self.pending(path)?.place()
     }
@@ -79,7 +79,7 @@ impl Image {
     /// Reads a PNG or BMP.
     ///
     /// # Errors
-    /// A file that is missing, cut short, or of another kind.
+    /// Returns an error if the file is missing, truncated, or of another kind.
     pub fn read(path: &Path) -> Result<Self> {
         let image = open_image(path)?;
         let shape = (image.height() as usize, image.width() as usize);
@@ -112,7 +112,7 @@ fn kind(layout: Layout) -> Kind {
     }
 }
 
-/// Words the other way round, where an image has words: the core's are little-endian, a PNG's big-endian.
+/// Swaps the bytes of 16-bit pixels: the core uses little-endian values and PNG uses big-endian ones.
 fn swap(kind: Kind, bytes: &mut [u8]) {
     if kind == Kind::Grey16 {
         bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.reverse());
@@ -128,10 +128,10 @@ fn output(display: &DisplayFile, shape: (usize, usize), layout: Layout) -> Resul
     Ok(Output::new(&display.target, shape, placement)?)
 }
 
-/// The plan of a modulator of `cells`, whose every pixel a hologram of (H, W) covers.
+/// Plans the bit planes of a modulator of `cells` for a hologram of (H, W) that covers every pixel.
 ///
 /// # Errors
-/// A hologram of another size.
+/// Returns an error if the hologram has another size.
 pub fn bit_planes(
     display: &DisplayFile,
     shape: (usize, usize),
@@ -148,10 +148,10 @@ pub fn bit_planes(
     Ok(BitPlanes::new(cells, shape, device.flip_x, device.flip_y))
 }
 
-/// The images of a phase-only hologram: one, or one for each colour.
+/// Packs a phase-only hologram into one image, or one image for each colour.
 ///
 /// # Errors
-/// A complex hologram; one that is larger than the modulator, or was made for another display.
+/// Returns an error if the hologram is complex, is larger than the modulator, or was made for another display.
 pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     hologram.check_display(display)?;
     let shape = hologram.shape();
@@ -190,10 +190,10 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     }
 }
 
-/// The frame that shows `maps` of levels, (H, W) each, one after another.
+/// Packs `maps` of levels, (H, W) each, into the frame that displays them in sequence.
 ///
 /// # Errors
-/// A number of maps that does not divide 24.
+/// Returns an error if the number of maps does not divide 24.
 pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
     let mut bytes = vec![0; plan.frame_bytes()];
     plan.pack(maps, &mut bytes)?;
@@ -204,10 +204,10 @@ pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
     })
 }
 
-/// The levels, (C, H, W) = (C, `shape`), that `images` show in the middle of the modulator.
+/// Extracts the levels, (C, H, W) = (C, `shape`), from the centre of the modulator in `images`.
 ///
 /// # Errors
-/// Images of another number, size or kind.
+/// Returns an error if the images have another number, size or kind.
 pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) -> Result<Array3<u16>> {
     let colours = display.device.display.colours();
     let mut levels = Array3::zeros((colours, shape.0, shape.1));
@@ -254,14 +254,14 @@ pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) ->
     Ok(levels)
 }
 
-/// Writes `images` to `path`, or to the files of their colours beside it; gives their names.
+/// Writes `images` to `path`, or to one file for each colour beside it, and returns the file names.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn write(path: &Path, images: &[Image]) -> Result<Vec<PathBuf>> {
     let files = paths(path, images.len());
     let pending = files.iter().zip(images).map(|(path, image)| image.pending(path));
-    // None takes its place before all are on the disk.
+    // No file takes its place before all are on the disk.
     pending
         .collect::<Result<Vec<_>>>()?
         .into_iter()
@@ -269,10 +269,10 @@ pub fn write(path: &Path, images: &[Image]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Declares the files that a hologram for `display` is written to.
+/// Declares the output files of a hologram for `display`.
 ///
 /// # Errors
-/// Those of [`output::file`].
+/// Returns the errors of [`output::file`].
 pub fn declare(path: &Path, display: &DisplayFile) -> Result<()> {
     output::extension(path, &["png"])?;
     let count = match &display.device.packing {
@@ -284,7 +284,7 @@ pub fn declare(path: &Path, display: &DisplayFile) -> Result<()> {
         .try_for_each(|path| output::file(path, &["png"]))
 }
 
-/// The files of `count` images: `path` for one, one of each colour for three.
+/// Returns the paths of `count` images: `path` itself for one, or one path for each colour for three.
 pub fn paths(path: &Path, count: usize) -> Vec<PathBuf> {
     if count == 1 {
         return vec![path.to_owned()];

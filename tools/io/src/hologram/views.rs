@@ -1,4 +1,4 @@
-//! Looking at hologram files: the amplitudes that an eye focused at z would see.
+//! Views of hologram files: the amplitudes that an eye focused at z would see.
 
 use crate::display::DisplayFile;
 use crate::display::calibration::AberrationFile;
@@ -13,14 +13,14 @@ use phasefront_core::optics::aperture::Opening;
 use phasefront_core::optics::asm::Propagator;
 use phasefront_core::view::refocus::{Refocus, shown_field};
 
-/// Optics with an aberration that is one for all depths, for holograms of one shape.
+/// Propagation through optics whose aberration is the same for all depths, for holograms of one shape.
 pub struct AberratedOptics(Vec<Propagator>);
 
 impl AberratedOptics {
-    /// Those that `correction` corrects.
+    /// Plans the optics whose aberration `correction` corrects.
     ///
     /// # Errors
-    /// An empty shape; a correction of other colours.
+    /// Returns an error if the shape is empty or the correction has another number of colours.
     pub fn new((height, width): (usize, usize), display: &Display, correction: &Aberration) -> Result<Self> {
         let pitch_m = display.pitch_m();
         let plans = Propagator::for_colours_corrected(
@@ -35,7 +35,7 @@ impl AberratedOptics {
         Ok(AberratedOptics(plans))
     }
 
-    /// What becomes of `field`, (C, H, W), on its way through.
+    /// Propagates `field`, (C, H, W), through the optics in place.
     pub fn pass(&self, field: &mut [Complex32]) {
         let mut scratch = self.0[0].scratch();
         let area = field.len() / self.0.len();
@@ -46,7 +46,7 @@ impl AberratedOptics {
 }
 
 impl Hologram {
-    /// (H, W).
+    /// Returns the height and width, (H, W).
     pub fn shape(&self) -> (usize, usize) {
         let (_, height, width) = match self {
             Hologram::PhaseOnly(levels, _) => levels.dim(),
@@ -56,18 +56,18 @@ impl Hologram {
         (height, width)
     }
 
-    /// What the file says of the hologram.
+    /// Returns the info stored with the hologram.
     pub fn info(&self) -> &HologramInfo {
         match self {
             Hologram::PhaseOnly(_, info) | Hologram::Words(_, info) | Hologram::Complex(_, info) => info,
         }
     }
 
-    /// Checks that the hologram was made for the display of `file`: for its lasers, pitch and offset, and levels for
-    /// its bits.
+    /// Checks that the hologram was made for the display of `file`: that the lasers, pitch and offset match, and that
+    /// levels match the display's bits.
     ///
     /// # Errors
-    /// What differs, of both.
+    /// Returns an error that names the differing values of both.
     pub fn check_display(&self, file: &DisplayFile) -> Result<()> {
         let (theirs, ours) = (&self.info().display, &file.target.display);
         let of_levels = !matches!(self, Hologram::Complex(..));
@@ -102,20 +102,21 @@ impl Hologram {
         )))
     }
 
-    /// The amplitudes at each of `z_m`, (C, H, W), against the middle of the volume, metres.
+    /// Computes the amplitudes, (C, H, W), at each of `z_m`, in metres from the middle of the volume.
     ///
     /// # Errors
-    /// A z too far to be propagated to, a look-up table that is none, or a hologram for a calibrated display.
+    /// Returns an error if a z is too far to propagate to, if the look-up table is invalid, or if the hologram was made
+    /// for a calibrated display.
     pub fn views(&self, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         self.views_on(&self.info().display_file()?, z_m)
     }
 
-    /// [`Self::views`] on a display with its calibration: by its own phase curves, under its laser, through its
-    /// aberration, which must be one for all depths.
+    /// Computes [`Self::views`] for a display with its calibration: its phase curves, its laser profile and its
+    /// aberration, which must be the same for all depths.
     ///
     /// # Errors
-    /// As [`Self::views`]; a hologram that was made for another display; a table made for fewer pixels; an aberration
-    /// that changes over depth or over the frame.
+    /// Returns the errors of [`Self::views`], and an error if the hologram was made for another display, if a table is
+    /// for fewer pixels, or if the aberration changes over depth or over the frame.
     pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         let shape = self.shape();
         let (height, width) = shape;
@@ -149,7 +150,7 @@ impl Hologram {
             .collect())
     }
 
-    /// The light that its levels make behind the modulator of `file`.
+    /// Computes the field that the hologram's levels produce behind the modulator of `file`.
     fn shown(&self, file: &DisplayFile) -> Result<Array3<Complex32>> {
         let (height, width) = self.shape();
         let info = self.info();
@@ -164,7 +165,7 @@ impl Hologram {
     }
 }
 
-/// A figure without the last digits of a float.
+/// Formats a number without the rounding noise of its last digits.
 fn rounded(value: f64) -> String {
     ((value * 1e6).round() / 1e6).to_string()
 }

@@ -1,5 +1,5 @@
-//! Pictures and depth maps, decoded: all that is read comes through `decode`, which bounds their pixels,
-//! turns them upright as their Exif data say, and makes an error of a decoder's panic.
+//! Decoding of pictures and depth maps. All of them pass through `decode`, which limits their pixels, turns them
+//! upright according to their Exif data, and converts a decoder's panic to an error.
 
 use crate::input::{self, MOST_PICTURE, quiet};
 use crate::{Error, Result};
@@ -14,72 +14,72 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-/// The kinds of colour pictures that are read, for texts that list them.
+/// The supported colour formats, for messages.
 pub const COLOUR_FORMATS: &str = "PNG, JPEG, WebP, TIFF or BMP, of 8 or 16 bits";
-/// The kinds of depth maps that are read, for texts that list them.
+/// The supported depth formats, for messages.
 pub const DEPTH_FORMATS: &str =
     "grey PNG, TIFF, WebP, JPEG or BMP of 8 or 16 bits, TIFF or OpenEXR of floating point, or .npy";
 
-/// Most pixels of an image that is read, 8192²: over two 8K frames.
+/// The maximum number of pixels of an image, 8192²: more than two 8K frames.
 pub const MOST_PIXELS: u64 = 1 << 26;
 
-/// What can be done with a HEIC or AVIF file, which no well-kept decoder in Rust reads.
+/// Advice for HEIC and AVIF files, for which no maintained Rust decoder exists.
 const HEIC: &str = "is HEIC, which is not read; `heif-convert --with-aux photo.heic photo.jpg` of libheif writes the photo and its disparity as two pictures: give these to --rgb and --depth with --invert";
 const AVIF: &str = "is AVIF, which is not read; save it as PNG or JPEG";
 
-/// How a picture is read.
+/// Options for reading a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Reading {
-    /// Pixels that it may have.
+    /// The maximum number of pixels.
     pub most_pixels: u64,
-    /// Whether it is turned as its Exif data say.
+    /// Whether the picture is turned according to its Exif data.
     pub upright: bool,
 }
 
 impl Reading {
-    /// A picture as people see it.
+    /// Reads a picture upright.
     pub(crate) const UPRIGHT: Reading = Reading {
         most_pixels: MOST_PIXELS,
         upright: true,
     };
-    /// A picture whose pixels stand where other numbers say, as textures do.
+    /// Reads a picture without turning it, for pixels that other data refer to, such as textures.
     pub const AS_STORED: Reading = Reading {
         upright: false,
         ..Self::UPRIGHT
     };
 }
 
-/// One channel of a depth map, (H, W), as its file holds it.
+/// One channel of a depth map, (H, W), with the values of its file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plane {
     pub(crate) values: Array2<f32>,
-    /// The largest number that its type holds; none for floating point.
+    /// The largest value of its integer type, or `None` for floating point.
     pub(crate) most: Option<f32>,
 }
 
-/// What a file holds.
+/// The pixels of a file.
 #[derive(Debug)]
 pub(crate) enum Pixels {
-    /// Whole numbers of 8 or 16 bits.
+    /// Integers of 8 or 16 bits.
     Image(DynamicImage),
-    /// Other numbers, of one channel.
+    /// Other numbers, in one channel.
     Plane(Plane),
 }
 
-/// What a file holds, and how it was turned.
+/// The pixels of a file and their orientation.
 #[derive(Debug)]
 pub(crate) struct Decoded {
     pub(crate) pixels: Pixels,
-    /// What the file's Exif data say; done where [`Reading::upright`] asks for it.
+    /// The orientation from the Exif data. It is already applied if [`Reading::upright`] is set.
     pub(crate) orientation: Orientation,
 }
 
 type Said<T> = std::result::Result<T, String>;
 
-/// The picture or depth map that `from` holds.
+/// Decodes the picture or depth map in `from`.
 ///
 /// # Errors
-/// Another kind of file, one that is broken or cut short, or too many pixels.
+/// Returns an error if the file is of another kind, broken or truncated, or has too many pixels.
 pub(crate) fn decode<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
     let mut head = Vec::new();
     (from.by_ref().take(16).read_to_end(&mut head))
@@ -99,18 +99,18 @@ pub(crate) fn decode<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decod
     Ok(Decoded { pixels, orientation })
 }
 
-/// The picture in `bytes`, in colour or grey.
+/// Decodes the picture in `bytes`, in colour or grey.
 ///
 /// # Errors
-/// As `decode`; numbers that are no picture's.
+/// Returns the errors of `decode`, and an error if the values are not those of a picture.
 pub fn picture_of(bytes: &[u8], how: Reading) -> Said<(DynamicImage, Orientation)> {
     picture(decode(Cursor::new(bytes), how)?)
 }
 
-/// The picture in the file at `path`, in colour or grey, and how it was turned.
+/// Decodes the colour or grey picture in the file at `path`. Returns the picture and its orientation.
 ///
 /// # Errors
-/// As `decode`; a file that cannot be read, or numbers that are no picture's.
+/// Returns the errors of `decode`, and an error if the file cannot be read or the values are not those of a picture.
 pub fn open_picture(path: &Path, how: Reading) -> Result<(DynamicImage, Orientation)> {
     let file = input::open(path, MOST_PICTURE)?;
     decode(file, how).and_then(picture).map_err(|e| Error::file(path, e))
@@ -131,7 +131,7 @@ enum Kind {
     Image(ImageFormat),
 }
 
-/// What can be done with a picture of phones that is not read, where `head` begins one.
+/// Returns advice if `head` begins an unsupported picture format of phones.
 pub(crate) fn unread_container(head: &[u8]) -> Option<&'static str> {
     let brand = head.get(8..12).filter(|_| head.get(4..8) == Some(b"ftyp"))?;
     match brand {
@@ -141,7 +141,7 @@ pub(crate) fn unread_container(head: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// What a file is by its first bytes.
+/// Returns the kind of a file, from its first bytes.
 fn kind(head: &[u8]) -> Said<Kind> {
     if let Some(why) = unread_container(head) {
         return Err(why.into());
@@ -154,7 +154,7 @@ fn kind(head: &[u8]) -> Said<Kind> {
         Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Bmp | ImageFormat::WebP)) => {
             Ok(Kind::Image(format))
         }
-        // BigTIFF has another number in its head.
+        // BigTIFF has another version number.
         _ if head.starts_with(b"II\x2b\0") || head.starts_with(b"MM\0\x2b") => Ok(Kind::Tiff),
         _ => Err(format!(
             "is not a picture of a kind that is read: {COLOUR_FORMATS}; depth also as OpenEXR or .npy"
@@ -166,7 +166,7 @@ fn broken(why: &dyn std::fmt::Display) -> String {
     format!("is not a whole picture: {why}")
 }
 
-/// A small file may hold a large image.
+/// Checks the number of pixels, because a small file may hold a large image.
 fn check(width: u64, height: u64, most: u64) -> Said<()> {
     if width.saturating_mul(height) > most {
         return Err(format!("has {width}×{height} pixels; {most} in all are the most"));
@@ -214,7 +214,7 @@ fn tiff<R: BufRead + Seek>(from: R, how: Reading) -> Said<Decoded> {
     Ok(Decoded { pixels, orientation })
 }
 
-/// The pixels of a TIFF, where they are of a kind that is read.
+/// Returns the pixels of a TIFF if their type is supported.
 fn tiff_pixels(values: DecodingResult, colours: ColorType, width: u32, height: u32) -> Option<Pixels> {
     use DecodingResult::{U8, U16};
     let image = match (values, colours) {
@@ -248,7 +248,7 @@ fn tiff_plane(values: DecodingResult, shape: (usize, usize)) -> Option<Pixels> {
     Some(Pixels::Plane(Plane { values, most }))
 }
 
-/// A depth map of OpenEXR: its channel of depth, or its colours where they are equal.
+/// Decodes an OpenEXR depth map from its depth channel, or from its colour channels if they are equal.
 fn exr<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
     let broken = |e: exr::error::Error| broken(&e);
     let about = MetaData::read_from_buffered(&mut from, false).map_err(broken)?;
@@ -272,7 +272,7 @@ fn exr<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
     })
 }
 
-/// One channel of OpenEXR.
+/// Reads one channel of an OpenEXR file.
 fn exr_plane<R: BufRead + Seek>(from: &mut R, name: &str) -> Said<Array2<f32>> {
     use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, Vec2};
     from.seek(SeekFrom::Start(0))
@@ -291,13 +291,13 @@ fn exr_plane<R: BufRead + Seek>(from: &mut R, name: &str) -> Said<Array2<f32>> {
     Ok(image.layer_data.channel_data.pixels)
 }
 
-/// The channel of depth, or the three of colour where there is none.
+/// Returns the depth channel, or the three colour channels if there is no depth channel.
 fn exr_channels(headers: &[Header]) -> Said<Vec<String>> {
     let flat = headers.iter().filter(|header| !header.deep);
     let names: Vec<String> = flat
         .flat_map(|header| header.channels.list.iter().map(|channel| channel.name.to_string()))
         .collect();
-    // Layers stand before a channel's name, as in `ViewLayer.Depth.Z`.
+    // Layer names precede the name of a channel, as in `ViewLayer.Depth.Z`.
     let last = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
     for wanted in ["z", "depth", "y", "d"] {
         if let Some(name) = names.iter().find(|name| last(name) == wanted) {
@@ -357,7 +357,7 @@ fn turned_plane(mut plane: Array2<f32>, orientation: Orientation) -> Array2<f32>
     plane.as_standard_layout().into_owned()
 }
 
-/// Whether a picture that was turned so has its height for its width.
+/// Checks whether an orientation swaps width and height.
 pub(crate) fn swaps_sides(orientation: Orientation) -> bool {
     orientation.to_exif() >= 5
 }

@@ -1,19 +1,20 @@
-//! Arrays of `.npy` files. A header may say anything: memory is taken for the bytes that are there, not for the shape
-//! that it names.
+//! Arrays in `.npy` files. Memory is allocated for the bytes present, not for the shape in the header, which may be
+//! false.
 
 use crate::input::decode::Plane;
 use ndarray::{Array, Array2, ArrayView, Dimension};
 use ndarray_npy::{ViewElement, ViewNpyError, ViewNpyExt};
 
-/// What every element that is read is aligned to.
+/// The largest alignment of an element type.
 const ALIGNMENT: usize = 16;
 
-/// The array that a whole `.npy` holds.
+/// Reads the array of a whole `.npy` file.
 ///
 /// # Errors
-/// Another type or number of dimensions, or bytes that are fewer or more than the header says.
+/// Returns an error if the type or the number of dimensions differs or if there are fewer or more bytes than the header
+/// says.
 pub fn read<T: ViewElement + Clone, D: Dimension>(file: &[u8]) -> Result<Array<T, D>, ViewNpyError> {
-    // The values begin behind the header, whose length has 2 bytes in version 1 and 4 in those after it.
+    // The values follow the header, whose length has 2 bytes in version 1 and 4 bytes in later versions.
     let values = match file {
         [_, _, _, _, _, _, 1, _, a, b, ..] => 10 + usize::from(u16::from_le_bytes([*a, *b])),
         [_, _, _, _, _, _, _, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize).saturating_add(12),
@@ -36,14 +37,14 @@ fn view<T: ViewElement + Clone, D: Dimension>(file: &[u8]) -> Result<Array<T, D>
     ArrayView::<T, D>::view_npy(file).map(|view| view.to_owned())
 }
 
-/// What a depth map's `.npy` must be.
+/// The requirement for the `.npy` of a depth map.
 const WANTED: &str = "is not a whole .npy of shape (H, W), (H, W, 1) or (1, H, W) and float16, float32, float64 or whole numbers of 8 to 32 bits";
 
-/// The one plane that a whole `.npy` holds, whatever its numbers: axes of length 1 are left out, where more than two
-/// are there.
+/// Reads the single plane of a whole `.npy` file of any supported number type. If there are more than two axes, those
+/// of length 1 are dropped.
 ///
 /// # Errors
-/// Another shape or type, or bytes that are fewer or more than the header says.
+/// Returns an error if the shape or type differs or if there are fewer or more bytes than the header says.
 pub(crate) fn read_plane(file: &[u8]) -> Result<Plane, String> {
     plane(file).ok_or_else(|| WANTED.to_owned())
 }
@@ -86,10 +87,10 @@ fn plane(file: &[u8]) -> Option<Plane> {
     Some(Plane { values, most })
 }
 
-/// `count` numbers of type `kind`, as NumPy writes it, and the largest that it holds where it is a whole number.
+/// Converts `count` numbers of the NumPy type `kind`. For integers, also returns the largest value of the type.
 fn numbers(kind: &str, bytes: &[u8], count: usize) -> Option<(Vec<f32>, Option<f32>)> {
     let (order, kind) = kind.split_at_checked(1)?;
-    // `|` is for types of one byte, `=` for the machine's own order.
+    // `|` marks types of one byte and `=` the machine's own byte order.
     let is_big = match order {
         ">" => true,
         "=" => cfg!(target_endian = "big"),
@@ -150,7 +151,7 @@ mod tests {
             let memory = [vec![0; shift], bytes.clone()].concat();
             assert_eq!(read::<f64, Ix2>(&memory[shift..]).unwrap(), want);
         }
-        // Headers of any length, as other programs write them.
+        // Other programs write headers of any length.
         for spaces in 0..9 {
             let header = format!(
                 "{{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }}{}\n",

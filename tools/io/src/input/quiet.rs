@@ -1,4 +1,4 @@
-//! Panics of other crates on broken files, as errors.
+//! Conversion of panics in other crates, caused by broken files, to errors.
 
 use std::cell::Cell;
 use std::sync::Once;
@@ -7,8 +7,8 @@ thread_local! {
     static IS_QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `work` gives, or what it said when it panicked; the panic is not printed. `work` must leave nothing behind that
-/// a panic would break.
+/// Runs `work` and returns its result, or its panic message as an error. The panic is not printed. `work` must not
+/// modify state that a panic would leave inconsistent.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -1,4 +1,4 @@
-//! Depth maps of files: one number for each pixel, whatever kind of file holds it.
+//! Depth maps in files of any supported kind: one number for each pixel.
 
 use crate::input::decode::{self, DEPTH_FORMATS, Pixels, Plane, Reading};
 use crate::input::{self, MOST_ARRAY, MOST_PICTURE, npy};
@@ -9,24 +9,23 @@ use image::{DynamicImage, Pixel, Rgb};
 use ndarray::Array2;
 use std::path::Path;
 
-/// A depth map, (H, W), and how its file's Exif data had it turned.
+/// A depth map, (H, W), and the orientation from its file's Exif data.
 #[derive(Debug)]
 pub(crate) struct DepthFile {
     pub(crate) depth: Array2<f32>,
     pub(crate) orientation: Orientation,
 }
 
-/// The numbers of a depth map, (H, W), as they stand in a file of [`DEPTH_FORMATS`], upright. For `normalized` depth
-/// whole numbers are divided by the largest that their type holds. Of colours that are equal, one is taken; alpha is
-/// left out.
+/// Reads the values of a depth map, (H, W), from a file of [`DEPTH_FORMATS`], upright. If `normalized` is set, integers
+/// are divided by the largest value of their type. If the colours are equal, one of them is used. Alpha is ignored.
 ///
 /// # Errors
-/// A file that is missing, cut short, or of another kind.
+/// Returns an error if the file is missing, truncated, or of another kind.
 pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
     read(path, normalized).map(|file| file.depth)
 }
 
-/// [`read_depth`], with how it was turned.
+/// Reads a depth map as [`read_depth`] does, and its orientation.
 pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
     let refuse = |why: String| Error::file(path, why);
     let (plane, orientation) = if has_extension(path, "npy") {
@@ -79,7 +78,7 @@ fn of_image(image: DynamicImage) -> std::result::Result<Plane, String> {
     })
 }
 
-/// One colour of each pixel, where all three are equal everywhere.
+/// Returns one colour of each pixel if all three are equal in every pixel.
 fn equal<T: Copy + PartialEq + Into<f32>>(pixels: impl Iterator<Item = Rgb<T>>) -> Option<Vec<f32>> {
     pixels
         .map(|Rgb([r, g, b])| (r == g && g == b).then(|| r.into()))

@@ -1,4 +1,4 @@
-//! Pictures for people: views and maps as PNG, JPEG or WebP, stacks of them as a moving GIF or WebP.
+//! Export of pictures for people: views and maps as PNG, JPEG or WebP, and stacks of them as an animated GIF or WebP.
 
 use crate::{Error, Result, output, picture};
 use image::codecs::gif::{GifEncoder, Repeat};
@@ -9,20 +9,20 @@ use ndarray::ArrayView3;
 use std::io::Write;
 use std::path::Path;
 
-/// Quality of JPEG and lossy WebP, of 100.
+/// The quality of JPEG and lossy WebP, from 0 to 100.
 const QUALITY: u8 = 90;
-/// Time that a picture of a moving one is shown, ms.
+/// The duration of a frame of an animation, in ms.
 const FRAME_MS: u32 = 100;
-/// The longest side of a WebP, pixels.
+/// The longest side of a WebP, in pixels.
 const WEBP_SIDE: u32 = 16383;
 
-/// Amplitudes, (C, H, W), as a picture; what is over 1 is white, and one laser's is grey.
+/// Converts amplitudes, (C, H, W), to a picture. Values above 1 are clipped, and one laser's are grey.
 pub fn of_amplitude(amplitude: ArrayView3<'_, f32>) -> RgbImage {
     let (_, height, width) = amplitude.dim();
     RgbImage::from_raw(width as u32, height as u32, picture::amplitude_bytes(amplitude)).expect("three bytes a pixel")
 }
 
-/// `picture` at `width` pixels, its sides in proportion; as it is where it is no wider.
+/// Scales `picture` down to a width of `width` pixels and keeps its aspect ratio. A narrower picture stays unchanged.
 pub fn at_width(picture: RgbImage, width: u32) -> RgbImage {
     if picture.width() <= width {
         return picture;
@@ -31,10 +31,10 @@ pub fn at_width(picture: RgbImage, width: u32) -> RgbImage {
     imageops::resize(&picture, width.max(1), height.max(1), FilterType::Triangle)
 }
 
-/// `picture` as lossy WebP of `quality`, 0 to 100.
+/// Encodes `picture` as lossy WebP of `quality`, from 0 to 100.
 ///
 /// # Errors
-/// A picture that is too large for the format.
+/// Returns an error if the picture is too large for the format.
 pub fn webp(picture: &RgbImage, quality: f32) -> Result<Vec<u8>> {
     let (width, height) = picture.dimensions();
     let encoder = webp::Encoder::from_rgb(picture.as_raw(), width, height);
@@ -42,7 +42,7 @@ pub fn webp(picture: &RgbImage, quality: f32) -> Result<Vec<u8>> {
     Ok(encoded.to_vec())
 }
 
-/// `picture` as WebP without loss.
+/// Encodes `picture` as lossless WebP.
 pub fn webp_lossless(picture: &RgbImage) -> Vec<u8> {
     let (width, height) = picture.dimensions();
     webp::Encoder::from_rgb(picture.as_raw(), width, height)
@@ -58,15 +58,15 @@ fn too_large(picture: &RgbImage) -> Error {
     ))
 }
 
-/// Whether `path` is named as a picture that moves: .gif or .webp.
+/// Checks whether the extension of `path` is that of an animation: .gif or .webp.
 pub fn moves(path: &Path) -> bool {
     ["gif", "webp"].iter().any(|e| output::has_extension(path, e))
 }
 
-/// Writes `picture` as what the name says: .png, .jpg or .webp.
+/// Writes `picture` in the format of the file extension: .png, .jpg or .webp.
 ///
 /// # Errors
-/// Another name; a file that cannot be written.
+/// Returns an error if the extension is another or the file cannot be written.
 pub fn write(path: &Path, picture: &RgbImage) -> Result<()> {
     let is = |extension| output::has_extension(path, extension);
     if is("png") {
@@ -85,10 +85,11 @@ pub fn write(path: &Path, picture: &RgbImage) -> Result<()> {
     Err(Error::file(path, "a picture's name must end in .png, .jpg or .webp"))
 }
 
-/// Writes `pictures`, all of one size, ten a second, there and back again, as what the name says: .gif or .webp.
+/// Writes `pictures`, all of the same size, as an animation that plays forward and back at ten frames per second, in
+/// the format of the file extension: .gif or .webp.
 ///
 /// # Errors
-/// Another name; a file that cannot be written.
+/// Returns an error if the extension is another or the file cannot be written.
 pub fn write_moving(path: &Path, pictures: &[RgbImage]) -> Result<()> {
     let back = pictures.iter().skip(1).rev().skip(1);
     let frames = pictures.iter().chain(back);

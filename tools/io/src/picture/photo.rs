@@ -1,11 +1,11 @@
-//! Photos with depth inside, as phones store them: JPEGs whose XMP says GDepth or Dynamic Depth 1.0.
+//! Photos with embedded depth from phones: JPEGs with XMP of GDepth or Dynamic Depth 1.0.
 //!
-//! * GDepth (`developers.google.com/depthmap-metadata`): the depth image lies in the XMP itself, in base64; where it is
-//!   too long for one segment, in extended XMP (Adobe's XMP specification, part 3).
-//! * Dynamic Depth 1.0: the XMP lists the images that stand behind the photo in the file.
+//! * GDepth (`developers.google.com/depthmap-metadata`): the XMP itself contains the depth image in base64. An image
+//!   too long for one segment is in extended XMP (Adobe's XMP specification, part 3).
+//! * Dynamic Depth 1.0: the XMP lists the images that follow the photo in the file.
 //!
-//! A depth image holds d_n from 0, near, to 1, far. `RangeLinear`: d = near + d_n·(far − near). `RangeInverse`, as
-//! portraits have it: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
+//! A depth image holds d_n from 0, near, to 1, far. `RangeLinear`: d = near + d_n·(far − near). `RangeInverse`, which
+//! portrait modes use: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
 
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PHOTO};
@@ -21,38 +21,40 @@ const GDEPTH: &str = "http://ns.google.com/photos/1.0/depthmap/";
 /// The namespaces of Dynamic Depth.
 const DEPTH_MAP: &str = "http://ns.google.com/photos/dd/1.0/depthmap/";
 const ITEM: &str = "http://ns.google.com/photos/dd/1.0/item/";
-/// What an APP1 segment of XMP begins with, and one of extended XMP.
+/// The first bytes of an APP1 segment with XMP, and of one with extended XMP.
 const XMP: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
 const EXTENDED_XMP: &[u8] = b"http://ns.adobe.com/xmp/extension/\0";
-/// The GUID, the length of the whole, and the offset of this part, before each part of extended XMP.
+/// The length of the header of each part of extended XMP: a GUID, the total length, and the offset of the part.
 const EXTENDED_HEAD: usize = 32 + 4 + 4;
-/// Most marks (`<`, `"`, `'`) in XMP: elements and attributes take far more memory than their characters.
+/// The maximum number of marks (`<`, `"`, `'`) in XMP. Elements and attributes take far more memory than their
+/// characters.
 const MOST_MARKS: usize = 1 << 15;
 
-/// What the numbers of a photo's depth mean.
+/// The meaning of the depth values of a photo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
-    /// Linear in distance.
+    /// The values are linear in distance.
     Linear,
-    /// Linear in inverse distance.
+    /// The values are linear in inverse distance.
     Inverse,
 }
 
 /// A photo with depth, upright.
 #[derive(Debug, Clone)]
 pub struct Photo {
-    /// Amplitudes, (3, H, W) in 0..=1.
+    /// The amplitudes, (3, H, W) in 0..=1.
     pub rgb: Array3<f32>,
-    /// d_n, (h, w) in 0..=1: 0 near, 1 far. It shows what the photo shows, stretched.
+    /// The depth d_n, (h, w) in 0..=1: 0 is near and 1 is far. It covers the same field of view as the photo,
+    /// stretched.
     pub depth: Array2<f32>,
-    /// What d_n means.
+    /// The meaning of d_n.
     pub range: Range,
-    /// Distances of d_n = 0 and 1, in metres, where the file says them.
+    /// The distances of d_n = 0 and d_n = 1 in metres, if the file gives them.
     pub range_m: Option<(f64, f64)>,
 }
 
 impl Photo {
-    /// Distances in metres, (h, w), where the file says its range.
+    /// Returns the distances in metres, (h, w), if the file gives its range.
     pub fn metres(&self) -> Option<Array2<f32>> {
         let (near, far) = self.range_m?;
         Some(self.depth.mapv(|d| {
@@ -65,10 +67,10 @@ impl Photo {
     }
 }
 
-/// Reads a photo with depth inside.
+/// Reads a photo with embedded depth.
 ///
 /// # Errors
-/// A file that is missing or broken, or has no depth that is understood; the reason says what can be done.
+/// Returns an error with advice if the file is missing or broken or has no supported depth.
 pub fn read(path: &Path) -> Result<Photo> {
     let bytes = input::bytes(path, MOST_PHOTO)?;
     of_bytes(&bytes).map_err(|why| Error::file(path, why))
@@ -83,7 +85,7 @@ fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
     }
     let (colour, orientation) = decode::picture_of(bytes, Reading::UPRIGHT)?;
     let found = Xmp::read(bytes)?.depth(bytes)?;
-    // It lies as the photo is stored, whatever it says itself.
+    // The depth image has the orientation of the stored photo, whatever its own metadata say.
     let depth = decode::picture_of(&found.image, Reading::AS_STORED);
     let (mut depth, _) = depth.map_err(|why| format!("the depth inside {why}"))?;
     depth.apply_orientation(orientation);
@@ -98,7 +100,7 @@ fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
     })
 }
 
-/// A depth image that was found, still encoded.
+/// A depth image that is still encoded.
 struct Found {
     image: Vec<u8>,
     range: Range,
@@ -191,7 +193,7 @@ impl Found {
     }
 }
 
-/// What XMP says.
+/// Parses XMP.
 fn parse(text: &str) -> std::result::Result<Document<'_>, String> {
     let marks = text.bytes().filter(|byte| matches!(byte, b'<' | b'"' | b'\''));
     if marks.count() > MOST_MARKS {
@@ -200,7 +202,7 @@ fn parse(text: &str) -> std::result::Result<Document<'_>, String> {
     Document::parse(text).map_err(|e| format!("its XMP is broken: {e}"))
 }
 
-/// What the APP1 segments before the picture's own data hold.
+/// Returns the APP1 segments before the image data.
 fn app1_segments(jpeg: &[u8]) -> Vec<&[u8]> {
     const APP1: u8 = 0xE1;
     const START_OF_SCAN: u8 = 0xDA;
@@ -219,7 +221,7 @@ fn app1_segments(jpeg: &[u8]) -> Vec<&[u8]> {
     found
 }
 
-/// The extended XMP that `main` names, of its parts.
+/// Joins the extended XMP that `main` refers to from its parts.
 fn extended(main: &str, parts: &[&[u8]]) -> std::result::Result<String, String> {
     let head = |part: &[u8]| -> Option<(usize, usize)> {
         let number = |at: usize| Some(u32::from_be_bytes(*part.get(at..)?.first_chunk()?) as usize);
@@ -235,7 +237,7 @@ fn extended(main: &str, parts: &[&[u8]]) -> std::result::Result<String, String> 
     }
     let got: usize = named.iter().map(|(_, _, part)| part.len()).sum();
     let length = named.first().map_or(0, |(length, ..)| *length);
-    // Before there is memory for it: a part may say any length.
+    // This check precedes the allocation, because a part may claim any length.
     if got < length {
         return Err(format!("of its extended XMP {got} of {length} bytes are there"));
     }
@@ -250,7 +252,7 @@ fn extended(main: &str, parts: &[&[u8]]) -> std::result::Result<String, String> 
     String::from_utf8(text).map_err(|_| "its extended XMP is no UTF-8".into())
 }
 
-/// A property of XMP, an attribute or an element, anywhere under `node`.
+/// Returns an XMP property, an attribute or an element, anywhere below `node`.
 fn property<'a>(node: Node<'a, '_>, space: &str, name: &str) -> Option<&'a str> {
     node.descendants().find_map(|node| {
         let element = node.has_tag_name((space, name)).then(|| node.text()).flatten();
@@ -258,8 +260,8 @@ fn property<'a>(node: Node<'a, '_>, space: &str, name: &str) -> Option<&'a str> 
     })
 }
 
-/// The bytes of the item of Dynamic Depth that is called `uri`. The items stand one behind the other at the file's end,
-/// in the order of the directory, each with padding behind it; the first is the photo itself.
+/// Returns the bytes of the Dynamic Depth item called `uri`. The items lie at the end of the file, in the order of the
+/// directory, each followed by padding. The first item is the photo itself.
 fn item<'a>(xml: &Document<'_>, jpeg: &'a [u8], uri: &str) -> std::result::Result<&'a [u8], String> {
     let items: Vec<_> = (xml.descendants())
         .filter(|node| node.tag_name().name() == "Item" && property(*node, ITEM, "Mime").is_some())

@@ -1,33 +1,33 @@
-//! SVG pictures: curves in panels side by side, and bars of parts.
+//! SVG plots: curves in panels side by side, and stacked bars.
 
 use crate::{Error, Result, output};
 use plotters::prelude::*;
 use std::io::Write;
 use std::path::Path;
 
-/// Width of a panel and height of the picture, pixels.
+/// The width of a panel and the height of the picture, in pixels.
 const PANEL: (u32, u32) = (460, 360);
-/// Most numbers along x, so that they have room.
+/// The maximum number of labels along x, so that they do not overlap.
 const MOST_LABELS: usize = 12;
 const COLOUR: RGBColor = RGBColor(31, 95, 160);
 
-/// One curve and the words around it.
+/// One curve with its title and labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel<'a> {
-    /// Over the curve.
+    /// The title above the curve.
     pub title: &'a str,
-    /// Along x.
+    /// The label of the x axis.
     pub x: &'a str,
-    /// Along y.
+    /// The label of the y axis.
     pub y: &'a str,
-    /// At least one point, by growing x.
+    /// The points, at least one, in ascending order of x.
     pub points: Vec<(i32, f64)>,
 }
 
-/// Writes `panels` to `path`, an SVG.
+/// Writes `panels` to `path` as SVG.
 ///
 /// # Errors
-/// A point that is not finite, no point at all, or a file that cannot be written.
+/// Returns an error if there is no point, if a point is not finite, or if the file cannot be written.
 pub fn write_svg(path: &Path, panels: &[Panel<'_>]) -> Result<()> {
     let bad = panels.is_empty()
         || panels
@@ -43,19 +43,19 @@ pub fn write_svg(path: &Path, panels: &[Panel<'_>]) -> Result<()> {
     output::write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// A bar of parts, one after another.
+/// A bar of consecutive parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bar {
-    /// Beside the bar.
+    /// The label beside the bar.
     pub label: String,
-    /// Name and length of each part; bars of one picture have the same names.
+    /// The name and length of each part. All bars of a picture have the same names.
     pub parts: Vec<(&'static str, f64)>,
 }
 
-/// Writes `bars` below each other to `path`, an SVG.
+/// Writes `bars`, one below the other, to `path` as SVG.
 ///
 /// # Errors
-/// A length that is not finite or below 0, no bar at all, or a file that cannot be written.
+/// Returns an error if there is no bar, if a length is negative or not finite, or if the file cannot be written.
 pub fn write_bars(path: &Path, title: &str, bars: &[Bar]) -> Result<()> {
     let mut lengths = bars.iter().flat_map(|bar| &bar.parts);
     if bars.is_empty() || !lengths.all(|(_, length)| length.is_finite() && *length >= 0.0) {

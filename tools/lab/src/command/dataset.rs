@@ -1,4 +1,4 @@
-//! `phasefront-lab dataset`: LDI and hologram pairs, resumable, shardable.
+//! `phasefront-lab dataset` makes LDI and hologram pairs. It can resume and can run in shards.
 
 use clap::{Args, ValueEnum};
 use phasefront_command::flags::DisplayFlags;
@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 /// Make a data set: random scenes as layered depth images and their holograms
 ///
-/// Called again with the same folder, it resumes. Where the display's file names an aberration, the
-/// holograms correct it.
+/// If the folder already holds part of the data set, the command resumes. If the display's file names an aberration,
+/// the holograms correct it.
 #[derive(Args)]
 pub(crate) struct Dataset {
     /// Pairs to make
@@ -22,22 +22,23 @@ pub(crate) struct Dataset {
     /// Height and width of a scene, pixels
     #[arg(long, value_name = "PX", default_value_t = 384)]
     size: usize,
-    /// Planes of SM-LBM
+    /// Number of SM-LBM planes
     #[arg(long, value_name = "N", default_value_t = 1000)]
     planes: usize,
-    /// Layers of a layered depth image
+    /// Number of layers of a layered depth image
     #[arg(long, value_name = "N", default_value_t = 5)]
     ldi_layers: usize,
-    /// The same seed gives the same data set
+    /// Seed; the same seed gives the same data set
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
-    /// What the scenes look like
+    /// Look of the scenes
     #[arg(long, value_enum, default_value_t = Like::Objects)]
     scenes_like: Like,
-    /// Pictures (.jpg, .png) for surfaces, of scenes like photographs and of varied ones; the manifest knows them again
+    /// Folder of pictures (.jpg, .png) for the surfaces of photograph-like and varied scenes; the manifest records
+    /// their fingerprint
     #[arg(long, value_name = "DIR")]
     textures: Option<PathBuf>,
-    /// Make every nth pair only, from the ith of 0..n
+    /// Make every nth pair only, starting from the ith of 0..n
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<(usize, usize)>,
     #[command(flatten)]
@@ -49,11 +50,11 @@ pub(crate) struct Dataset {
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Like {
-    /// Many objects, mostly in front of nothing; dark
+    /// Many objects, mostly without a background; dark
     Objects,
-    /// Bright and dark scenes that fill the frame, with textures, steps of depth and thin things as photographs have
+    /// Bright and dark scenes that fill the frame, with textures, depth steps and thin objects like photographs
     Photographs,
-    /// Scenes of every kind: any brightness, textures from white noise to flat, few objects to hundreds of thin ones
+    /// Scenes of every kind: any brightness, textures from white noise to flat, a few objects to hundreds of thin ones
     Varied,
 }
 

@@ -1,4 +1,4 @@
-//! `phasefront-lab evaluate`: the paper's Table 2 on a data set.
+//! `phasefront-lab evaluate` computes the paper's Table 2 on a data set.
 
 use clap::{Args, ValueEnum};
 use phasefront::target::Response;
@@ -14,15 +14,15 @@ use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Judge methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks; brightness
-/// against the truth's, and the share of the modulator's light that passes the aperture
+/// Evaluate methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks;
+/// brightness relative to the truth; and the share of the modulator's light that passes the aperture
 ///
-/// A focal stack is a scene's 15 most frequent depths and 5 random ones.
+/// A focal stack consists of a scene's 15 most frequent depths and 5 random ones.
 #[derive(Args)]
 pub(crate) struct Evaluate {
-    /// Folder of the data set, as `phasefront-lab dataset` makes it
+    /// Folder of the data set, as made by `phasefront-lab dataset`
     data: PathBuf,
-    /// Methods to judge, separated by commas
+    /// Methods to evaluate, separated by commas
     #[arg(
         long,
         value_enum,
@@ -31,42 +31,42 @@ pub(crate) struct Evaluate {
         required_unless_present_any = ["network", "pair"]
     )]
     method: Vec<MethodName>,
-    /// Networks to judge, separated by commas: a bundled one, or an ONNX file
+    /// Networks to evaluate, separated by commas: a bundled network or an ONNX file
     #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
-    /// Numbers that bundled networks compute in [default: int8]
+    /// Precision of the bundled networks [default: int8]
     #[arg(long, value_enum)]
     precision: Option<PrecisionName>,
-    /// Judge the bundled pair of networks for the offset as well; its pre-filter takes the place of each --encoder, so
-    /// that its rows are called deep
+    /// Evaluate the bundled pair of networks for the offset as well; its pre-filter replaces each --encoder, so its
+    /// rows are named deep
     #[arg(long)]
     pair: bool,
-    /// Encoders to judge as well, separated by commas; the complex field always is
+    /// Encoders to evaluate as well, separated by commas; the complex field is always evaluated
     #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
     encoder: Vec<EncoderName>,
-    /// Each encoder with each of these dark thresholds: shares of full light below which phases are drawn to 0
+    /// Dark thresholds to evaluate with each encoder: the share of full light below which phases are drawn to 0
     #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK_THRESHOLD], requires = "encoder")]
     dark_threshold: Vec<f32>,
-    /// Each encoder with each of these numbers of local steps of correction
+    /// Numbers of local correction steps to evaluate with each encoder
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1], requires = "encoder")]
     local_steps: Vec<usize>,
-    /// Each encoder with each of these numbers of steps at the midpoint
+    /// Numbers of midpoint steps to evaluate with each encoder
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0], requires = "encoder")]
     midpoint_steps: Vec<usize>,
-    /// Also where a descent of so many steps from the last of these ends: the ceiling of every encoder, some seconds a
-    /// scene
+    /// Also evaluate the ceiling of every encoder: the end of a gradient descent with this number of steps from the
+    /// last of these settings, which takes some seconds per scene
     #[arg(long, value_name = "N", requires = "encoder")]
     ceiling: Option<usize>,
-    /// z of encoded holograms against the middle of the volume, mm, positive toward the viewer
+    /// z of encoded holograms relative to the middle of the volume, mm, positive toward the viewer
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true)]
     offset_mm: f64,
-    /// Bits of the modulator that encoded holograms are for
+    /// Bits of the modulator for encoded holograms
     #[arg(long, value_name = "N", default_value_t = 8, requires = "encoder")]
     bits: u32,
-    /// Radius of the aperture that is looked through [default: the display's, which holograms are made for]
+    /// Radius of the viewing aperture [default: the display's, which holograms are made for]
     #[arg(long, value_name = "R", requires = "encoder")]
     look_radius: Option<f64>,
-    /// How far its centre lies beside the optical axis, of its radius
+    /// Distance of the viewing aperture's centre from the optical axis, as a fraction of its radius
     #[arg(
         long,
         value_name = "S",
@@ -75,19 +75,19 @@ pub(crate) struct Evaluate {
         requires = "encoder"
     )]
     look_shift: f64,
-    /// Depth that methods are given
+    /// Depth that methods receive
     #[arg(long, value_enum, default_value_t = Depth::Rendered)]
     depth: Depth,
-    /// Which pairs
+    /// Split of the data set
     #[arg(long, value_enum, default_value_t = Split::Test)]
     split: Split,
-    /// Only the first so many of them
+    /// Number of scenes to evaluate, from the start of the split
     #[arg(long, value_name = "N")]
     scenes: Option<usize>,
-    /// Planes of SM-LBM [default: the data set's] and of the sweep [default: what suits the display]
+    /// Planes of SM-LBM [default: the data set's] and of the sweep [default: suits the display]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
-    /// Taps of the sweep's filter [default: what suits its planes and the display]
+    /// Taps of the sweep's filter [default: suits the planes and the display]
     #[arg(long, value_name = "N")]
     taps: Option<usize>,
     /// Hidden layers of the sweep [default: 2]
@@ -96,17 +96,16 @@ pub(crate) struct Evaluate {
     /// Pixels along each side of the sweep's tiles [default: 256]
     #[arg(long, value_name = "N")]
     tile: Option<usize>,
-    /// Chooses the random depths of the focal stacks
+    /// Seed of the random depths in the focal stacks
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
     seed: u64,
-    /// Pixels at each scene's border that do not count; the reach of light at an offset is λ/2p of it: 30 pixels for 6
-    /// mm
+    /// Pixels at each scene's border that do not count; the reach of light is λ/2p of the offset: 30 pixels for 6 mm
     #[arg(long, value_name = "PX", default_value_t = 0)]
     margin: usize,
-    /// Folder for pictures of the worst scenes: input, ours, truth, 4 times the difference
+    /// Folder for pictures of the worst scenes: input, result, truth, and 4 times the difference
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
-    /// Pictures a row
+    /// Number of pictures per table row
     #[arg(long, value_name = "N", default_value_t = 3, requires = "pictures")]
     worst: usize,
     #[command(flatten)]
@@ -115,13 +114,13 @@ pub(crate) struct Evaluate {
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum MethodName {
-    /// The visible image as the field, phase 0
+    /// The visible image as the field, with phase 0
     Rgb,
-    /// SM-LBM of what is visible
+    /// SM-LBM of the visible layer
     Visible,
-    /// SM-LBM of what is visible and the hidden surfaces that the sweep adds
+    /// SM-LBM of the visible layer and the hidden surfaces that the sweep adds
     Filled,
-    /// The plane sweep of what is visible
+    /// The plane sweep of the visible layer
     Sweep,
     /// SM-LBM of all layers
     Layers,
@@ -194,7 +193,7 @@ impl Evaluate {
         Ok(())
     }
 
-    /// Refuses flags that none of the methods takes.
+    /// Returns an error for flags that none of the methods uses.
     fn check_flags(&self) -> Result<()> {
         let has = |wanted: &[MethodName]| self.method.iter().any(|method| wanted.contains(method));
         let sweep = has(&[MethodName::Sweep]);
@@ -311,7 +310,7 @@ impl Evaluate {
     }
 }
 
-/// A name that a file may have: of a path its last part without the extension, no blanks.
+/// Returns a name that a file may have: the last part of a path without the extension and without blanks.
 fn file_stem(name: &str) -> String {
     let stem = Path::new(name).file_stem().unwrap_or_default();
     stem.to_string_lossy().replace(' ', "-")

@@ -1,4 +1,4 @@
-//! `phasefront-lab occlusion`: the six settings of the occlusion study, Fig. 9, pictures and figures.
+//! `phasefront-lab occlusion` runs the six settings of the occlusion study, Fig. 9, and writes pictures and measures.
 
 use clap::Args;
 use ndarray::{Array3, s};
@@ -11,19 +11,19 @@ use phasefront_lab::study::occlusion::{self, SETTINGS, Study};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// White between the views of the comparison, pixels.
+/// The width of the white gap between the views of the comparison, in pixels.
 const GAP: usize = 4;
 
-/// Compare six ways to model occlusion: pictures at the front and rear focus, and figures
+/// Compare six ways to model occlusion: pictures at the front and rear focus, and measures
 ///
-/// The settings are 1 no occlusion, 2 occlusion only from the input, 3 rays on the input, 4 rays on
-/// the complete scene, 5 waves on the input, 6 waves on the complete scene, the reference.
+/// The settings are: 1 no occlusion; 2 occlusion only from the input; 3 rays on the input; 4 rays on the complete
+/// scene; 5 waves on the input; 6 waves on the complete scene, which is the reference.
 #[derive(Args)]
 pub(crate) struct Occlusion {
     /// Folder of a layered depth image [default: the paper's two bars, whose LDI is written too]
     #[arg(long, value_name = "DIR")]
     ldi: Option<PathBuf>,
-    /// Planes that the depths fall on
+    /// Number of planes that depths are rounded to
     #[arg(long, value_name = "N", default_value_t = 256)]
     planes: usize,
     #[command(flatten)]
@@ -81,7 +81,7 @@ impl Occlusion {
     }
 }
 
-/// The views side by side, front focus above rear focus.
+/// Puts the views side by side, with the front focus above the rear focus.
 fn comparison(study: &Study) -> Array3<f32> {
     let (_, height, width) = study.outcomes[0].front.dim();
     let count = study.outcomes.len();

@@ -1,4 +1,4 @@
-//! `phasefront-lab scene`: a random scene, or a model from a file, as a layered depth image.
+//! `phasefront-lab scene` renders a random scene, or a model from a file, as a layered depth image.
 
 use clap::Args;
 use phasefront_command::flags::{OverwriteFlag, parse_size};
@@ -13,19 +13,19 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("what").args(["model", "seed"]).required(true))]
 pub(crate) struct Scene {
-    /// A random scene; the same seed gives the same one
+    /// Seed of a random scene; the same seed gives the same scene
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// A .gltf, .glb or .obj file, fitted to the frame and the volume
+    /// A .gltf, .glb or .obj file, which is fitted to the frame and the volume
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Width and height, pixels
     #[arg(long, value_name = "WxH", default_value = "384x384", value_parser = parse_size)]
     size: (usize, usize),
-    /// Layers: hits kept along a line of sight
+    /// Layers: the number of hits kept along a line of sight
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=64))]
     layers: u8,
-    /// Render by depth peeling on the GPU rather than exactly on the CPU
+    /// Render by depth peeling on the GPU instead of exactly on the CPU
     #[arg(long)]
     gpu: bool,
     /// Folder of the layered depth image: layer_0.png, depth_0.png, layer_1.png …
@@ -35,7 +35,7 @@ pub(crate) struct Scene {
     overwrite: OverwriteFlag,
 }
 
-/// What models are lit by: from the upper left, in front.
+/// The light on models, from the upper left and in front.
 const LIGHT: Light = Light {
     direction: [-0.36, 0.48, 0.8],
     ambient: 0.35,

@@ -1,4 +1,4 @@
-//! `phasefront-lab seeds`: the sweep's fields of a data set's scenes, to train seeded networks on.
+//! `phasefront-lab seeds` computes the sweep's fields of a data set's scenes, which seeded networks are trained on.
 
 use clap::Args;
 use phasefront_command::flags::sweep_for;
@@ -12,21 +12,21 @@ use std::path::PathBuf;
 
 /// Sweep the scenes of a data set on the depths that the training package has put into a folder
 ///
-/// `python -m phasefront_training seeds` makes the depths and calls this. Called again, it resumes.
+/// `python -m phasefront_training seeds` makes the depths and calls this command. If it is called again, it resumes.
 #[derive(Args)]
 pub(crate) struct Seeds {
     /// Folder of the data set
     data: PathBuf,
-    /// Planes of the sweep [default: what suits the display]
+    /// Planes of the sweep [default: suits the display]
     #[arg(long, value_name = "N")]
     planes: Option<usize>,
-    /// Taps of the sweep's filter [default: what suits planes and display]
+    /// Taps of the sweep's filter [default: suits the planes and the display]
     #[arg(long, value_name = "N")]
     taps: Option<usize>,
-    /// Depths of each scene to add: read by a sensor with faults, and refined by the core
+    /// Number of depths to add for each scene: read by a sensor with faults and refined by the core
     #[arg(long, value_name = "N", default_value_t = 0)]
     refined: usize,
-    /// Folder of the depths; the fields are put there too
+    /// Folder of the depths; the command writes the fields there too
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
 }
@@ -34,7 +34,7 @@ pub(crate) struct Seeds {
 impl Seeds {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         output::reading(&self.data)?;
-        // The training package has put the depths there.
+        // The folder already holds the depths of the training package.
         output::folder(&self.output, Holding::Anything)?;
         let manifest = Manifest::read(&self.data)?;
         if manifest.display.colours() != 3 {

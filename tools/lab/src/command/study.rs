@@ -1,6 +1,6 @@
-//! `phasefront-lab study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and
-//! temporally smoothed video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other
-//! displays.
+//! `phasefront-lab study` computes the paper's Fig. 2a and 2b as a table, JSON and a plot. It also studies the benefit
+//! of refined depth and of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep
+//! on other displays.
 
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};
@@ -17,37 +17,37 @@ use phasefront_lab::study::{self, Row, Scenes};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Study how many layers or planes a hologram needs, what the plane sweep's parts and refined depth are worth, and how
-/// much video flickers
+/// Study the number of layers or planes that a hologram needs, the benefit of the plane sweep's parts and of refined
+/// depth, and the flicker of video
 #[derive(Args)]
 pub(crate) struct Study {
-    /// What to study
+    /// The study to run
     #[arg(value_enum)]
     what: What,
-    /// Random scenes
+    /// Number of random scenes
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
     scenes: u16,
     /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768 [default: 384]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(1..=4096))]
     size: Option<u16>,
-    /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192, for sweep and displays
-    /// 200]
+    /// Planes of SM-LBM; in the study of planes, those of the finest hologram [default: 256; for planes 8192, for sweep
+    /// and displays 200]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
     /// Layers of a layered depth image in the study of planes [default: 5]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     ldi_layers: Option<u8>,
-    /// Seed of the first scene; the others follow
+    /// Seed of the first scene; the others use the following seeds
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 48))]
     seed: u64,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Folder of what comes out: NAME.json, and NAME.svg of layers, planes and sweep
+    /// Folder for the results: NAME.json, and NAME.svg for layers, planes and sweep
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
 }
 
-/// Planes of the truth in the studies of the sweep.
+/// The number of planes of the truth in the studies of the sweep.
 const SWEEP_PLANES: u32 = 200;
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -56,13 +56,13 @@ enum What {
     Layers,
     /// Planes of the volume: 32, 128, 512 and 2048 against 8192 (Fig. 2b)
     Planes,
-    /// The plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, beside exact waves
+    /// The plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, compared with exact waves
     Sweep,
-    /// The plane sweep beside exact waves on other displays
+    /// The plane sweep compared with exact waves on other displays
     Displays,
-    /// Holograms of depth that a sensor of 256×192 gave, refined and not, against the truth
+    /// Holograms of depth from a sensor of 256×192, refined and not refined, compared with the truth
     Depth,
-    /// How much the picture of a scene that stands still changes from frame to frame, 30 of each scene
+    /// How much the displayed image of a static scene changes from frame to frame, over 30 frames of each scene
     Flicker,
 }
 
@@ -296,7 +296,7 @@ impl Study {
     }
 
     fn flicker(&self, json: bool) -> Result<()> {
-        /// Of each scene.
+        /// The number of frames of each scene.
         const FRAMES: usize = 30;
         let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
         let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
@@ -349,7 +349,7 @@ impl Study {
             true => row.value as i32,
             false => row.value.ilog2() as i32,
         };
-        // Scenes that equal the finest to the bit have no finite PSNR, and then nor has their mean.
+        // Scenes that equal the finest to the bit have no finite PSNR, so their mean is not finite either.
         let points = |figure: fn(&Row) -> f64| -> Vec<(i32, f64)> {
             (rows.iter().map(|row| (x_of(row), figure(row))))
                 .filter(|(_, y)| y.is_finite())

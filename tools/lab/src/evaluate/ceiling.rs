@@ -1,10 +1,10 @@
-//! The ceiling: the phase map that a gradient descent on one hologram ends at. What any encoder can be measured
-//! against; far too slow for anything else.
+//! The ceiling: the phase map at which a gradient descent on one hologram ends. Every encoder can be compared with it.
+//! It is far too slow for any other use.
 //!
-//! It asks for the amplitudes of a wave at the midpoint, always, and at a few other planes of the volume, drawn anew
-//! for each step. With u the displayed wave at a plane and T the wanted amplitude, the loss is Σ(|u| − T)², its
-//! gradient by the modulator's phases −2·Im(conj(Kᴴ(u − T·u/|u|))·e), e being the phasors shown and K the way to the
-//! plane. Steps are Adam's (Kingma and Ba, 2015).
+//! The descent fits the amplitudes of a wave at the midpoint, in every step, and at a few other planes of the volume,
+//! which each step draws anew. With the displayed wave u at a plane and the wanted amplitude T, the loss is Σ(|u| −
+//! T)². Its gradient with respect to the modulator's phases is −2·Im(conj(Kᴴ(u − T·u/|u|))·e), where e is the displayed
+//! phasors and K the propagation to the plane. The steps are Adam's (Kingma and Ba, 2015).
 
 use num_complex::Complex32;
 use phasefront::Display;
@@ -13,11 +13,11 @@ use phasefront_io::Result;
 use phasefront_io::dice::Dice;
 use rayon::prelude::*;
 
-/// Planes of the volume, beside the midpoint.
+/// The number of planes of the volume in addition to the midpoint.
 const PLANES: usize = 8;
-/// Those of a step.
+/// The number of those planes that a step draws.
 const DRAWN: usize = 2;
-/// Of Adam: how fast it goes at first, and its averages.
+/// The parameters of Adam: the initial step size and the decay of the averages.
 const RATE: f32 = 0.05;
 const MOMENTUM: f32 = 0.9;
 const SPREAD: f32 = 0.99;
@@ -26,15 +26,15 @@ const SPREAD: f32 = 0.99;
 pub(crate) struct Ceiling {
     size: usize,
     aperture_radius: f64,
-    /// z, the way there from the modulator and the way back: the midpoint's first.
+    /// For each plane, the midpoint first: z, and the propagation from the modulator to it and back.
     planes: Vec<(f64, Vec<Propagator>, Vec<Propagator>)>,
 }
 
 impl Ceiling {
-    /// Plans for holograms of `size`×`size` pixels at the modulator of `display`.
+    /// Plans the descent for holograms of `size`×`size` pixels at the modulator of `display`.
     ///
     /// # Errors
-    /// A distance that cannot be propagated.
+    /// Returns an error if a wave cannot be propagated over one of the distances.
     pub(crate) fn new(size: usize, display: &Display) -> Result<Self> {
         let ways = |distance_m: f64| {
             let (pitch_m, colours) = (display.pitch_m(), display.wavelengths_m());
@@ -53,13 +53,13 @@ impl Ceiling {
         })
     }
 
-    /// z of the planes whose amplitudes are asked for, metres.
+    /// Returns z, in metres, of the planes whose amplitudes are fitted.
     pub(crate) fn z_m(&self) -> Vec<f64> {
         self.planes.iter().map(|(z_m, ..)| *z_m).collect()
     }
 
-    /// Takes `phases`, (C, H, W), toward the amplitudes `wanted`, (C, H, W) at each of [`Self::z_m`], over the
-    /// amplitude that full light stands for.
+    /// Moves `phases`, (C, H, W), toward the amplitudes `wanted`, (C, H, W) at each of [`Self::z_m`], which are divided
+    /// by the amplitude of full light.
     pub(crate) fn optimise(&self, phases: &mut [f32], wanted: &[Vec<f32>], steps: usize) {
         let plane = self.size * self.size;
         let colours = phases.par_chunks_exact_mut(plane).enumerate();
@@ -84,14 +84,14 @@ impl Ceiling {
             for at in std::iter::once(0).chain(drawn) {
                 let (_, there, back) = &self.planes[at];
                 let mut missing = shown.clone();
-                // There and back is equally far, so both are padded alike.
+                // Both directions cover the same distance, so they have the same padding.
                 let scratch = &mut scratches[at];
                 there[colour].propagate_through(&mut missing, self.aperture_radius, scratch);
                 for (u, wanted) in missing.iter_mut().zip(wanted[at]) {
                     *u -= *u * (wanted / u.norm().max(1e-12));
                 }
                 back[colour].propagate_through(&mut missing, self.aperture_radius, scratch);
-                // The midpoint counts as much as the planes that are drawn.
+                // The midpoint has the weight of all drawn planes together.
                 let weight = if at == 0 { 1.0 } else { 1.0 / DRAWN as f32 };
                 for ((gradient, missing), e) in gradient.iter_mut().zip(&missing).zip(&shown) {
                     *gradient -= 2.0 * weight * (missing.conj() * e).im;
@@ -114,7 +114,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The squared difference at the midpoint, by which the gradient can be checked.
+    /// Returns the squared difference at the midpoint, to check the gradient.
     fn loss(ceiling: &Ceiling, phases: &[f32], wanted: &[f32]) -> f64 {
         let plane = ceiling.size * ceiling.size;
         let (_, there, _) = &ceiling.planes[0];

@@ -1,5 +1,5 @@
-//! Models from files as scenes: what glTF and OBJ have in common. Each format's own reading is in `gltf_file` and
-//! `obj_file`.
+//! Reads models from files as scenes. This module holds the steps that glTF and OBJ share; `gltf_file` and `obj_file`
+//! read the formats.
 
 mod beside;
 mod gltf_file;
@@ -15,21 +15,22 @@ use phasefront_io::{Error, Result, output};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Part of the frame's height or width that a model fills, whichever it fills first.
+/// The fraction of the frame's height or width that a model fills, whichever it reaches first.
 const FILL: f64 = 0.9;
-/// Part of the volume's depth that a model fills.
+/// The fraction of the volume's depth that a model fills.
 const DEPTH_FILL: f64 = 0.96;
 
-/// Reads a model from a `.gltf`, `.glb` or `.obj` file as a scene for a frame of `height` x `width` pixels: upright,
-/// seen along its −z axis, in the middle of the frame and as large as fits, its depth stretched or pressed to the
-/// volume. With a light, Lambert's shading is written into the vertex colours.
+/// Reads a model from a `.gltf`, `.glb` or `.obj` file as a scene for a frame of `height` x `width` pixels. The model
+/// is upright, seen along its −z axis, in the middle of the frame and as large as fits. Its depth is stretched or
+/// compressed to the volume. With a light, the vertex colours contain Lambert's shading.
 ///
-/// The base colour (glTF) or the diffuse colour (OBJ) is what is seen. Where a surface has no texture coordinates its
-/// texture is left out, where a picture named by an OBJ's material is absent it is white, and a warning is logged.
-/// Textures repeat, whatever the file says. Lines, points and animations are left out.
+/// The visible colour is the base colour (glTF) or the diffuse colour (OBJ). A surface without texture coordinates
+/// loses its texture. If a picture that an OBJ's material names is missing, the surface is white and a warning is
+/// logged. Textures repeat, whatever the file says. Lines, points and animations are ignored.
 ///
-/// The error names the file: absent, not such a model, without triangles, not finite, without height and width,
-/// larger than [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
+/// The error names the file. Reading fails if the file does not exist, is not a model of its format, has no triangles,
+/// has numbers that are not finite, has no height and width, exceeds [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or
+/// names a picture that cannot be read.
 pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
     output::reading(path)?;
     let fail = |reason: String| Error::file(path, reason);
@@ -62,10 +63,10 @@ pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>
     Ok(scene)
 }
 
-/// How a model's own lengths become the scene's.
+/// The conversion from a model's coordinates to the scene's.
 struct Frame {
     middle: [f64; 3],
-    /// Pixels a unit along x and y; parts of the volume a unit along z.
+    /// Pixels per unit along x and y; fractions of the volume per unit along z.
     scale: [f64; 3],
     /// The middle of the frame, in pixels.
     at: [f64; 2],
@@ -74,7 +75,7 @@ struct Frame {
 impl Frame {
     fn around(parts: &[Part], height: usize, width: usize) -> std::result::Result<Self, String> {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        // Only what a triangle names is seen.
+        // Only vertices of triangles are visible.
         let corners = parts
             .iter()
             .flat_map(|part| part.triangles.iter().flatten().map(|&i| part.positions[i as usize]));
@@ -119,7 +120,7 @@ impl Frame {
     }
 }
 
-/// The part's front and, if it is seen, its back.
+/// Makes the meshes of the part's front and, if it is two-sided, of its back.
 fn sides(part: Part, frame: &Frame, light: Option<Light>) -> Vec<Mesh> {
     let normals = if part.normals.is_empty() {
         smooth_normals(&part)
@@ -158,7 +159,7 @@ fn sides(part: Part, frame: &Frame, light: Option<Light>) -> Vec<Mesh> {
     std::iter::once(front).chain(back).collect()
 }
 
-/// Each vertex's mean of the normals of its triangles, by their areas.
+/// Returns, for each vertex, the mean of its triangles' normals, weighted by area.
 fn smooth_normals(part: &Part) -> Vec<[f32; 3]> {
     let mut sums = vec![[0.0f32; 3]; part.positions.len()];
     for t in &part.triangles {
@@ -179,7 +180,7 @@ fn smooth_normals(part: &Part) -> Vec<[f32; 3]> {
     sums
 }
 
-/// The vector at length one; none where it has no length.
+/// Scales the vector to length one. Returns zeros if its length is zero or not finite.
 fn unit(v: [f64; 3]) -> [f64; 3] {
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     if length > 0.0 && length.is_finite() {

@@ -1,10 +1,10 @@
-//! Procedural pictures for surfaces: a [`Pattern`] is one value a texel, which a ramp of colours makes a [`Texture`].
-//! Most of them join their own repeats without a seam; those that do not say so.
+//! Procedural pictures for surfaces. A [`Pattern`] has one value per texel, and a ramp of colours turns it into a
+//! [`Texture`]. Most patterns repeat without a seam; the documentation of the others says so.
 
 use crate::scene::Texture;
 use phasefront_io::dice::Dice;
 
-/// One value in [0, 1] a texel, row by row.
+/// One value in [0, 1] per texel, row by row.
 #[derive(Debug, Clone)]
 pub struct Pattern {
     width: usize,
@@ -13,7 +13,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern whose texel at (x, y), in texels, is `value(x, y)`, held to [0, 1]. Neither size may be zero.
+    /// Makes the pattern whose texel at (x, y), in texels, is `value(x, y)`, clamped to [0, 1]. Neither size may be
+    /// zero.
     pub fn from_fn((width, height): (usize, usize), mut value: impl FnMut(usize, usize) -> f32) -> Self {
         let mut values = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -22,13 +23,13 @@ impl Pattern {
         Self { width, height, values }
     }
 
-    /// The value at column `x` and row `y`.
+    /// Returns the value at column `x` and row `y`.
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
     }
 
-    /// Value noise of several octaves, stretched to span [0, 1]: `cells` lattice cells across and down in the first
-    /// octave, twice as many in each next one, whose weight is `roughness` of the one before.
+    /// Makes value noise of several octaves, stretched to [0, 1]. The first octave has `cells` lattice cells across and
+    /// down. Each further octave has twice as many, with a weight of `roughness` times the weight before.
     pub fn noise(size: (usize, usize), cells: (usize, usize), octaves: u32, roughness: f32, dice: &mut Dice) -> Self {
         let (width, height) = size;
         let mut values = vec![0.0f32; width * height];
@@ -63,8 +64,8 @@ impl Pattern {
         Self { width, height, values }
     }
 
-    /// Stripes, `waves` of them across and down together, bent by `bend` of a stripe times noise. `softness` in
-    /// (0, 1]: the part of a stripe that its edge takes.
+    /// Makes `waves` stripes across and down, bent by noise of amplitude `bend` stripes. `softness` in (0, 1] is the
+    /// fraction of a stripe that its edge takes.
     pub fn stripes(size: (usize, usize), waves: (i32, i32), bend: f32, softness: f32, dice: &mut Dice) -> Self {
         let noise = (bend > 0.0).then(|| Self::noise(size, (3, 3), 3, 0.5, dice));
         Self::from_fn(size, |x, y| {
@@ -74,15 +75,15 @@ impl Pattern {
         })
     }
 
-    /// A checkerboard of `fields` across and down (even numbers repeat without a seam).
+    /// Makes a checkerboard of `fields` across and down. Even numbers repeat without a seam.
     pub fn checks(size: (usize, usize), fields: (usize, usize)) -> Self {
         Self::from_fn(size, |x, y| {
             ((x * fields.0 / size.0 + y * fields.1 / size.1) % 2) as f32
         })
     }
 
-    /// Stripes of any `period`, in texels, whose waves run at `angle` (radians) to the rows; `softness` as of
-    /// [`stripes`](Self::stripes). They join their repeats with a seam.
+    /// Makes stripes of any `period`, in texels, whose waves run at `angle` (radians) to the rows. `softness` is as in
+    /// [`stripes`](Self::stripes). The pattern repeats with a seam.
     pub fn slanted_stripes(size: (usize, usize), period: f64, angle: f64, softness: f32) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self::from_fn(size, |x, y| {
@@ -90,8 +91,8 @@ impl Pattern {
         })
     }
 
-    /// A checkerboard whose fields are `side` texels wide and turned by `angle`, in radians. It joins its repeats with
-    /// a seam.
+    /// Makes a checkerboard whose fields are `side` texels wide and turned by `angle`, in radians. The pattern repeats
+    /// with a seam.
     pub fn slanted_checks(size: (usize, usize), side: f64, angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self::from_fn(size, |x, y| {
@@ -101,7 +102,7 @@ impl Pattern {
         })
     }
 
-    /// Single points of value 1 on 0, `count` of them anywhere, each `radius` texels in radius.
+    /// Draws `count` points of value 1 on 0 at random positions, with a radius of `radius` texels.
     pub fn points(size: (usize, usize), count: usize, radius: f32, dice: &mut Dice) -> Self {
         let mut pattern = Self::from_fn(size, |_, _| 0.0);
         for _ in 0..count {
@@ -111,11 +112,11 @@ impl Pattern {
         pattern
     }
 
-    /// A wall: `courses` rows of `bricks`, every second row set off by half a brick, each brick of its own tone in
-    /// [0.35, 1], joints of `joint` of a course at value 0.
+    /// Makes a wall: `courses` rows of `bricks`, with every second row shifted by half a brick. Each brick has its own
+    /// tone in [0.35, 1]. Joints have value 0 and a width of `joint` times a course.
     pub fn bricks(size: (usize, usize), bricks: usize, courses: usize, joint: f32, dice: &mut Dice) -> Self {
         let tones: Vec<f32> = (0..bricks * courses).map(|_| dice.range(0.35, 1.0) as f32).collect();
-        // A joint is as wide across as down.
+        // Makes joints as wide across as down.
         let aspect = (size.0 as f32 / bricks as f32) / (size.1 as f32 / courses as f32);
         Self::from_fn(size, |x, y| {
             let v = (y as f32 + 0.5) / size.1 as f32 * courses as f32;
@@ -130,12 +131,12 @@ impl Pattern {
         })
     }
 
-    /// Discs on a jittered grid of `count` a side, value 1 on 0, their radius `radius` of a grid cell give or take
-    /// half.
+    /// Makes discs of value 1 on 0 on a jittered grid of `count` per side. The mean radius is `radius` times a grid
+    /// cell, and single radii differ from it by up to half.
     pub fn spots(size: (usize, usize), count: usize, radius: f32, dice: &mut Dice) -> Self {
         let points = jittered(dice, count);
         let radii: Vec<f32> = points.iter().map(|_| radius * dice.range(0.5, 1.5) as f32).collect();
-        // A texel's width in cells: the discs' edges are one texel soft.
+        // The width of a texel in cells. The discs' edges are one texel soft.
         let soft = count as f32 / size.0.min(size.1) as f32;
         Self::from_fn(size, |x, y| {
             let mut value = 0.0f32;
@@ -146,7 +147,8 @@ impl Pattern {
         })
     }
 
-    /// Cells about the points of a jittered grid of `count` a side: each of its own tone, with borders at value 0.
+    /// Makes cells around the points of a jittered grid of `count` per side. Each cell has its own tone, and borders
+    /// have value 0.
     pub fn cells(size: (usize, usize), count: usize, border: f32, dice: &mut Dice) -> Self {
         let points = jittered(dice, count);
         let tones: Vec<f32> = points.iter().map(|_| dice.range(0.2, 1.0) as f32).collect();
@@ -163,7 +165,8 @@ impl Pattern {
         })
     }
 
-    /// Rings about the middle, `count` of them to the edge, bent by `bend` of a ring times noise: wood, targets.
+    /// Makes rings around the middle, `count` of them to the edge, bent by noise of amplitude `bend` rings, like wood
+    /// or targets.
     pub fn rings(size: (usize, usize), count: f32, bend: f32, softness: f32, dice: &mut Dice) -> Self {
         let noise = (bend > 0.0).then(|| Self::noise(size, (3, 3), 3, 0.5, dice));
         Self::from_fn(size, |x, y| {
@@ -174,7 +177,7 @@ impl Pattern {
         })
     }
 
-    /// A smooth run there and back, `turns` (across, down) times.
+    /// Makes a linear gradient from 1 to 0 and back, `turns` (across, down) times.
     pub fn gradient(size: (usize, usize), turns: (i32, i32)) -> Self {
         Self::from_fn(size, |x, y| {
             let t =
@@ -183,8 +186,8 @@ impl Pattern {
         })
     }
 
-    /// Lines of writing in no language: glyphs of a few straight strokes, value 1 on 0. `lines` rows of them, strokes
-    /// `thickness` of a line wide. They join their repeats with a seam.
+    /// Makes lines of writing in no language: glyphs of a few straight strokes, value 1 on 0. There are `lines` rows,
+    /// and strokes are `thickness` times a line wide. The pattern repeats with a seam.
     pub fn strokes(size: (usize, usize), lines: usize, thickness: f32, dice: &mut Dice) -> Self {
         let mut pattern = Self::from_fn(size, |_, _| 0.0);
         let line = size.1 as f32 / lines as f32;
@@ -194,7 +197,7 @@ impl Pattern {
             let mut left = 0.3 * line;
             while left + 0.5 * line < size.0 as f32 {
                 let glyph_width = dice.range(0.3, 0.6) as f32 * line;
-                // Strokes join points of a grid of 3 by 3, each starting where the last one ended.
+                // Strokes join points of a grid of 3 by 3. Each stroke starts at the end of the one before.
                 let mut from = (dice.integer(0, 2), dice.integer(0, 2));
                 for _ in 0..dice.integer(2, 4) {
                     let to = ((from.0 + dice.integer(0, 2)) % 3, (from.1 + dice.integer(1, 2)) % 3);
@@ -210,7 +213,8 @@ impl Pattern {
         pattern
     }
 
-    /// Draws a straight stroke of value 1 between two points, in texels from the top-left corner, `pen` its half width.
+    /// Draws a straight stroke of value 1 between two points, in texels from the top-left corner, with half width
+    /// `pen`.
     pub fn stroke(&mut self, from: [f32; 2], to: [f32; 2], pen: f32) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let square = (along[0] * along[0] + along[1] * along[1]).max(1e-6);
@@ -230,7 +234,7 @@ impl Pattern {
         }
     }
 
-    /// The value at each texel moved toward `other`'s, which repeats where it is smaller, by `amount`.
+    /// Returns the pattern with each value moved toward that of `other` by `amount`. A smaller `other` repeats.
     pub fn mixed(&self, other: &Self, amount: f32) -> Self {
         Self::from_fn((self.width, self.height), |x, y| {
             let value = self.at(x, y);
@@ -238,7 +242,7 @@ impl Pattern {
         })
     }
 
-    /// The picture whose colour, RGB in [0, 1], is `ramp[0]` at value 0, `ramp[1]` at one half and `ramp[2]` at 1.
+    /// Makes a texture whose colour, RGB in [0, 1], is `ramp[0]` at value 0, `ramp[1]` at one half and `ramp[2]` at 1.
     pub fn texture(&self, ramp: [[f32; 3]; 3]) -> Texture {
         let texel = |&value: &f32| {
             let upper = value >= 0.5;
@@ -250,7 +254,7 @@ impl Pattern {
         Texture::sized(self.width, self.height, self.values.iter().map(texel).collect())
     }
 
-    /// `texture` with holes where the value is below one half; the pattern repeats where it is smaller.
+    /// Returns `texture` with holes where the value is below one half. A smaller pattern repeats.
     pub fn cut(&self, texture: &Texture) -> Texture {
         let mut texels = texture.texels().to_vec();
         for (index, texel) in texels.iter_mut().enumerate() {
@@ -261,33 +265,33 @@ impl Pattern {
     }
 }
 
-/// The lattice points beside texel `x` of `size` on a repeating lattice of `count`, and how far between them it lies,
-/// smoothed.
+/// Returns the lattice points beside texel `x` of `size` on a repeating lattice of `count`, and the smoothed position
+/// between them.
 fn lattice_place(x: usize, size: usize, count: usize) -> (usize, usize, f32) {
     let position = (x as f32 + 0.5) * count as f32 / size as f32;
     let below = position as usize;
     (below % count, (below + 1) % count, smooth(position - below as f32))
 }
 
-/// 0 to 1 with level ends.
+/// Rises smoothly from 0 to 1, with slope zero at both ends.
 fn smooth(t: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// A wave of period 1 between 0 and 1; `softness` of half its period is edge.
+/// Returns a wave of period 1 between 0 and 1. `softness` is the fraction of half a period that its edge takes.
 fn wave(t: f32, softness: f32) -> f32 {
     let triangle = (2.0 * (t - t.floor()) - 1.0).abs();
     smooth(((triangle - 0.5) / softness + 0.5).clamp(0.0, 1.0))
 }
 
-/// One point in each cell of a repeating grid of `count` a side, in cells.
+/// Returns one random point in each cell of a repeating grid of `count` per side, in cells.
 fn jittered(dice: &mut Dice, count: usize) -> Vec<[f32; 2]> {
     (0..count * count)
         .map(|_| [0; 2].map(|_| dice.range(0.1, 0.9) as f32))
         .collect()
 }
 
-/// Calls `visit(index, distance in cells)` for the points of the texel's own grid cell and of the eight about it.
+/// Calls `visit(index, distance in cells)` for the points of the texel's own grid cell and of the eight around it.
 fn around(
     size: (usize, usize),
     count: usize,

@@ -1,4 +1,4 @@
-//! Random scenes of three kinds, and what they draw from.
+//! Random scenes of three kinds, and their common parts.
 
 mod ground;
 mod natural;

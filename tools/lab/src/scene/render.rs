@@ -1,4 +1,4 @@
-//! Rendering to layered depth images: exactly on the CPU, and by depth peeling on a GPU.
+//! Rendering to layered depth images: exactly on the CPU, or by depth peeling on a GPU.
 
 mod peel;
 mod raster;

@@ -1,14 +1,14 @@
-//! Solids and sheets as triangle meshes, and their place in a scene.
+//! Solids and sheets as triangle meshes, and their placement in a scene.
 //!
-//! A [`Shape`] has its own axes: x right, y **up**, z toward the viewer (right-handed), about the origin, one unit in
-//! each direction unless said otherwise. [`Shape::place`] turns it into a [`Mesh`].
+//! A [`Shape`] has its own axes: x right, y **up**, z toward the viewer (right-handed). It is centred at the origin and
+//! extends one unit in each direction unless stated otherwise. [`Shape::place`] turns it into a [`Mesh`].
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use crate::scene::{Mesh, Texture};
 
-/// A mesh about the origin, with outward normals.
+/// A mesh around the origin, with outward normals.
 #[derive(Debug, Clone, Default)]
 pub struct Shape {
     positions: Vec<[f64; 3]>,
@@ -17,32 +17,32 @@ pub struct Shape {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Where a shape stands, how it is turned and lit.
+/// The position, rotation and light of a shape.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// Size along the shape's own axes, before it is turned, in pixels.
+    /// The size along the shape's own axes, before rotation, in pixels.
     pub scale_px: [f64; 3],
     /// The rotation, as a matrix of rows.
     pub rotation: [[f64; 3]; 3],
-    /// Parts of the volume's depth that a pixel's length along z counts for.
+    /// The depth, as a fraction of the volume, for a length of one pixel along z.
     pub depth_per_px: f64,
-    /// The origin's place: x and y in pixels from the frame's top-left corner, z in [−½, ½].
+    /// The position of the origin: x and y in pixels from the frame's top-left corner, z in [−½, ½].
     pub centre: [f64; 3],
-    /// Lambert's shading, or none.
+    /// The light for Lambert's shading, or `None` for no shading.
     pub light: Option<Light>,
 }
 
-/// A distant light and what comes from all around.
+/// A distant light and ambient light.
 #[derive(Debug, Clone, Copy)]
 pub struct Light {
-    /// Toward the light, of length one; x right, y up, z toward the viewer.
+    /// The direction toward the light, of length one: x right, y up, z toward the viewer.
     pub direction: [f64; 3],
-    /// The light in the shade, in [0, 1]; the rest is Lambert's cosine.
+    /// The brightness in the shade, in [0, 1]. Lambert's cosine gives the rest.
     pub ambient: f64,
 }
 
 impl Light {
-    /// The brightness, in [0, 1], of a surface with this normal.
+    /// Returns the brightness, in [0, 1], of a surface with this normal.
     pub fn on(&self, normal: [f64; 3]) -> f64 {
         let cosine: f64 = (0..3).map(|i| normal[i] * self.direction[i]).sum();
         self.ambient + (1.0 - self.ambient) * cosine.max(0.0)
@@ -50,13 +50,13 @@ impl Light {
 }
 
 impl Shape {
-    /// A flat square that faces the viewer; it has no back.
+    /// Makes a flat square that faces the viewer. It has no back.
     pub fn sheet() -> Self {
         Self::grid(1, 1, |u, v| [2.0 * u - 1.0, 2.0 * v - 1.0, 0.0])
     }
 
-    /// A sheet of `columns` x `rows` pieces whose points are `point(u, v)`, u and v in [0, 1]. It is seen from where
-    /// u runs right and v up. The texture's top is at v = 1.
+    /// Makes a sheet of `columns` x `rows` pieces with points `point(u, v)`, u and v in [0, 1]. It is visible from the
+    /// side on which u runs right and v runs up. The texture's top is at v = 1.
     pub fn grid(columns: usize, rows: usize, point: impl Fn(f64, f64) -> [f64; 3]) -> Self {
         let mut shape = Self::default();
         for j in 0..=rows {
@@ -82,7 +82,7 @@ impl Shape {
                 *sum = add(*sum, normal);
             }
         }
-        // Where the sheet closes on itself the two edges share their normals.
+        // Where the sheet closes on itself, the two edges share their normals.
         let mut share = |a: u32, b: u32| {
             let (a, b) = (a as usize, b as usize);
             if length(sub(shape.positions[a], shape.positions[b])) < 1e-9 {
@@ -96,14 +96,15 @@ impl Shape {
         shape
     }
 
-    /// A closed outline, counter-clockwise and seen whole from the origin, filled and facing the viewer.
+    /// Fills a closed outline, facing the viewer. The outline must be counter-clockwise and completely visible from the
+    /// origin.
     pub fn polygon(outline: &[[f64; 2]]) -> Self {
         let mut shape = Self::default();
         shape.cap(outline, 1.0, 0.0);
         shape
     }
 
-    /// The same, as thick as z from −1 to 1: front, back and sides.
+    /// Makes a solid of the outline from z = −1 to z = 1, with front, back and sides.
     pub fn prism(outline: &[[f64; 2]]) -> Self {
         let mut shape = Self::default();
         shape.cap(outline, 1.0, 1.0);
@@ -122,7 +123,7 @@ impl Shape {
             for (p, z, uv) in corners {
                 shape.vertex([p[0], p[1], z], normal, uv);
             }
-            // Seen from outside: a and b at the back are joined to b and a in front.
+            // Seen from outside, a and b at the back join b and a in front.
             shape
                 .triangles
                 .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
@@ -130,7 +131,7 @@ impl Shape {
         shape
     }
 
-    /// A cuboid from −1 to 1 along each axis; every face shows the whole texture.
+    /// Makes a cuboid from −1 to 1 along each axis. Every face shows the whole texture.
     pub fn cuboid() -> Self {
         let mut shape = Self::default();
         let faces = [
@@ -157,7 +158,7 @@ impl Shape {
         shape
     }
 
-    /// A sphere of `detail` pieces around, its radius `radius(direction)`.
+    /// Makes a sphere of `detail` pieces around, with the radius `radius(direction)`.
     pub fn ball(detail: usize, radius: impl Fn([f64; 3]) -> f64) -> Self {
         Self::grid(detail, (detail / 2).max(2), |u, v| {
             let (sin_u, cos_u) = libm::sincos(TAU * u);
@@ -168,7 +169,7 @@ impl Shape {
         })
     }
 
-    /// A ring about the z axis, its tube's radius `tube` of one, thinner by that inside one unit.
+    /// Makes a ring around the z axis with an outer radius of one and a tube of radius `tube`.
     pub fn torus(detail: usize, tube: f64) -> Self {
         Self::grid(detail, (detail / 2).max(3), |u, v| {
             let (sin_u, cos_u) = libm::sincos(TAU * u);
@@ -178,7 +179,7 @@ impl Shape {
         })
     }
 
-    /// A cylinder along y, its top's radius `top` of the bottom's: 1 a rod, 0 a cone.
+    /// Makes a cylinder along y. The radius of its top is `top` times that of its bottom: 1 gives a rod, 0 a cone.
     pub fn cylinder(detail: usize, top: f64) -> Self {
         let ring = |r: f64| {
             let turn = move |i: usize| libm::sincos(TAU * i as f64 / detail as f64);
@@ -197,7 +198,7 @@ impl Shape {
             lids.cap(&ring(top), 1.0, 1.0);
         }
         lids.cap(&ring(1.0), -1.0, -1.0);
-        // The caps look along z; the cylinder stands along y.
+        // The caps face along z, but the cylinder runs along y.
         let stand = |[x, y, z]: [f64; 3]| [x, z, -y];
         lids.positions.iter_mut().for_each(|p| *p = stand(*p));
         lids.normals.iter_mut().for_each(|n| *n = stand(*n));
@@ -205,7 +206,7 @@ impl Shape {
         shape
     }
 
-    /// A tube of radius `tube` along the closed curve `curve(t)`, t in [0, 1).
+    /// Makes a tube of radius `tube` along the closed curve `curve(t)`, t in [0, 1).
     pub fn loop_tube(detail: usize, tube: f64, curve: impl Fn(f64) -> [f64; 3]) -> Self {
         Self::grid(detail, 8, |u, v| {
             let (before, here, after) = (curve(u - 1e-3), curve(u), curve(u + 1e-3));
@@ -217,7 +218,7 @@ impl Shape {
         })
     }
 
-    /// The other shape's triangles beside these.
+    /// Adds the triangles of the other shape.
     pub fn append(&mut self, other: &Self) {
         let first = self.positions.len() as u32;
         self.positions.extend(&other.positions);
@@ -227,7 +228,7 @@ impl Shape {
             .extend(other.triangles.iter().map(|t| t.map(|index| index + first)));
     }
 
-    /// The shape moved, turned and scaled within its own axes.
+    /// Returns the shape scaled, rotated and shifted within its own axes.
     pub fn moved(mut self, scale: [f64; 3], rotation: [[f64; 3]; 3], shift: [f64; 3]) -> Self {
         for p in &mut self.positions {
             *p = add(rotate(&rotation, scaled(*p, scale)), shift);
@@ -239,7 +240,7 @@ impl Shape {
         self
     }
 
-    /// The shape as a mesh of the scene. The light is the one before depth is scaled.
+    /// Returns the shape as a mesh of the scene. Shading uses the shape before its depth is scaled.
     pub fn place(&self, place: &Place, texture: Arc<Texture>) -> Mesh {
         let inverse = place.scale_px.map(|s| 1.0 / s);
         let position = |p: &[f64; 3]| {
@@ -266,7 +267,7 @@ impl Shape {
         self.uv.push(uv);
     }
 
-    /// The outline filled at height z, facing +z (`side` 1) or −z (`side` −1).
+    /// Fills the outline at height z, facing +z (`side` 1) or −z (`side` −1).
     fn cap(&mut self, outline: &[[f64; 2]], side: f64, z: f64) {
         let middle = self.positions.len() as u32;
         let count = outline.len() as u32;
@@ -285,8 +286,8 @@ impl Shape {
     }
 }
 
-/// The outline of a star in the unit circle, its inner corners at radius `inner`: at one, a regular polygon of
-/// `2 * points` corners; at cos(π / points), one of `points`.
+/// Returns the outline of a star in the unit circle, with its inner corners at radius `inner`. An `inner` of one gives
+/// a regular polygon of `2 * points` corners, and cos(π / points) gives one of `points` corners.
 pub fn star(points: usize, inner: f64) -> Vec<[f64; 2]> {
     (0..2 * points)
         .map(|i| {
@@ -297,7 +298,7 @@ pub fn star(points: usize, inner: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// The rotation of a unit quaternion [w, x, y, z].
+/// Returns the rotation of a unit quaternion [w, x, y, z].
 pub fn quaternion([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     [
         [
@@ -318,7 +319,8 @@ pub fn quaternion([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// The rotation by `angle` (radians, counter-clockwise as seen from the axis's tip) about `axis`, of length one.
+/// Returns the rotation by `angle` about `axis`, of length one. The angle is in radians, counter-clockwise as seen from
+/// the tip of the axis.
 pub fn turn(axis: [f64; 3], angle: f64) -> [[f64; 3]; 3] {
     let (sin, cos) = libm::sincos(angle / 2.0);
     quaternion([cos, sin * axis[0], sin * axis[1], sin * axis[2]])
@@ -352,7 +354,7 @@ fn length(a: [f64; 3]) -> f64 {
     (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt()
 }
 
-/// The vector at length one; toward the viewer if it has none.
+/// Scales the vector to length one. A vector of length zero becomes the direction toward the viewer.
 fn unit(a: [f64; 3]) -> [f64; 3] {
     let length = length(a);
     if length > 1e-12 {
@@ -375,7 +377,7 @@ mod tests {
             [0.8 * cos, 0.8 * sin, 0.0]
         };
         let hexagon = star(6, 0.75f64.sqrt());
-        // Volumes of the solids that the pieces approach.
+        // The expected volumes are those of the smooth solids.
         vec![
             ("cuboid", Shape::cuboid(), 8.0),
             ("ball", Shape::ball(64, |_| 1.0), 4.0 / 3.0 * TAU / 2.0),
@@ -397,9 +399,9 @@ mod tests {
                 .iter()
                 .map(|t| dot(corner(t, 0), cross(corner(t, 1), corner(t, 2))) / 6.0)
                 .sum();
-            // An eight-sided tube holds a tenth less than a round one.
+            // An eight-sided tube has a tenth less volume than a round one.
             assert!((sum / volume - 1.0).abs() < 0.11, "{name}: volume {sum} for {volume}");
-            // The areas of a closed surface add up to nothing.
+            // The area vectors of a closed surface add up to zero.
             let area = shape.triangles.iter().fold([0.0; 3], |sum, t| {
                 add(
                     sum,
@@ -434,7 +436,8 @@ mod tests {
         let mesh = Shape::cuboid().place(&place, Arc::new(Texture::plain([1.0; 3])));
         let ldi = render_ldi_reference(&Scene { meshes: vec![mesh] }, 20, 40, 2).unwrap();
         for ((y, x), &d) in ldi.layers[0].depth.indexed_iter() {
-            // A quarter turn: 4 pixels to either side, 8 up and down; the front is 100 px nearer than the middle.
+            // After a quarter turn, the box extends 4 pixels to either side and 8 up and down. Its front is 100 px
+            // nearer than its middle.
             if (16..24).contains(&x) && (2..18).contains(&y) {
                 assert!((d - (0.5 - 0.1 - 0.2)).abs() < 1e-6);
                 assert_eq!(ldi.layers[0].rgb[[0, y, x]], 1.0, "lit full in the face");

@@ -1,11 +1,11 @@
-//! The picture on a mesh, and how it is sampled.
+//! The picture on a mesh, and its sampling.
 
 use phasefront_io::{Error, Result};
 
-/// Alpha at and above which a sampled point of a surface is there; below, the surface has a hole.
+/// The alpha from which a sampled point of a surface is solid. Below it the surface has a hole.
 pub(super) const ALPHA_CUT: f32 = 0.5;
 
-/// An RGBA picture of 8 bits that repeats in both directions. Where alpha is below one half the surface has a hole.
+/// An RGBA picture of 8 bits that repeats in both directions. Where alpha is below one half, the surface has a hole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     width: usize,
@@ -14,7 +14,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// A texture of `texels`, row by row. An error if it is empty or the count is not `width * height`.
+    /// Makes a texture of `texels`, row by row. Returns an error if it is empty or the count is not `width * height`.
     pub fn new(width: usize, height: usize, texels: Vec<[u8; 4]>) -> Result<Self> {
         if texels.is_empty() || width.checked_mul(height) != Some(texels.len()) {
             return Err(Error::Input(format!(
@@ -25,13 +25,13 @@ impl Texture {
         Ok(Self { width, height, texels })
     }
 
-    /// [`new`](Self::new) where the caller made the count right and not zero.
+    /// Makes a texture like [`new`](Self::new) from texels whose count the caller guarantees to be right and not zero.
     pub(super) fn sized(width: usize, height: usize, texels: Vec<[u8; 4]>) -> Self {
         debug_assert!(!texels.is_empty() && texels.len() == width * height);
         Self { width, height, texels }
     }
 
-    /// A texture of one colour, RGB in [0, 1].
+    /// Makes a texture of one colour, RGB in [0, 1].
     pub fn plain(rgb: [f32; 3]) -> Self {
         let [r, g, b] = rgb.map(|v| (v * 255.0).round() as u8);
         Self {
@@ -41,23 +41,23 @@ impl Texture {
         }
     }
 
-    /// Width in texels.
+    /// Returns the width in texels.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height in texels.
+    /// Returns the height in texels.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The texels, row by row, RGBA.
+    /// Returns the texels, row by row, RGBA.
     pub fn texels(&self) -> &[[u8; 4]] {
         &self.texels
     }
 
-    /// RGBA in [0, 1] at `uv`, bilinear between the four nearest texel centres; texel (i, j) has its centre at
-    /// ((i + ½) / width, (j + ½) / height).
+    /// Samples RGBA in [0, 1] at `uv`, bilinearly between the four nearest texel centres. The centre of texel (i, j) is
+    /// at ((i + ½) / width, (j + ½) / height).
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 4] {
         let (x0, x1, fx) = neighbours(uv[0], self.width);
         let (y0, y1, fy) = neighbours(uv[1], self.height);
@@ -74,11 +74,11 @@ impl Texture {
     }
 }
 
-/// The two texels beside coordinate `t`, and how far from the first to the second it lies.
+/// Returns the two texels beside coordinate `t`, and its position between them as a fraction.
 fn neighbours(t: f32, size: usize) -> (usize, usize, f32) {
     let position = (t - t.floor()) * size as f32 - 0.5;
     let below = position.floor();
-    // `below` is −1 at least and `size` at most (where rounding made t − ⌊t⌋ one).
+    // `below` is from −1 to `size`. It is `size` if rounding made t − ⌊t⌋ one.
     let wrap = |index: f32| {
         if index < 0.0 { size - 1 } else { index as usize % size }
     };
@@ -103,12 +103,12 @@ mod tests {
         assert_eq!(texture.sample([0.75, 0.75]), [1.0, 1.0, 0.2, 0.0]);
         assert_eq!(texture.sample([0.5, 0.5]), [0.5, 0.5, 0.05, 0.75]);
         assert_eq!(texture.sample([0.375, 0.25]), [0.25, 0.0, 0.0, 1.0]);
-        // Halfway between the last texel and the first of the next repeat, on either side.
+        // These positions are halfway between the last texel and the first texel of the next repeat.
         for u in [0.0, 1.0, -3.0, 7.0] {
             assert_eq!(texture.sample([u, 0.25])[0], 0.5);
         }
         assert_eq!(texture.sample([-0.75, 2.25]), texture.sample([0.25, 0.25]));
-        // The float just below 0 wraps to 1 by rounding.
+        // The largest float below 0 wraps to 1 by rounding.
         assert_eq!(texture.sample([-1e-12, 0.25])[0], 0.5);
     }
 

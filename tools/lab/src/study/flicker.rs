@@ -1,5 +1,5 @@
-//! How much video flickers: a scene that stands still, its depth noisy as a phone's, frame after frame through a
-//! session; and how much the picture that is seen changes from each frame to the next.
+//! Measures the flicker of video. A static scene with depth as noisy as a phone's runs through a session frame by
+//! frame, and the study measures how much the displayed image changes between frames.
 
 use crate::scene;
 use crate::study::refined_depth::{SENSOR, SensorFaults, simulate_sensor};
@@ -9,39 +9,39 @@ use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 
-/// Makes a hologram of a frame, in a session of either kind.
+/// A function that makes a hologram of a frame, in a session of either kind.
 type Process = dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>;
 
-/// Noise and missing readings, new in each frame.
+/// The noise and missing readings, new in each frame.
 const FAULTS: SensorFaults = SensorFaults {
     name: "noise and holes",
     noise: 0.01,
     shift: 0,
     holes: true,
 };
-/// Metres at normalized depth 0 and 1.
+/// The distances, in metres, at normalized depth 0 and 1.
 const RANGE_M: (f32, f32) = (0.5, 2.5);
-/// Frames of a second.
+/// The frame rate.
 const RATE_HZ: u64 = 30;
 
-/// What smooths a session's frames, and how the displayed image is corrected.
+/// The smoothing of a session's frames and the correction of the displayed image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
-    /// Its name in tables.
+    /// The name in tables.
     pub name: &'static str,
-    /// Whether frames have a past: depth is smoothed over time.
+    /// Whether depth is smoothed over time, with the help of earlier frames.
     pub video: bool,
-    /// Whether brightness is [`Brightness::Smoothed`]; if not, it is [`Brightness::FrameMax`].
+    /// Whether brightness is [`Brightness::Smoothed`]. Otherwise it is [`Brightness::FrameMax`].
     pub smoothed: bool,
-    /// As in [`EncoderOptions`].
+    /// The dark threshold, as in [`EncoderOptions`].
     pub dark_threshold: f32,
-    /// As in [`EncoderOptions`].
+    /// The local steps, as in [`EncoderOptions`].
     pub local_steps: usize,
-    /// As in [`EncoderOptions`].
+    /// The midpoint steps, as in [`EncoderOptions`].
     pub midpoint_steps: usize,
 }
 
-/// Makes each frame by itself, as by default.
+/// The default setting: each frame is processed alone.
 const ALONE: Setting = Setting {
     name: "each frame by itself",
     video: false,
@@ -51,7 +51,7 @@ const ALONE: Setting = Setting {
     midpoint_steps: 0,
 };
 
-/// Depth and brightness smoothed.
+/// The setting with depth and brightness smoothed.
 const BOTH: Setting = Setting {
     name: "both",
     video: true,
@@ -59,8 +59,8 @@ const BOTH: Setting = Setting {
     ..ALONE
 };
 
-/// Nothing smoothed, each, and both; then both without correction, and with one step at the midpoint that goes on from
-/// the frame before.
+/// The settings: no smoothing, smoothing of depth, of brightness, and of both. Two more smooth both: without
+/// correction, and with one midpoint step that starts from the previous frame.
 pub const SETTINGS: [Setting; 6] = [
     ALONE,
     Setting {
@@ -87,22 +87,23 @@ pub const SETTINGS: [Setting; 6] = [
     },
 ];
 
-/// What changes from frame to frame: root mean squares over the frames.
+/// The changes between frames, as root mean squares over the frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What smoothed the frames.
+    /// The name of the setting.
     pub setting: &'static str,
-    /// The change of the picture's mean brightness, of that brightness.
+    /// The change of the image's mean brightness, as a fraction of that brightness.
     pub brightness: f64,
-    /// The change of a pixel's amplitude, full light being 1.
+    /// The change of a pixel's amplitude. Full light is 1.
     pub pixel: f64,
 }
 
-/// `frames` frames of random scene `seed`, at (H, W) = 4 times [`SENSOR`], by `method` in each of [`SETTINGS`]. The
-/// displayed image is seen at full light, focused in the middle of the volume. `done` hears of each frame.
+/// Makes `frames` frames of random scene `seed`, at (H, W) = 4 times [`SENSOR`], by `method` in each of [`SETTINGS`].
+/// The displayed image is viewed at full light with the focus in the middle of the volume. `done` is called after each
+/// frame.
 ///
 /// # Errors
-/// Fewer than two frames, or what a session refuses.
+/// Returns an error if there are fewer than two frames or the session fails.
 pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done: &dyn Fn()) -> Result<Vec<Row>> {
     if frames < 2 {
         return Err(Error::Input(
@@ -152,7 +153,8 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
                 let (height, width) = (shape.0 / 2, shape.1 / 2);
                 let mut rgba = vec![0; 4 * height * width];
                 hologram.preview(0.0, height, width, &mut rgba)?;
-                // The preview undoes the scale; the eye sees the light, which is amplitude over scale.
+                // The preview undoes the scale, but the eye sees the light, which is the amplitude divided by the
+                // scale.
                 let light = |byte: &u8| f32::from(*byte) / 255.0 / hologram.scale();
                 let colours = rgba.chunks_exact(4).flat_map(|pixel| &pixel[..3]);
                 seen.push(colours.map(light).collect());

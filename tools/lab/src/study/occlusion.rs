@@ -1,16 +1,14 @@
-//! The study of occlusion (Methods, 'Methods comparison for occlusion modeling', and Fig. 9): six pairs
-//! of input and method on one scene, each looked at from the front and from the rear, and what is
-//! wrong with each, measured.
+//! The study of occlusion (Methods, 'Methods comparison for occlusion modeling', and Fig. 9). It views six pairs of
+//! input and method on one scene from the front and from the rear, and measures the artefacts of each.
 //!
-//! Setting 6, waves on the complete scene, is the reference of every figure. The four artefacts
-//! are measured at the front focus, where Fig. 9 marks them, on regions that the scene itself
-//! gives. With S the surfaces nearer than the middle of both focuses and 'near' the reach of light
-//! between them:
+//! Setting 6, waves on the complete scene, is the reference for every measure. The four artefacts are measured at the
+//! front focus, where Fig. 9 marks them, in regions that follow from the scene. S denotes the surfaces in front of the
+//! middle between the two focuses, and 'near' means within the reach of light between the focuses:
 //!
-//! 1. light of hidden points on S, away from what is visible of the rear;
-//! 2. light of visible points on S, near what is visible of the rear;
-//! 3. light that is missing beside S, near hidden points;
-//! 4. what rays do differently from waves, in all three places.
+//! 1. light of hidden points on S, away from the visible part of the rear;
+//! 2. light of visible points on S, near the visible part of the rear;
+//! 3. missing light beside S, near hidden points;
+//! 4. the difference between rays and waves, in all three regions.
 
 use ndarray::{Array2, Array3, Axis, Zip, s};
 use num_complex::Complex32;
@@ -24,7 +22,7 @@ use phasefront_io::metrics::{self, Comparison};
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 
-/// How light is kept from where it should not go.
+/// The method that models occlusion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Method {
     /// The point-based method.
@@ -36,10 +34,10 @@ enum Method {
 /// One of the six pairs of input and method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setting {
-    /// What the paper calls it.
+    /// The name in the paper.
     pub name: &'static str,
     method: Method,
-    /// Whether the input is the rasterized scene, layer 0 alone.
+    /// Whether the input is the rasterized scene, which has only layer 0.
     rasterized: bool,
 }
 
@@ -77,50 +75,50 @@ pub const SETTINGS: [Setting; 6] = [
     },
 ];
 
-/// How much there is of each artefact at the front focus; `None` where the scene has no place for it.
+/// The amount of each artefact at the front focus. `None` if the scene has no region for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Artefacts {
-    /// 1: root mean square amplitude error on front surfaces out of reach of the visible rear.
+    /// Artefact 1: the root mean square amplitude error on front surfaces out of reach of the visible rear.
     pub leakage_from_occluded: Option<f64>,
-    /// 2: root mean square amplitude error on front surfaces within reach of the visible rear.
+    /// Artefact 2: the root mean square amplitude error on front surfaces within reach of the visible rear.
     pub leakage_from_visible: Option<f64>,
-    /// 3: the part of the energy beside front surfaces, within reach of hidden points, that is missing;
-    /// negative where there is more than there should be.
+    /// Artefact 3: the missing share of the energy beside front surfaces, within reach of hidden points. Negative if
+    /// there is too much energy.
     pub loss_from_occluded: Option<f64>,
-    /// 4: root mean square amplitude difference from waves on the same input; only for ray casting.
+    /// Artefact 4: the root mean square amplitude difference from waves on the same input. Only for ray casting.
     pub geometric_inaccuracy: Option<f64>,
 }
 
-/// What one setting shows, and how good it is.
+/// The views of one setting and their quality.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// Which.
+    /// The setting.
     pub setting: Setting,
-    /// Amplitudes at the front focus, (3, H, W).
+    /// The amplitudes at the front focus, (3, H, W).
     pub front: Array3<f32>,
-    /// Amplitudes at the rear focus, (3, H, W).
+    /// The amplitudes at the rear focus, (3, H, W).
     pub rear: Array3<f32>,
-    /// Against setting 6, at the front focus.
+    /// The comparison with setting 6 at the front focus.
     pub front_quality: Comparison,
-    /// Against setting 6, at the rear focus.
+    /// The comparison with setting 6 at the rear focus.
     pub rear_quality: Comparison,
-    /// At the front focus.
+    /// The artefacts at the front focus.
     pub artefacts: Artefacts,
 }
 
-/// The six settings on one scene.
+/// The results of the six settings on one scene.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// z of the front focus, metres.
+    /// z of the front focus, in metres.
     pub front_z_m: f64,
-    /// z of the rear focus, metres.
+    /// z of the rear focus, in metres.
     pub rear_z_m: f64,
-    /// Settings 1 to 6.
+    /// The outcomes of settings 1 to 6.
     pub outcomes: Vec<Outcome>,
 }
 
-/// The paper's scene: four pairs of vertical bars at both ends of the volume, the front bar of each
-/// hiding the lower half of the rear one, as an LDI of two layers of 320×256 that holds all of it.
+/// Makes the paper's scene: four pairs of vertical bars at both ends of the volume. The front bar of each pair hides
+/// the lower half of the rear one. The LDI has two layers of 320×256, which hold the complete scene.
 pub fn two_bars() -> Ldi {
     const SHAPE: (usize, usize) = (256, 320);
     const FRONT_AMPLITUDE: f32 = 0.3;
@@ -145,11 +143,11 @@ pub fn two_bars() -> Ldi {
     Ldi { layers }
 }
 
-/// Runs the six settings on `ldi`, its depths on `planes` planes. The focuses are the planes before and
-/// behind which one in twenty of its points lie. `progress` hears of the settings done.
+/// Runs the six settings on `ldi`, with its depths rounded to `planes` planes. One in twenty points lies in front of
+/// the front focus, and one in twenty behind the rear focus. `progress` receives the number of finished settings.
 ///
 /// # Errors
-/// A scene without points, and what the methods refuse.
+/// Returns an error if the scene has no points or a method fails.
 pub fn study(ldi: &Ldi, display: &Display, planes: usize, progress: &dyn Fn(usize)) -> Result<Study> {
     let (height, width) = ldi.shape();
     let rasterized = Ldi {
@@ -207,7 +205,7 @@ pub fn study(ldi: &Ldi, display: &Display, planes: usize, progress: &dyn Fn(usiz
     })
 }
 
-/// z of the planes of the 5th and the 95th percentile of all points, front first.
+/// Returns z of the planes at the 5th and the 95th percentile of all points, front first.
 fn focuses(ldi: &Ldi, display: &Display, planes: usize) -> Result<[f64; 2]> {
     let mut depths: Vec<f32> = (ldi.layers.iter())
         .flat_map(|layer| layer.depth.iter().copied().filter(|d| !d.is_nan()))
@@ -222,13 +220,13 @@ fn focuses(ldi: &Ldi, display: &Display, planes: usize) -> Result<[f64; 2]> {
     Ok([last / 20, last - last / 20].map(|i| plane_z_m(plane_of_depth(depths[i], planes), planes, display)))
 }
 
-/// Where the artefacts are looked for.
+/// The regions in which the artefacts are measured.
 struct Regions {
-    /// 1: front surfaces that hidden points alone can shine through.
+    /// Region 1: front surfaces through which only hidden points can shine.
     over_hidden: Array2<bool>,
-    /// 2: front surfaces near what is visible of the rear.
+    /// Region 2: front surfaces near the visible part of the rear.
     over_visible: Array2<bool>,
-    /// 3: beside front surfaces, near hidden points.
+    /// Region 3: pixels beside front surfaces, near hidden points.
     beside: Array2<bool>,
 }
 
@@ -255,13 +253,13 @@ impl Regions {
         }
     }
 
-    /// All of them.
+    /// Returns the union of the regions.
     fn all(&self) -> Array2<bool> {
         &(&self.over_hidden | &self.over_visible) | &self.beside
     }
 }
 
-/// The pixels that have one of `set` within `reach` rows and columns.
+/// Returns the pixels that have a pixel of `set` within `reach` rows and columns.
 fn widened(set: &Array2<bool>, reach: usize) -> Array2<bool> {
     let mut out = set.clone();
     for axis in [1, 0] {
@@ -272,7 +270,7 @@ fn widened(set: &Array2<bool>, reach: usize) -> Array2<bool> {
                 if marked.get(i) == Some(&true) {
                     last = Some(i);
                 }
-                // The pixel `reach` before i sees all of ±reach now.
+                // At this point, all marked pixels within ±reach of pixel i − reach are known.
                 if i >= reach {
                     lane[i - reach] = last.is_some_and(|last| last + 2 * reach >= i);
                 }
@@ -282,7 +280,7 @@ fn widened(set: &Array2<bool>, reach: usize) -> Array2<bool> {
     out
 }
 
-/// The values of all colours of `image` in `region`.
+/// Returns the values of all colours of `image` in `region`.
 fn values<'a>(image: &'a Array3<f32>, region: &'a Array2<bool>) -> impl Iterator<Item = f64> + 'a {
     image.axis_iter(Axis(0)).flat_map(move |plane| {
         plane
@@ -300,7 +298,7 @@ fn rms(a: &Array3<f32>, b: &Array3<f32>, region: &Array2<bool>) -> Option<f64> {
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-/// The energy in a region, `None` where there is none.
+/// Returns the energy in a region, or `None` if it is empty.
 fn energy(image: &Array3<f32>, region: &Array2<bool>) -> Option<f64> {
     let sum: f64 = values(image, region).map(|v| v * v).sum();
     (sum > 0.0).then_some(sum)

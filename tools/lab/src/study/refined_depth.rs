@@ -1,5 +1,5 @@
-//! What the refinement of depth is worth: rendered scenes with simulated sensor depth, and the holograms
-//! of the refined and of the plainly enlarged depth against the truth.
+//! Measures the benefit of depth refinement. It renders scenes, simulates a depth sensor, and compares the holograms of
+//! refined depth and of plainly enlarged depth with the truth.
 
 use crate::scene;
 use ndarray::{Array2, Array3, ArrayView2};
@@ -15,25 +15,25 @@ use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result, metrics};
 use serde::Serialize;
 
-/// (H, W) of the depth sensor: ARKit's.
+/// The shape, (H, W), of the depth sensor, which is ARKit's.
 pub const SENSOR: (usize, usize) = (192, 256);
-/// Display pixels along each side of a sensor's.
+/// The number of display pixels along each side of a sensor pixel.
 pub const RATIO: usize = 4;
 
 /// The faults of a simulated depth sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SensorFaults {
-    /// Its name in tables.
+    /// The name in tables.
     pub name: &'static str,
-    /// Standard deviation of each reading's noise, of the volume's depth.
+    /// The standard deviation of the noise of each reading, as a fraction of the volume's depth.
     pub noise: f32,
-    /// How far depth is shifted against colour, right and down, display pixels.
+    /// The shift of depth from colour, right and down, in display pixels.
     pub shift: usize,
-    /// Whether readings are missing: 40 % of those at edges, and blobs.
+    /// Whether readings are missing: 40 % of those at edges, and those in blobs.
     pub holes: bool,
 }
 
-/// The faults that are studied: the sensor's resolution alone, with each fault, and with all.
+/// The faults in the study: only the sensor's resolution, with each fault, and with all faults.
 pub const SENSOR_FAULTS: [SensorFaults; 5] = [
     SensorFaults {
         name: "256×192",
@@ -67,15 +67,15 @@ pub const SENSOR_FAULTS: [SensorFaults; 5] = [
     },
 ];
 
-/// Depth differences over this are another surface; of the volume.
+/// The depth difference, as a fraction of the volume, above which two readings belong to different surfaces.
 const EDGE: f32 = 0.1;
-/// The share of readings at edges that is missing.
+/// The share of readings at edges that are missing.
 const EDGE_HOLES: f64 = 0.4;
-/// Readings for each blob that has none, and the blob's radius in readings.
+/// The number of readings per missing blob, and the radius of a blob in readings.
 const READINGS_A_BLOB: usize = 4096;
 const BLOB_RADIUS: f64 = 7.0;
 
-/// Reads `depth`, (4h, 4w), with a simulated sensor of (h, w): NaN where there is no reading.
+/// Simulates a reading of `depth`, (4h, 4w), by a sensor of (h, w). Missing readings are NaN.
 pub fn simulate_sensor(depth: ArrayView2<'_, f32>, how: &SensorFaults, seed: u64) -> Array2<f32> {
     let (height, width) = depth.dim();
     let (h, w) = (height / RATIO, width / RATIO);
@@ -119,12 +119,12 @@ pub fn simulate_sensor(depth: ArrayView2<'_, f32>, how: &SensorFaults, seed: u64
     readings
 }
 
-/// Nearly normal, of deviation 1: the sum of twelve uniform numbers.
+/// Returns an approximately normal number of deviation 1: the sum of twelve uniform numbers.
 fn normal(dice: &mut Dice) -> f32 {
     (0..12).map(|_| dice.unit()).sum::<f64>() as f32 - 6.0
 }
 
-/// Holes from the nearest reading, then bilinear.
+/// Fills holes with the nearest reading, then enlarges bilinearly.
 pub fn enlarge(readings: &Array2<f32>) -> Result<Array2<f32>> {
     let mut filled = readings.clone();
     fill_nearest(&mut filled)?;
@@ -140,7 +140,7 @@ pub fn enlarge(readings: &Array2<f32>) -> Result<Array2<f32>> {
     }))
 }
 
-/// As the core refines it along the edges of `rgb`, (3, 4h, 4w).
+/// Refines the readings with the core along the edges of `rgb`, (3, 4h, 4w).
 pub fn refine(readings: &Array2<f32>, rgb: &Array3<f32>) -> Result<Array2<f32>> {
     let (_, height, width) = rgb.dim();
     let shape = readings.dim();
@@ -157,27 +157,28 @@ pub fn refine(readings: &Array2<f32>, rgb: &Array3<f32>) -> Result<Array2<f32>> 
     Ok(refined)
 }
 
-/// How close holograms of one kind of depth come to the truth: means over the scenes.
+/// The quality of holograms of one kind of depth compared with the truth, as means over the scenes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What made the hologram.
+    /// The method that made the hologram.
     pub method: String,
-    /// The name of the sensor's faults; "none" for the rendered depth itself.
+    /// The name of the sensor's faults, or "none" for the rendered depth.
     pub faults: &'static str,
     /// "rendered", "bilinear" or "refined".
     pub depth: &'static str,
-    /// Of the midpoint hologram's amplitude, dB.
+    /// The PSNR of the midpoint hologram's amplitude, in dB.
     pub psnr: f64,
-    /// Of the midpoint hologram's amplitude.
+    /// The SSIM of the midpoint hologram's amplitude.
     pub ssim: f64,
-    /// The share of pixels whose depth is off by over 0.05 of the volume.
+    /// The share of pixels whose depth differs by more than 0.05 of the volume.
     pub wrong_depth: f64,
 }
 
-/// The study on `scenes` random scenes from `seed` on. `done` hears of each finished hologram, [`work`] in all.
+/// Runs the study on `scenes` random scenes, starting from `seed`. `done` is called after each hologram, [`work`] times
+/// in total.
 ///
 /// # Errors
-/// No scenes, or what a method refuses.
+/// Returns an error if there are no scenes or a method fails.
 pub fn study(
     scenes: usize,
     seed: u64,
@@ -242,12 +243,12 @@ pub fn study(
     Ok(rows)
 }
 
-/// The holograms of [`study`].
+/// Returns the number of holograms of [`study`].
 pub fn work(scenes: usize, methods: usize) -> usize {
     scenes * (1 + methods * (1 + 2 * SENSOR_FAULTS.len()))
 }
 
-/// Colour and depth of what is visible: black and farthest where nothing is.
+/// Returns colour and depth of the visible layer. Pixels without a surface are black and farthest.
 pub(crate) fn front(ldi: &Ldi) -> (Array3<f32>, Array2<f32>) {
     let layer = &ldi.layers[0];
     let seen = |y: usize, x: usize| !layer.depth[(y, x)].is_nan();
@@ -287,7 +288,7 @@ mod tests {
         let missing = holes.iter().filter(|d| d.is_nan()).count();
         assert!((80..400).contains(&missing), "{missing}");
         let shifted = simulate_sensor(depth.view(), &SENSOR_FAULTS[3], 1);
-        // The disc's left edge, at pixel 45, is a reading farther right.
+        // The reading farther right sees the disc's left edge, at pixel 45.
         assert!(shifted[(20, 11)] > plain[(20, 11)]);
         assert_eq!(simulate_sensor(depth.view(), &SENSOR_FAULTS[4], 2).len(), 2000);
     }

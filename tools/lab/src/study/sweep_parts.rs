@@ -1,6 +1,6 @@
-//! What the plane sweep's planes, taps, hidden layers, tiles and merged steps are worth, one at a time, beside exact
-//! waves on the same surfaces; on rendered depth, and on simulated sensor depth that the core has refined. And
-//! the sweep on displays that no network was trained for.
+//! Measures the effect of the plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, beside
+//! exact waves on the same surfaces. It uses rendered depth, and simulated sensor depth that the core has refined. It
+//! also measures the sweep on displays that no network was trained for.
 
 use crate::scene;
 use crate::study::Scenes;
@@ -19,10 +19,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::time::Instant;
 
-/// Frames of which the fastest is a sweep's time.
+/// The number of frames from which the fastest gives the time of a sweep.
 const TIMED_FRAMES: usize = 5;
 
-/// The displays of [`displays`] beside the study's own: what differs, as the display's file says it.
+/// The displays of [`displays`], as differences from the default display in the format of a display file.
 pub const DISPLAYS: [&str; 10] = [
     "",
     "pitch_um = 6.4",
@@ -36,46 +36,47 @@ pub const DISPLAYS: [&str; 10] = [
     "offset_mm = 20.0",
 ];
 
-/// How a hologram is made.
+/// The method that makes a hologram.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Propagation {
-    /// SM-LBM of what is visible and so many hidden layers.
+    /// SM-LBM of the visible layer and `hidden` hidden layers.
     Exact { hidden: usize, planes: usize },
-    /// The sweep, with its steps merged or not.
+    /// The sweep, with or without merged steps.
     Sweep { sweep: Sweep, merged: bool },
 }
 
-/// Means over the scenes.
+/// The means over the scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Figures {
-    /// Of the hologram's amplitude, dB.
+    /// The PSNR of the hologram's amplitude, in dB.
     pub psnr: f64,
-    /// Of the hologram's amplitude.
+    /// The SSIM of the hologram's amplitude.
     pub ssim: f64,
 }
 
 /// One setting of the ablation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What is changed: `exact`, `default`, `planes`, `taps`, `hidden`, `between`, `tile` or `merge`.
+    /// The changed part: `exact`, `default`, `planes`, `taps`, `hidden`, `between`, `tile` or `merge`.
     pub part: &'static str,
     /// The setting in words.
     pub setting: String,
-    /// What is changed as a number, for a plot.
+    /// The changed value as a number, for a plot.
     pub value: usize,
-    /// On rendered depth.
+    /// The quality on rendered depth.
     pub clean: Figures,
-    /// On refined depth.
+    /// The quality on refined depth.
     pub refined: Figures,
-    /// The first scene on one thread, the fastest of five frames, ns a pixel; none for exact waves.
+    /// The time for the first scene on one thread, the fastest of five frames, in ns per pixel. `None` for exact waves.
     pub ns_per_pixel: Option<f64>,
 }
 
-/// The ablation on `scenes`, whose true holograms and exact waves have `planes` planes. `done` hears of each finished
-/// hologram, [`ablation_work`] in all.
+/// Runs the ablation on `scenes`. The true holograms and the exact waves have `planes` planes. `done` is called after
+/// each hologram, [`ablation_work`] times in total.
 ///
 /// # Errors
-/// No scenes, a size that a sensor's pixels do not divide, or a display that cannot be swept.
+/// Returns an error if there are no scenes, if a sensor's pixels do not divide the size, or if the display cannot be
+/// swept.
 pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
     check(scenes)?;
     let size = scenes.size;
@@ -144,12 +145,12 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
     Ok(rows)
 }
 
-/// The holograms of [`ablation`].
+/// Returns the number of holograms of [`ablation`].
 pub fn ablation_work(scenes: &Scenes, planes: usize) -> usize {
     2 * scenes.scenes * settings(&scenes.display, planes).len()
 }
 
-/// What is compared: the part that is changed, in words, as a number, and how.
+/// Returns the settings to compare: the changed part, the setting in words, its number, and the method.
 fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usize, Propagation)> {
     let default = Sweep::for_display(display);
     let sweep = |sweep| Propagation::Sweep { sweep, merged: true };
@@ -201,35 +202,35 @@ fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usiz
     settings
 }
 
-/// The sweep on one display, beside exact waves; all against the truth of that display, at its modulator.
+/// The sweep and exact waves on one display, compared with the truth for that display at its modulator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DisplayRow {
-    /// What differs from the default display; empty for that one.
+    /// The difference from the default display, or empty for the default display.
     pub display: String,
-    /// The sweep that suits it.
+    /// The number of planes of the sweep that suits the display.
     pub planes: usize,
-    /// Its taps.
+    /// The number of taps of that sweep.
     pub taps: usize,
-    /// SM-LBM of what is visible, in the truth's planes.
+    /// SM-LBM of the visible layer, with the planes of the truth.
     pub visible: Figures,
-    /// SM-LBM of what is visible and the hidden layers, in the sweep's planes.
+    /// SM-LBM of the visible and the hidden layers, with the planes of the sweep.
     pub filled: Figures,
     /// The sweep.
     pub sweep: Figures,
 }
 
-/// [`DISPLAYS`] on `scenes`, whose own display does not count. `done` hears of each finished hologram,
-/// [`displays_work`] in all.
+/// Measures [`DISPLAYS`] on `scenes`, ignoring the display of `scenes`. `done` is called after each hologram,
+/// [`displays_work`] times in total.
 ///
 /// # Errors
-/// No scenes.
+/// Returns an error if there are no scenes.
 pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<DisplayRow>> {
     check(scenes)?;
     let mut rows = Vec::new();
     for toml in DISPLAYS {
         let display = Display::from_toml(toml)?;
         let sweep = Sweep::for_display(&display);
-        // As `Method::Sweep` does: a near modulator is swept to.
+        // The sweep goes directly to a near modulator, as in `Method::Sweep`.
         let near = sweep::reaches(&display, display.offset_m());
         let z_m = if near { display.offset_m() } else { 0.0 };
         let plan = SweepPlan::new(scenes.size, scenes.size, &display, sweep, z_m)?;
@@ -269,7 +270,7 @@ pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
     Ok(rows)
 }
 
-/// The holograms of [`displays`].
+/// Returns the number of holograms of [`displays`].
 pub fn displays_work(scenes: &Scenes) -> usize {
     3 * scenes.scenes * DISPLAYS.len()
 }
@@ -289,7 +290,7 @@ fn render(scenes: &Scenes, i: u64) -> Result<Ldi> {
     Ok(scene::render_ldi_reference(&scene, size, size, 5)?.quantized())
 }
 
-/// SM-LBM of what is visible and the first `hidden` layers that the sweep adds.
+/// Computes SM-LBM of the visible layer and the first `hidden` layers that the sweep adds.
 fn exact(frame: &RgbdFrame, display: &Display, hidden: usize, planes: usize) -> Result<Array3<Complex32>> {
     let mut layers = filled(frame, display)?.layers;
     layers.truncate(1 + hidden);
@@ -304,7 +305,7 @@ fn swept(plan: &SweepPlan, frame: &RgbdFrame) -> Result<Array3<Complex32>> {
     Ok(field)
 }
 
-/// On one thread, the fastest of [`TIMED_FRAMES`], ns a pixel.
+/// Measures the time on one thread: the fastest of [`TIMED_FRAMES`], in ns per pixel.
 fn time(plan: &SweepPlan, frame: &RgbdFrame) -> Result<f64> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -324,7 +325,7 @@ fn time(plan: &SweepPlan, frame: &RgbdFrame) -> Result<f64> {
     })
 }
 
-/// A midpoint hologram at the modulator.
+/// Propagates a midpoint hologram to the modulator.
 fn to_modulator(mut field: Array3<Complex32>, display: &Display) -> Result<Array3<Complex32>> {
     if display.offset_m() == 0.0 {
         return Ok(field);

@@ -1,4 +1,4 @@
-//! The command `phasefront-lab`: what it makes, and what it refuses before any work.
+//! Tests the command `phasefront-lab`: its outputs, and the inputs that it refuses before any work.
 use crate::folder;
 
 use folder::Folder;
@@ -7,7 +7,8 @@ use std::fs;
 use std::path::PathBuf;
 
 impl Folder {
-    /// The command fails with `code` and one line that holds each of `words`; it leaves no file behind.
+    /// Asserts that the command fails with `code` and one line that contains each of `words`, and leaves no file
+    /// behind.
     fn refuses(&self, arguments: &[&str], code: i32, words: &[&str]) {
         let before = self.files("");
         let errors = self.fails(arguments, code);
@@ -21,7 +22,7 @@ impl Folder {
         assert_eq!(self.files(""), before, "{arguments:?} left a file behind");
     }
 
-    /// The files in the folder `name`, sorted.
+    /// Returns the files in the folder `name`, sorted.
     fn files(&self, name: &str) -> Vec<PathBuf> {
         let entries = fs::read_dir(self.path(name)).unwrap();
         let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();

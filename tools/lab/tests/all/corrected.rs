@@ -1,4 +1,4 @@
-//! SM-LBM with aberration correction against Eq. 5 in f64, plane by plane, and against what is known.
+//! Tests SM-LBM with aberration correction against Eq. 5 in f64, plane by plane, and against known results.
 use crate::reference;
 
 use ndarray::{Array2, Array3, Axis, s};
@@ -35,7 +35,7 @@ fn plane_of(hologram: &Array3<Complex32>, colour: usize) -> Array2<Complex64> {
     widen(plane.as_slice().unwrap(), plane.dim())
 }
 
-/// An aberration with no symmetry: a shift, a defocus and an astigmatism, all growing with z.
+/// Returns an asymmetric aberration: a shift, a defocus and an astigmatism, all growing with z.
 fn kernel(z: f64, lambda: f64, mu: f64, nu: f64) -> Complex64 {
     let shift = mu * 6e-6 + nu * (1e-5 * (1.0 + z / 3e-3));
     let defocus = 0.3e-3 * lambda * (mu * mu - 0.5 * nu * nu) * (1.0 + z / 6e-3);
@@ -60,7 +60,7 @@ fn agrees_with_equation_5_plane_by_plane() {
         let ours = hologram(&ldi, planes, &correction);
         let z = |k: usize| volume / 2.0 - volume * (k as f64 + 0.5) / planes as f64;
         let plane_of_depth = |d: f32| ((f64::from(d) * planes as f64) as usize).min(planes - 1);
-        // Φ(z) by its two neighbours.
+        // Φ(z) is interpolated between its two neighbours.
         let phi = |z: f64, lambda: f64, mu: f64, nu: f64| {
             let next = z_m.partition_point(|at| *at <= z);
             if next == 0 || next == z_m.len() {
@@ -135,7 +135,7 @@ fn kernels_of_one_change_nothing() {
 fn a_shift_moves_the_hologram() {
     let ldi = random_ldi((64, 72), 2);
     let display = Display::default();
-    // Two pixels right, three down; the plane is that much larger than it must be.
+    // The shift is two pixels right and three down, and the plane is larger than necessary by this amount.
     let (h, w) = shape_for(&ldi);
     let shift = |_: f64, _: f64, mu: f64, nu: f64| Complex64::from_polar(1.0, -2.0 * PI * 8e-6 * (2.0 * mu + 3.0 * nu));
     let correction = Correction::sampled(vec![0.0], (h + 3, w + 2), &display, shift).unwrap();
@@ -152,7 +152,7 @@ fn a_shift_moves_the_hologram() {
 
 #[test]
 fn a_defocus_moves_the_focus() {
-    // A display that needs the front of the volume 0.4 mm nearer and leaves its rear as it is.
+    // This display needs the front of the volume 0.4 mm nearer and leaves the rear unchanged.
     let (frame, moved_m) = ((96, 96), 0.4e-3);
     let display = Display::default();
     for (depth, ahead_m) in [(0.0, moved_m), (0.5, moved_m / 2.0), (1.0, 0.0)] {
@@ -166,12 +166,12 @@ fn a_defocus_moves_the_focus() {
             depth: Array2::from_elem(frame, depth),
         }])
         .unwrap();
-        // At half way the mean of the two kernels acts: two images, each of half the amplitude.
+        // Halfway, the mean of the two kernels applies: two images, each with half the amplitude.
         let defocus = move |z: f64, lambda: f64, mu: f64, nu: f64| {
             let ahead_m = if z > 0.0 { moved_m } else { 0.0 };
             let f2 = mu * mu + nu * nu;
             let bend = lambda * f2 / (1.0 + (1.0 - lambda * lambda * f2).sqrt());
-            // ASM by −ahead: the field at z + ahead is then the image.
+            // ASM by −ahead makes the field at z + ahead the image.
             Complex64::from_polar(1.0, 2.0 * PI * ahead_m * bend)
         };
         let ends = vec![display.z_of_depth(0.995), display.z_of_depth(0.005)];
@@ -228,7 +228,7 @@ fn what_cannot_be_computed_is_refused() {
 
 #[test]
 fn too_many_propagations_are_refused_before_they_begin() {
-    // Points on every one of 600 planes, with a kernel for each: 600²/2 is over 512²/2.
+    // Every one of 600 planes has points and its own kernel: 600²/2 is more than 512²/2.
     let planes = 600;
     let display = Display::default();
     let ldi = Ldi::new(vec![LdiLayer {
@@ -251,7 +251,7 @@ fn too_many_propagations_are_refused_before_they_begin() {
     );
 }
 
-/// Coefficients that change over depth, and kernels put between: against a kernel of each plane's own.
+/// Compares interpolated kernels for coefficients that change over depth with a separate kernel for each plane.
 #[test]
 fn coefficients_that_change_over_depth_are_followed() {
     let ldi = random_ldi((48, 56), 3);
@@ -295,7 +295,7 @@ fn one_correction_over_the_frame_is_the_fourier_filter() {
     let ours = spatial::hologram(&ldi, &display, 7, &spatial, &|_, _| {}).unwrap();
     for colour in 0..3 {
         let error = relative_error(&plane_of(&ours, colour), &plane_of(&filtered, colour));
-        // What the cut of the sub-hologram leaves out: up to 0.0505, in blue.
+        // The truncation of the sub-hologram causes an error of up to 0.0505, in blue.
         assert!(error < 0.06, "{colour}: {error}");
     }
 }

@@ -1,4 +1,4 @@
-//! Evaluation on small data sets made on the fly, against the same figures computed apart.
+//! Tests the evaluation on small generated data sets against separately computed metrics.
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::target::Aberration;
@@ -22,7 +22,7 @@ use std::process::Command;
 const SIZE: usize = 48;
 const PLANES: usize = 10;
 
-/// A data set of 80 pairs of which only the two of the test split are made, 78 and 79.
+/// A data set of 80 pairs, of which only the two in the test split exist: 78 and 79.
 struct Data {
     dir: tempfile::TempDir,
     manifest: Manifest,
@@ -178,7 +178,7 @@ fn the_truth_is_the_truth_and_what_is_visible_is_nearer_to_it_than_the_image() {
     assert!(visible.focal_ssim > rgb.focal_ssim);
 }
 
-/// Fig. 8: where a data set's holograms correct an aberration, all are looked at through it.
+/// Tests that the holograms of a data set that corrects an aberration are all viewed through it (Fig. 8).
 #[test]
 fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let cylinder = Aberration::new([[2.0, 4.0, 0.0, 0.0, 0.0]; 3]).unwrap();
@@ -189,10 +189,11 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let display = Display::default();
     let layers = || Method::layers(&display, PLANES);
     assert!(psnr(&plain, layers()) > 100.0);
-    // What corrects nothing is blurred.
+    // Holograms without a correction are blurred.
     let blurred = psnr(&corrected, layers());
     assert!(blurred < 25.0, "{blurred}");
-    // The correcting holograms look through the cylinder as the others do without: but for light over the rim.
+    // The corrected holograms look the same through the cylinder as the others without it, except for light beyond the
+    // border.
     let z_m = [0.0, 1e-3];
     let see = |data: &Data| {
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
@@ -229,7 +230,8 @@ fn the_ceiling_is_above_every_encoder() {
     assert!(lifted.focal_psnr > plain.focal_psnr, "{plain:?} {lifted:?}");
 }
 
-/// At an offset the modulator's frame is too small for the light at its border; away from there it shows the field.
+/// At an offset the modulator's frame is too small for the light at its border. Away from the border it reproduces the
+/// field.
 #[test]
 fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
     let data = Data::new();
@@ -250,8 +252,8 @@ fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
     assert!(inner > whole + 0.5 && inner > 18.0, "{whole} {inner}");
 }
 
-/// A correction for the aperture that is looked through shows more than one for another; one beside the axis shows
-/// less.
+/// A correction for the viewing aperture gives a better image than a correction for another aperture, and an off-axis
+/// aperture gives a worse one.
 #[test]
 fn what_is_shown_depends_on_the_aperture() {
     let data = Data::new();
@@ -334,7 +336,8 @@ fn encoded_fields_are_judged_as_their_files_look() {
         let ours = row.scenes[0].1;
         assert!(ours.brightness > 0.8 && ours.brightness < 1.2, "{ours:?}");
         assert!(ours.light > 0.01 && ours.light < 0.9, "{ours:?}");
-        // One is padded for the volume, the other not at all, and the aperture's edge falls between other frequencies.
+        // One is padded for the volume and the other is not, so the aperture's edge falls between different
+        // frequencies.
         assert!(
             (ours.amplitude_psnr - direct.psnr_overall).abs() < 1.0,
             "{ours:?} {direct:?}"
@@ -344,7 +347,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
 
 #[test]
 fn a_focal_stack_is_the_fullest_bins_and_random_others() {
-    // Bin 2k of the first 40 holds 40 − k pixels, the others none; two pixels are no hit.
+    // Bin 2k of the first 40 bins holds 40 − k pixels, and the others hold none. Two pixels have no hit.
     let mut depths: Vec<f32> = (0..20)
         .flat_map(|k| std::iter::repeat_n((2 * k) as f32 / 200.0 + 0.001, 40 - k))
         .collect();
@@ -456,7 +459,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
     refused(&["--method", "rgb", "--dark-threshold", "0"], 2, "--encoder");
 }
 
-/// A pre-filter takes the place of every encoder, once.
+/// Tests that a pre-filter replaces all encoders, once.
 #[test]
 fn a_pairs_rows_are_deep() {
     let data = Data::new();

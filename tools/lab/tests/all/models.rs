@@ -1,4 +1,4 @@
-//! Models from glTF, GLB and OBJ files: what is seen of them, what is done without, what is refused.
+//! Tests models from glTF, GLB and OBJ files: their rendered images, ignored features, and refused files.
 use phasefront_io::ldi::Ldi;
 use phasefront_lab::scene::shapes::Light;
 use phasefront_lab::scene::{MAX_MODEL_TRIANGLES, read_model, render_ldi_reference};
@@ -11,13 +11,13 @@ const GREEN: [f32; 3] = [0.0, 1.0, 0.0];
 const BLUE: [f32; 3] = [0.0, 0.0, 1.0];
 const WHITE: [f32; 3] = [1.0; 3];
 
-/// Reads a model and renders two layers of 40 x 20 pixels: a square fills columns 11 to 28 and rows 1 to 18.
+/// Reads a model and renders two layers of 40×20 pixels: a square fills columns 11 to 28 and rows 1 to 18.
 fn seen(path: &Path) -> Ldi {
     let scene = read_model(path, 20, 40, None).unwrap();
     render_ldi_reference(&scene, 20, 40, 2).unwrap()
 }
 
-/// The colours in the middle of the square's quarters: top left, top right, bottom left, bottom right.
+/// Returns the colours at the centres of the square's quarters: top left, top right, bottom left, bottom right.
 fn quarters(ldi: &Ldi) -> [[f32; 3]; 4] {
     let layer = &ldi.layers[0];
     [(5, 15), (5, 24), (14, 15), (14, 24)].map(|(y, x)| {
@@ -30,7 +30,7 @@ fn hits(ldi: &Ldi, layer: usize) -> usize {
     ldi.layers[layer].depth.iter().filter(|d| !d.is_nan()).count()
 }
 
-/// Red, green, blue, white, as a PNG; the last one's alpha as given.
+/// Encodes a PNG of red, green, blue and white pixels. The last pixel has the given alpha.
 fn picture(alpha: u8) -> Vec<u8> {
     let mut image = image::RgbaImage::new(2, 2);
     for (index, colour) in [
@@ -49,7 +49,7 @@ fn picture(alpha: u8) -> Vec<u8> {
     png.into_inner()
 }
 
-/// A square from −1 to 1 with that picture, as glTF's JSON and its buffer.
+/// Returns a square from −1 to 1 with that picture, as glTF's JSON and its buffer.
 fn square() -> (Value, Vec<u8>) {
     let mut buffer = Vec::new();
     let positions = [[-1.0f32, -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]];
@@ -108,7 +108,7 @@ fn glb(json: &Value, buffer: &[u8]) -> Vec<u8> {
     file
 }
 
-/// The square, changed, as a file.
+/// Writes the square to a file after `change`.
 fn changed(folder: &Path, change: impl FnOnce(&mut Value)) -> PathBuf {
     let (mut json, buffer) = square();
     change(&mut json);
@@ -181,7 +181,7 @@ fn nodes_turn_mirror_and_stack() {
 #[test]
 fn depth_fills_the_volume_near_to_far() {
     let folder = tempfile::tempdir().unwrap();
-    // Two squares, the second smaller and behind, at the right.
+    // There are two squares. The second is smaller, behind the first, and at the right.
     let path = changed(folder.path(), |json| {
         json["scenes"][0]["nodes"] = json!([0, 1]);
         json["nodes"] = json!([{"mesh": 0}, {"mesh": 0, "translation": [0, 0, -40]}]);
@@ -244,7 +244,7 @@ fn without_texture_coordinates_the_plain_and_vertex_colours_are_seen() {
         json["meshes"][0]["primitives"][0]["attributes"] = json!({"POSITION": 0, "COLOR_0": 2});
     });
     assert_eq!(quarters(&seen(&path)), [RED; 4]);
-    // A linear factor of 0.5 is 0.73 to the eye.
+    // A linear factor of 0.5 is 0.73 in sRGB.
     let path = changed(folder.path(), |json| {
         json["materials"][0]["pbrMetallicRoughness"] = json!({"baseColorFactor": [0.5, 0.5, 0.5, 1]});
     });
@@ -353,7 +353,7 @@ fn nodes_may_lie_as_deep_as_they_like() {
     assert_eq!(quarters(&seen(&deep))[0], RED);
 }
 
-/// Files that a model names are regular ones of its own folder.
+/// Files that a model names must be regular files in its own folder.
 #[test]
 fn a_model_reads_nothing_but_its_folder() {
     let all = tempfile::tempdir().unwrap();
@@ -376,7 +376,7 @@ fn a_model_reads_nothing_but_its_folder() {
         if uri != "file:///etc/passwd" {
             refused(&obj(&folder, OBJ), reason);
         }
-        // A library of materials that cannot be read leaves surfaces white, as one that is not there.
+        // An unreadable material library leaves surfaces white, as a missing one does.
         let text = OBJ.replace("model.mtl", uri);
         assert_eq!(quarters(&seen(&obj(&folder, &text))), [WHITE; 4]);
     }
@@ -391,7 +391,7 @@ fn a_model_reads_nothing_but_its_folder() {
 #[test]
 fn a_small_picture_of_many_pixels_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    // Two lines of 2²⁵ pixels and one more, all black.
+    // The picture has 2²⁶ pixels and one more row, all black.
     let mut png = Vec::new();
     let mut encoder = png::Encoder::new(&mut png, 1 << 14, (1 << 12) + 1);
     encoder.set_color(png::ColorType::Grayscale);
@@ -404,7 +404,7 @@ fn a_small_picture_of_many_pixels_is_refused() {
     refused(&path, "16384×4097 pixels; 67108864 in all are the most");
 }
 
-/// No file cut short and no file with a wrong byte makes it panic; each error is one line.
+/// Neither a truncated file nor a file with a wrong byte causes a panic. Each error is one line.
 #[test]
 fn damaged_glb_never_panics() {
     let folder = tempfile::tempdir().unwrap();

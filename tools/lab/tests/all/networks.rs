@@ -1,4 +1,4 @@
-//! The bundled networks load, and the fast path gives what tract gives.
+//! Tests that the bundled networks load and that the fast path gives the same results as tract.
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Display, Method, Network, RgbdFrame};
@@ -22,7 +22,8 @@ fn numbers(precision: Precision) -> network::Precision {
     }
 }
 
-/// A rendered frame as network input, planes of `kind`; a seed is its colours, turned.
+/// Returns a rendered frame as network input, with the planes of `kind`. A seed consists of the frame's colours,
+/// rotated in phase.
 fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
     let scene = scene::random_scene(11, height, width);
     let ldi = scene::render_ldi_reference(&scene, height, width, 1).unwrap();
@@ -53,13 +54,13 @@ fn pairs_are_for_their_offset_and_display() {
     }
     let none = |display: Display| pair_for(&display, Precision::Int8).is_none();
     assert!(none(Display::default().with_offset_m(3e-3).unwrap()));
-    // Where the encoder would refuse its pre-filter.
+    // The encoder would refuse its pre-filter here.
     assert!(none(Display::default().with_offset_m(6.05e-3).unwrap()));
     assert!(none(Display::from_toml("pitch_um = 6.4").unwrap()));
 }
 
-/// Runs `network` on the fast path and on stock tract, at an odd size and an even one.
-/// (Tract takes no odd sides at half the resolution.)
+/// Runs `network` on the fast path and on stock tract, at an odd size and an even one. (Tract does not support odd
+/// sides at half the resolution.)
 fn assert_agrees_with_tract(name: &str, network: &Network, precision: Precision) {
     assert_eq!(network.precision(), numbers(precision));
     let sizes = if name.starts_with("half") {
@@ -83,7 +84,8 @@ fn assert_agrees_with_tract(name: &str, network: &Network, precision: Precision)
         let error = mean_square(&mut ours.iter().zip(tracts).map(|(a, b)| a - b));
         let signal = mean_square(&mut tracts.iter().copied());
         let decibels = 10.0 * (signal / error).log10();
-        // Engines round int8 differently by one step at times, which adds up over layers; f32 differs by its last bits.
+        // Engines sometimes round int8 differently by one step, which accumulates over layers. With f32, only the last
+        // bits differ.
         let least = match precision {
             Precision::Int8 if name == "rgbd-30" => 25.0,
             Precision::Int8 => 30.0,
@@ -113,14 +115,14 @@ fn the_fast_path_of_networks_in_files_agrees_with_tract() {
     }
 }
 
-/// dB, of amplitudes.
+/// Returns the PSNR of amplitudes, in dB.
 fn amplitude_psnr(field: &Array3<Complex32>, truth: &Array3<Complex32>) -> f64 {
     let figures = metrics::compare(field.mapv(|u| u.norm()).view(), truth.mapv(|u| u.norm()).view());
     figures.unwrap().psnr_overall
 }
 
-/// To the paraxial order a hologram depends on λ·z/p² alone: a display of the same or a smaller λ·V/p² is served as
-/// well as the one a network was trained for, by its own exact hologram.
+/// To paraxial order a hologram depends on λ·z/p² alone. A network therefore serves a display with the same or a
+/// smaller λ·V/p² as well as the display it was trained for, compared with that display's own exact hologram.
 #[test]
 fn other_displays_are_served_by_physics() {
     let (height, width) = (128, 160);
@@ -154,8 +156,8 @@ fn other_displays_are_served_by_physics() {
         let other = psnr(toml);
         assert!(other > trained - 0.5, "{toml}: {other} dB for {trained} dB");
     }
-    // A network for twice the depth serves the paper's display too, and one of twice its λ·V/p² better than the
-    // visible waves do.
+    // A network for twice the depth also serves the paper's display, and serves a display with twice its λ·V/p² better
+    // than visible waves do.
     let wide = Arc::new(Network::from_onnx(include_bytes!("../../../../models/rgbd-15-wide.onnx")).unwrap());
     assert!(psnr_of(&wide, "") > trained - 0.5);
     let twice = "pitch_um = 5.66";
@@ -187,7 +189,7 @@ fn displays_beyond_what_was_trained_are_refused() {
     cylinder.check_display(&Display::default()).unwrap();
     let why = cylinder.check_display(&Display::from_toml("volume_depth_mm = 3").unwrap());
     assert!(why.unwrap_err().to_string().contains("of one display"));
-    // A pre-filter too serves the displays of one λ·offset/p².
+    // A pre-filter also serves all displays with the same λ·offset/p².
     let pair = pair_for(&Display::default().with_offset_m(6e-3).unwrap(), Precision::Int8).unwrap();
     let fine = Display::from_toml("pitch_um = 4\nvolume_depth_mm = 1.5").unwrap();
     pair.prefilter

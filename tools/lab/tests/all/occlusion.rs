@@ -1,4 +1,4 @@
-//! The occlusion study on the paper's scene: its order, and each artefact where Fig. 9 marks it.
+//! Tests the occlusion study on the paper's scene: the order of its settings, and each artefact where Fig. 9 marks it.
 use ndarray::Array2;
 use phasefront::Display;
 use phasefront_io::ldi::{Ldi, LdiLayer};
@@ -14,7 +14,7 @@ fn the_artefacts_are_where_the_paper_sees_them() {
     };
     let present = |values: [Option<f64>; 6]| values.map(|v| v.unwrap());
 
-    // 6 is the reference; of the others waves come first, and no occlusion at all last.
+    // Setting 6 is the reference. Of the others, waves are best and no occlusion is worst.
     let psnr: Vec<f64> = (study.outcomes.iter()).map(|o| o.front_quality.psnr_overall).collect();
     assert_eq!(psnr[5], f64::INFINITY);
     let best = psnr[..5].iter().copied().fold(0.0, f64::max);
@@ -22,24 +22,24 @@ fn the_artefacts_are_where_the_paper_sees_them() {
     assert_eq!(worst, psnr[0], "{psnr:?}");
     assert!(best == psnr[3] || best == psnr[4], "{psnr:?}");
 
-    // 1: light of the hidden halves shines through the front bars where nothing holds it back.
+    // 1: light of the hidden halves shines through the front bars unless it is blocked.
     let occluded = present(of(&|o| o.artefacts.leakage_from_occluded));
     for setting in [1, 2, 3, 4, 5] {
         assert!(occluded[0] > 4.0 * occluded[setting], "{occluded:?}");
     }
-    // 2: light of the visible halves falls over the front bars where no computation stops it.
+    // 2: light of the visible halves covers the front bars unless a computation stops it.
     let visible = present(of(&|o| o.artefacts.leakage_from_visible));
     for (leaking, stopped) in [(0, 3), (0, 5), (1, 2), (1, 4)] {
         assert!(visible[leaking] > 2.0 * visible[stopped], "{visible:?}");
     }
-    // 3: beside the front bars the light of the hidden halves is missing where the input has none of it.
+    // 3: light of the hidden halves is missing beside the front bars if the input lacks it.
     let loss = present(of(&|o| o.artefacts.loss_from_occluded));
     for lossy in [1, 2, 4] {
         for complete in [0, 3, 5] {
             assert!(loss[lossy] > 0.15 && loss[lossy] > 1.5 * loss[complete], "{loss:?}");
         }
     }
-    // 4: rays are not waves; there is nothing of it where no ray is cast.
+    // 4: rays are not waves. This artefact is absent without ray casting.
     let rays = of(&|o| o.artefacts.geometric_inaccuracy);
     for (i, value) in rays.into_iter().enumerate() {
         match SETTINGS[i].name.starts_with("geometric") {

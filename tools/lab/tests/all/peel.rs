@@ -1,4 +1,4 @@
-//! Depth peeling on a GPU, or on a software driver, against the renderer on the CPU.
+//! Tests depth peeling on a GPU or a software driver against the CPU renderer.
 use crate::driver;
 
 use phasefront_io::ldi::Ldi;
@@ -9,10 +9,11 @@ fn peeler() -> DepthPeeler {
     driver::opened(DepthPeeler::new())
 }
 
-/// Depth and colour.
+/// The depth and colour of a pixel.
 type Pixel = (f32, [f32; 3]);
 
-/// How many pixels of the layers differ: a hit in one only, depths apart by more than 1e-4, colours by more than 1/100.
+/// Returns the number of differing pixels in the layers: a hit in only one, depths that differ by more than 1e-4, or
+/// colours that differ by more than 1/100.
 fn differing(a: &Ldi, b: &Ldi) -> usize {
     let pixels = |ldi: &Ldi| {
         let of_layer = |layer: &phasefront_io::ldi::LdiLayer| {
@@ -32,7 +33,7 @@ fn differing(a: &Ldi, b: &Ldi) -> usize {
     a.into_iter().zip(b).filter(differ).count()
 }
 
-/// A rectangle that faces the viewer at depth d.
+/// Creates a rectangle at depth d that faces the viewer.
 fn wall(x: [f32; 2], d: f32, rgb: [f32; 3]) -> Mesh {
     let corner = |i: usize, y: f32| [x[i], y, 0.5 - d];
     Mesh {
@@ -58,7 +59,7 @@ fn random_scenes_are_the_references_but_for_single_pixels() {
         let scene = random_scene(seed, height, width);
         let expected = render_ldi_reference(&scene, height, width, 5).unwrap();
         let ldi = peeler.render(&scene, height, width, 5).unwrap();
-        // Each layer behind a pixel that differs may differ too.
+        // Each layer behind a differing pixel may differ too.
         let (count, all) = (differing(&ldi, &expected), 5 * height * width);
         assert!(
             count * 500 <= all,
@@ -79,7 +80,7 @@ fn simple_scenes_are_the_references_exactly() {
     };
     let (red, green, blue) = ([1., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
     same(Vec::new());
-    // At the ends of the volume, out of it, and all at one depth: the first counts.
+    // Walls at the ends of the volume, outside it, and all at one depth, where the first counts.
     let ends = same(vec![
         wall([0., 9.], 1.0, red),
         wall([3., 14.], 0.0, green),
@@ -89,7 +90,7 @@ fn simple_scenes_are_the_references_exactly() {
     assert_eq!(ends.layers[0].depth[[4, 12]], 0.0);
     let ties = same([red, green, blue].map(|rgb| wall([1.5, 12.5], 0.5, rgb)).to_vec());
     assert!(ties.layers[1].depth.iter().all(|d| d.is_nan()));
-    // Backs are not seen, holes are seen through, colours are held to one.
+    // Back faces are invisible, holes are transparent, and colours are clamped to 1.
     let mut back = wall([0., 14.], 0.2, red);
     back.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let mut sieve = wall([0., 14.], 0.4, green);

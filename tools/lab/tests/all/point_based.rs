@@ -1,4 +1,4 @@
-//! The point-based method against its definition, against waves, and what it must do whatever the scene.
+//! Tests the point-based method against its definition, against waves, and for properties that hold in every scene.
 use crate::reference;
 
 use ndarray::{Array2, Array3, Axis, s};
@@ -23,7 +23,7 @@ fn random_ldi((h, w): (usize, usize), layers: usize) -> Ldi {
     scene::render_ldi_reference(&scene, h, w, layers).unwrap()
 }
 
-/// One layer of smooth amplitude and constant depth.
+/// Creates one layer of smooth amplitude and constant depth.
 fn flat((h, w): (usize, usize), depth: f32) -> Ldi {
     Ldi::new(vec![LdiLayer {
         rgb: Array3::from_shape_fn((3, h, w), |(c, y, x)| {
@@ -34,7 +34,7 @@ fn flat((h, w): (usize, usize), depth: f32) -> Ldi {
     .unwrap()
 }
 
-/// Two layers of one shape.
+/// Stacks two layers of the same shape.
 fn stacked(front: &Ldi, rear: &Ldi) -> Ldi {
     Ldi::new(vec![front.layers[0].clone(), rear.layers[0].clone()]).unwrap()
 }
@@ -73,7 +73,7 @@ fn agrees_with_its_definition() {
 
 #[test]
 fn bands_of_rows_join() {
-    // More rows than one band holds, against the definition.
+    // The image has more rows than one band holds and is compared with the definition.
     let ldi = random_ldi((71, 6), 2);
     let expected = point_based::reference::hologram(&ldi, &Display::default(), 20, Occlusion::Geometric).unwrap();
     let ours = hologram(&ldi, 20, Occlusion::Geometric);
@@ -87,7 +87,7 @@ fn bands_of_rows_join() {
 
 #[test]
 fn a_sub_hologram_is_the_wave_of_its_point() {
-    // Eq. 1 and 2 of a lone pixel at z with phase 2πz/λ, seen at z = 0, weighted as the sub-hologram is.
+    // Eq. 1 and 2 for a single pixel at z with phase 2πz/λ, seen at z = 0 and weighted like the sub-hologram.
     let size = 129;
     for lambda in [638e-9, 520e-9, 450e-9] {
         for z in [-3e-3, -1.1e-3, 0.7e-3, 2.5e-3] {
@@ -159,22 +159,22 @@ fn threads_do_not_change_a_bit() {
 #[test]
 fn rays_are_stopped_by_what_is_before_them_and_by_nothing_else() {
     let shape = (80, 96);
-    // Both behind z = 0, both before it, and one on each side.
+    // Both layers lie behind z = 0, both in front of it, or one on each side.
     for (near, far) in [(0.6, 0.9), (0.1, 0.4), (0.1, 0.9)] {
         let (front, rear) = (flat(shape, near), flat(shape, far));
         let both = stacked(&front, &rear);
-        // A whole plate lets nothing through but past the frame's ends.
+        // A full plate blocks all light except past the frame's ends.
         let inner = s![.., 33..47, 33..63];
         let ours = hologram(&both, 64, Occlusion::Geometric);
         let alone = hologram(&both, 64, Occlusion::Input);
         assert_eq!(ours.slice(inner), alone.slice(inner), "{near} before {far}");
         assert!(energy(&(hologram(&both, 64, Occlusion::None) - &alone)) > 0.1 * energy(&alone));
-        // A black one too.
+        // A black plate blocks light too.
         let mut black = both.clone();
         black.layers[0].rgb.fill(0.0);
         let dark = hologram(&black, 64, Occlusion::Geometric);
         assert!(dark.slice(inner).iter().all(|v| *v == Complex32::ZERO));
-        // Half a plate lets the other half through as if it were not there, but for the reach of light.
+        // Half a plate leaves the other half unaffected, except within the reach of light.
         let mut half = both.clone();
         half.layers[0].depth.slice_mut(s![.., 48..]).fill(f32::NAN);
         half.layers[0].rgb.slice_mut(s![.., .., 48..]).fill(0.0);

@@ -1,4 +1,4 @@
-//! Seeds of a small data set: beside the depths that were given, refined ones; to all, the sweep's fields.
+//! Tests the seeds of a small data set: refined depths beside the given ones, and the sweep's fields for all.
 use ndarray::{Array2, Array3, Array4, Axis, concatenate, s};
 use ndarray_npy::{read_npy, write_npy};
 use num_complex::Complex32;

@@ -1,4 +1,4 @@
-//! SM-LBM against Eq. 1–4 in f64, and what it must do whatever the scene.
+//! Tests SM-LBM against Eq. 1–4 in f64, and for properties that hold in every scene.
 use crate::reference;
 
 use ndarray::{Array2, Array3, Axis, s};
@@ -19,7 +19,7 @@ fn plane_of(hologram: &Array3<Complex32>, colour: usize) -> Array2<Complex64> {
     widen(plane.to_slice().unwrap(), plane.dim())
 }
 
-/// The same by the reference, in the same padded plane.
+/// Computes the reference for the same input in the same padded plane.
 fn expected(ldi: &Ldi, planes: usize, colour: usize) -> Array2<Complex64> {
     let display = Display::default();
     let (h, w) = ldi.shape();
@@ -41,7 +41,7 @@ fn random_ldi((h, w): (usize, usize), layers: usize) -> Ldi {
     scene::render_ldi_reference(&scene, h, w, layers).unwrap()
 }
 
-/// One layer of smooth amplitude and constant depth.
+/// Creates one layer of smooth amplitude and constant depth.
 fn flat((h, w): (usize, usize), depth: f32) -> Ldi {
     Ldi::new(vec![LdiLayer {
         rgb: Array3::from_shape_fn((3, h, w), |(c, y, x)| {

@@ -1,4 +1,4 @@
-//! The studies of layers and planes: what they compare, and what the command writes.
+//! Tests the studies of layers and planes: their comparisons, and the files that the command writes.
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Display, RgbdFrame, Sweep};
@@ -44,7 +44,7 @@ fn layers_are_compared_with_ten() {
         let hologram = sm_lbm::hologram(ldi, &Display::default(), 12, &|_, _| {}).unwrap();
         hologram.mapv(|v| v.norm())
     };
-    // An LDI of two layers is rendered apart here, cut from one of ten there.
+    // This LDI is rendered with two layers. The study cuts two layers from an LDI of ten.
     let direct: Vec<f64> = [11, 12]
         .map(|seed| {
             let (two, ten) = (amplitude(&ldi(seed, 40, 2)), amplitude(&ldi(seed, 40, 10)));
@@ -75,7 +75,7 @@ fn planes_are_compared_with_the_finest() {
     assert!(study::layers(&none, 12, &|_| {}).is_err());
 }
 
-/// Runs `phasefront-lab study` on one scene of 40 planes and reads NAME.json; the folder holds the plot, too.
+/// Runs `phasefront-lab study` on one scene of 40 planes and reads NAME.json. The folder also holds the plot.
 fn run(what: &str, size: &str, folder: &Path) -> serde_json::Value {
     let output = Command::new(env!("CARGO_BIN_EXE_phasefront-lab"))
         .args(["study", what, "--scenes", "1", "--planes", "40"])
@@ -107,12 +107,12 @@ fn the_command_writes_figures_and_a_plot() {
 #[test]
 fn the_command_studies_the_sweep() {
     let folder = tempfile::tempdir().unwrap();
-    // In smaller scenes a sensor's depth would be all holes.
+    // In smaller scenes a sensor's depth would consist only of holes.
     let result = run("sweep", "64", folder.path());
     let rows = result["rows"].as_array().unwrap();
     let count = |part: &str| rows.iter().filter(|row| row["part"] == part).count();
     let svg = std::fs::read_to_string(folder.path().join("sweep.svg")).unwrap();
-    // The default sweep is a point of all four curves, and planes have two.
+    // The default sweep is a point of all four curves, and the planes have two curves.
     let points = 4 + 2 * count("planes") + count("taps") + count("hidden");
     assert_eq!(svg.matches("<circle").count(), points);
     let result = run("displays", "24", folder.path());
@@ -158,7 +158,7 @@ fn the_sweep_is_studied_beside_exact_waves() {
         found.unwrap_or_else(|| panic!("no {part} {value}: {rows:?}"))
     };
     let default = of("default", 40);
-    // Merged steps and tiles change nothing but the time.
+    // Merged steps and tiles change only the time.
     for same in [of("merge", 0), of("tile", 128)] {
         assert!((same.clean.psnr - default.clean.psnr).abs() < 0.02, "{same:?}");
         assert!(same.ns_per_pixel.unwrap() > 0.0);
@@ -169,7 +169,7 @@ fn the_sweep_is_studied_beside_exact_waves() {
     assert!(default.clean.psnr > default.refined.psnr, "{default:?}");
     assert!(of("exact", 2).clean.psnr > default.clean.psnr, "{rows:?}");
 
-    // What is measured is what it says: one row by hand.
+    // One row is recomputed by hand.
     let display = &scenes.display;
     let sweep = Sweep {
         hidden_layers: 0,

@@ -1,5 +1,5 @@
-//! The plane sweep on displays that no network was trained for: beside exact waves on the same surfaces, and both
-//! beside the truth. And on a frame that a camera took: no seams between tiles.
+//! Tests the plane sweep on displays for which no network was trained. The sweep and exact waves on the same surfaces
+//! are compared with the ground truth. A captured frame must show no seams between tiles.
 use crate::skip;
 
 use ndarray::Array3;
@@ -22,7 +22,7 @@ use phasefront_lab::scene;
 use std::path::Path;
 
 const SIZE: usize = 96;
-/// Planes of the truth.
+/// The number of planes of the ground truth.
 const TRUE_PLANES: usize = 200;
 
 fn scene_of(seed: u64) -> (Ldi, RgbdFrame) {
@@ -39,7 +39,7 @@ fn scene_of(seed: u64) -> (Ldi, RgbdFrame) {
     (ldi.clone(), RgbdFrame::new(rgb, depth).unwrap())
 }
 
-/// Takes a midpoint hologram to the display.
+/// Propagates a midpoint hologram to the display.
 fn to_display(mut field: Array3<Complex32>, display: &Display) -> Array3<Complex32> {
     if display.offset_m() != 0.0 {
         let plans = Propagator::for_colours(
@@ -102,7 +102,7 @@ fn other_displays_need_no_training() {
     }
 }
 
-/// A captured frame of 640×480 as a session brings it to 1080p.
+/// Returns a captured frame of 640×480, converted to 1080p as a session does.
 fn captured(folder: &Path) -> RgbdFrame {
     const OUT: (usize, usize) = (1080, 1920);
     let ((height, width), bytes) = picture::read_rgb_bytes(&folder.join("color_0.jpg")).unwrap();
@@ -143,7 +143,7 @@ fn a_captured_frame_has_no_seams_between_tiles() {
     let (height, width) = frame.shape();
     let display = Display::default();
     let default = Sweep::for_display(&display);
-    // One tile of 1920 pixels is the whole frame.
+    // One tile of 1920 pixels covers the whole frame.
     let [tiles, whole] = [default.tile, 1920].map(|tile| {
         let sweep = Sweep { tile, ..default };
         let plan = SweepPlan::new(height, width, &display, sweep, 0.0).unwrap();
@@ -162,7 +162,7 @@ fn a_captured_frame_has_no_seams_between_tiles() {
     let views = [&tiles, &whole].map(|field| refocus.focal_stack(field, &z_m).unwrap());
     for (z_m, (tiled, whole)) in z_m.iter().zip(views[0].iter().zip(&views[1])) {
         assert!(worst(tiled, whole) < 2e-4, "{z_m}: {}", worst(tiled, whole));
-        // Steps from column to column are no larger over the tiles' edges than elsewhere.
+        // Steps between columns are no larger across the tiles' edges than elsewhere.
         let step = |x: usize| {
             let rows = tiled.chunks_exact(width);
             let steps: f32 = rows.map(|row| (row[x] - row[x - 1]).abs()).sum();

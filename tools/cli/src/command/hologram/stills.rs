@@ -1,5 +1,5 @@
-//! Folders of pictures for `phasefront hologram`: each by itself, under its own name. A picture that fails is named,
-//! and the others go on.
+//! Folders of pictures for `phasefront hologram`. Each picture is processed by itself and keeps its name. If a picture
+//! fails, the command reports it and continues with the others.
 
 use crate::flags::frame::Picture;
 use crate::make::{HologramRequest, infos};
@@ -15,7 +15,7 @@ use std::time::Instant;
 /// Makes the holograms of `pictures` in the folder `output`.
 ///
 /// # Errors
-/// Nothing to make, no place for it, or pictures that failed.
+/// Returns an error if there are no pictures, if the folder cannot be used, or if pictures failed.
 pub(super) fn run(
     mut request: HologramRequest,
     pictures: Vec<Picture>,
@@ -72,8 +72,8 @@ pub(super) fn run(
     Ok(())
 }
 
-/// Makes one, and says whether it did: where `resumes` is set, a hologram that is there and was made of the same files
-/// is kept.
+/// Makes the hologram of one picture and returns whether it did. If `resumes` is set, an existing hologram of the same
+/// files is kept.
 fn still(
     request: &mut HologramRequest,
     picture: &Picture,

@@ -1,4 +1,4 @@
-//! Writes what comes out, and takes up where it was left.
+//! Writes the output of a run, or continues that of an earlier run.
 
 use crate::record::{Before, Claim, RunRecord, already, names_of};
 use ndarray::{Array3, ArrayView3};
@@ -9,13 +9,13 @@ use phasefront_io::hologram::{self, HologramInfo};
 use phasefront_io::{Error, Result, output, picture};
 use std::path::{Path, PathBuf};
 
-/// The report of a run, in its folder.
+/// The file of a run's report in its folder.
 const STATISTICS: &str = "statistics.json";
 
-/// Writes what comes out, and keeps what the report needs.
+/// Writes the output of a run and keeps the figures for its report.
 pub(super) struct Sink {
     folder: Option<PathBuf>,
-    /// Of what is seen, and of the phases.
+    /// The film of the previews and the film of the phases.
     films: Option<[PathBuf; 2]>,
     preview_z_m: Option<f64>,
     info: HologramInfo,
@@ -25,7 +25,7 @@ pub(super) struct Sink {
 }
 
 impl Sink {
-    /// Into `output`, a folder, or a film beside the folder of its name.
+    /// Creates a sink that writes to `output`: a folder, or a film beside the folder of its name.
     pub(super) fn new(
         output: Option<&Path>,
         preview_z_m: Option<f64>,
@@ -57,7 +57,7 @@ impl Sink {
         if let Some(folder) = &folder {
             output::folder(folder, before.holding())?;
             let new = Claim::new(folder, &record, before, |name| is_frame(name) || name == STATISTICS)?;
-            // Films beside a folder without frames are not of an earlier run.
+            // Films beside a folder without frames do not belong to an earlier run.
             if let (Some(path), Before::Resume, false) = (film, before, new.resumes) {
                 return Err(already(path));
             }
@@ -77,7 +77,7 @@ impl Sink {
         })
     }
 
-    /// Whether frames of an earlier run may be there.
+    /// Checks whether frames of an earlier run may exist.
     pub(super) fn resumes(&self) -> bool {
         self.claim.as_ref().is_some_and(|claim| claim.resumes)
     }
@@ -90,7 +90,7 @@ impl Sink {
         folder.join(format!("preview_{index:06}.png"))
     }
 
-    /// The scale of the next frame's hologram where it is written already, of `frame`.
+    /// Returns the scale of the next frame's hologram if it is already written and was made of `frame`.
     pub(super) fn written(&self, frame: &VideoFrame) -> Result<Option<f32>> {
         let Some(folder) = &self.folder else { return Ok(None) };
         let path = self.phase(folder, self.scales.len());
@@ -107,7 +107,7 @@ impl Sink {
         }
     }
 
-    /// By what the hologram of `frame` is recognised.
+    /// Returns the fingerprint that identifies the hologram of `frame`.
     fn made_of(&self, frame: &VideoFrame) -> String {
         let mut all = self.record.fingerprint();
         frame.fingerprint(&mut all);
@@ -119,7 +119,7 @@ impl Sink {
         self.scales.push(scale);
     }
 
-    /// Writes the next hologram, made of `frame`, which a live stream does not know any more: it is not resumed.
+    /// Writes the next hologram. `frame` is its input, or `None` in a live stream, which cannot be resumed.
     pub(super) fn take(&mut self, hologram: &Hologram, frame: Option<&VideoFrame>) -> Result<()> {
         let index = self.scales.len();
         self.scales.push(hologram.scale());
@@ -152,7 +152,7 @@ impl Sink {
         }
     }
 
-    /// Makes the films, where they are asked for: what is seen, and without loss the phases.
+    /// Makes the films if they are requested: one of the previews, and a lossless one of the phases.
     pub(super) fn finish(&self, rate_hz: f64) -> Result<()> {
         let (Some([seen, phases]), Some(folder)) = (&self.films, &self.folder) else {
             return Ok(());
@@ -177,7 +177,7 @@ fn is_frame(name: &str) -> bool {
     digits.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// Removes what an earlier run made, and nothing else.
+/// Removes the files of an earlier run and nothing else.
 fn remove_made(folder: &Path) -> Result<()> {
     for name in names_of(folder)? {
         if is_frame(&name) || name == STATISTICS {

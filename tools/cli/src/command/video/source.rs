@@ -1,4 +1,4 @@
-//! Frames from where they come: folders, films, pipes.
+//! The sources of frames: folders, films and pipes.
 
 use super::Video;
 use crate::flags::frame::SeenDepthFlags;
@@ -15,15 +15,15 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Frames from where they come, all of one size.
+/// A source of frames that all have one size.
 pub(super) struct Source {
     input: Input,
-    /// How the frames' input is called.
+    /// The name of the input.
     path: PathBuf,
-    /// (H, W) of colour and of depth of the first frame that was given.
+    /// (H, W) of the colour and of the depth of the first frame.
     shapes: Option<[(usize, usize); 2]>,
     given: usize,
-    /// Fixed near and far.
+    /// Fixed near and far, in metres.
     range_m: Option<(f32, f32)>,
 }
 
@@ -37,7 +37,7 @@ struct Folder {
     paths: Vec<(PathBuf, PathBuf)>,
     unit: DepthUnit,
     invert: bool,
-    /// Frames that were read, where they are shown again.
+    /// The frames that were read, if they are shown again.
     kept: Vec<Arc<VideoFrame>>,
     next: usize,
     total: usize,
@@ -52,13 +52,13 @@ struct FilmSource {
     frames: Option<u64>,
 }
 
-/// Where a film's depth is.
+/// The place of a film's depth.
 enum FilmDepth {
-    /// In a film of its own.
+    /// A film of its own.
     Film(Film),
-    /// In the right half of the pictures.
+    /// The right half of the pictures.
     Beside,
-    /// Seen by a network, made for the first picture's size.
+    /// A network that estimates it, made for the first picture's size.
     Network {
         path: PathBuf,
         flags: SeenDepthFlags,
@@ -67,7 +67,7 @@ enum FilmDepth {
 }
 
 impl Source {
-    /// The source that `flags` name, and the (H, W) of its first frame.
+    /// Opens the source that `flags` name, and returns it with the (H, W) of its first frame.
     pub(super) fn open(flags: &Video) -> Result<(Source, (usize, usize))> {
         let (input, shape) = Input::open(flags)?;
         let source = Source {
@@ -80,10 +80,10 @@ impl Source {
         Ok((source, shape))
     }
 
-    /// The next frame; None at the end.
+    /// Returns the next frame, or `None` at the end.
     ///
     /// # Errors
-    /// A frame that cannot be read, or of another size than those before it.
+    /// Returns an error if a frame cannot be read or has another size than the frames before it.
     pub(super) fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
         let Some(frame) = self.input.next()? else {
             return Ok(None);
@@ -113,7 +113,7 @@ impl Source {
         Ok(Some(frame))
     }
 
-    /// What a frame is called in messages.
+    /// Returns the name of a frame for messages.
     pub(crate) fn name(&self, frame: usize) -> String {
         match &self.input {
             Input::Folder(folder) => {
@@ -124,7 +124,7 @@ impl Source {
         }
     }
 
-    /// Whether frames are there before they are due.
+    /// Checks whether frames are available before they are due.
     pub(super) fn is_stored(&self) -> bool {
         !matches!(self.input, Input::Pipe { .. })
     }
@@ -179,7 +179,7 @@ impl Input {
                 sequence::by_pattern(&flags.input, colour, depth)?
             }
         };
-        // The layouts that say their unit never hold normalized depth.
+        // Layouts that define their unit never hold normalized depth.
         let unit = said.filter(|_| unit == DepthUnit::Normalized).unwrap_or(unit);
         check_range(flags, unit)?;
         let folders: BTreeSet<_> = (paths.iter())
@@ -237,7 +237,7 @@ impl Folder {
     }
 }
 
-/// Refuses near and far where depth of `unit` has no metres.
+/// Refuses near and far if depth of `unit` has no metres.
 fn check_range(flags: &Video, unit: DepthUnit) -> Result<()> {
     match flags.depth.range()?.is_some() && unit == DepthUnit::Normalized {
         true => Err(Error::Input(
@@ -343,7 +343,7 @@ impl FilmSource {
     }
 }
 
-/// A frame whose depth `network` sees.
+/// Reads a frame, with the depth that `network` estimates.
 fn see(
     path: &Path,
     flags: &SeenDepthFlags,

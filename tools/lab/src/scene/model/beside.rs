@@ -1,5 +1,5 @@
-//! What a model names beside itself. A model may come from anywhere: only regular files of its own folder are read, and
-//! no more of them than a model may have.
+//! Reads the files that a model names. Because a model may come from an untrusted source, it reads only regular files
+//! of the model's own folder, and only up to the limits of a model.
 
 use crate::scene::model::part::MAX_MODEL_BYTES;
 use image::DynamicImage;
@@ -10,20 +10,20 @@ use std::path::{Path, PathBuf};
 
 type Result<T> = std::result::Result<T, String>;
 
-/// Most texels of a model's pictures: a gigabyte.
+/// The most texels of a model's pictures: a gigabyte.
 const MAX_TEXELS: usize = 1 << 28;
 
 /// The folder of a model.
 pub(super) struct Beside {
     folder: PathBuf,
-    /// Bytes that may still be read.
+    /// The bytes that may still be read.
     left: u64,
-    /// Texels that may still be made of pictures.
+    /// The texels that pictures may still have.
     texels_left: usize,
 }
 
 impl Beside {
-    /// That of the model at `path`.
+    /// Opens the folder of the model at `path`.
     pub(super) fn new(path: &Path) -> Result<Self> {
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -36,7 +36,7 @@ impl Beside {
         })
     }
 
-    /// The bytes of the file `name`; none where there is no such file.
+    /// Reads the file `name`. Returns `None` if it does not exist.
     pub(super) fn read_if_there(&mut self, name: &str) -> Result<Option<Vec<u8>>> {
         let path = match self.folder.join(name).canonicalize() {
             Ok(path) => path,
@@ -58,13 +58,13 @@ impl Beside {
             .map_err(|e| format!("{name}: {e}"))
     }
 
-    /// The bytes of the file `name`.
+    /// Reads the file `name`.
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>> {
         self.read_if_there(name)?
             .ok_or_else(|| format!("{name}: there is no such file"))
     }
 
-    /// Width, height and RGBA texels of a picture, as they are stored; of 16 bits the upper 8.
+    /// Decodes a picture to its width, height and RGBA texels, as stored. Of 16-bit values it keeps the upper 8 bits.
     pub(super) fn texels(&mut self, bytes: &[u8]) -> Result<(usize, usize, Vec<[u8; 4]>)> {
         let image = decode::picture_of(bytes, Reading::AS_STORED)?.0;
         let (width, height) = (image.width() as usize, image.height() as usize);

@@ -1,5 +1,5 @@
-//! glTF 2.0 and GLB files as [`Part`]s. The crate trusts what a file says of its own buffers in places; what could
-//! lead it astray is checked here first.
+//! Reads glTF 2.0 and GLB files as [`Part`]s. The `gltf` crate trusts some of a file's statements about its own
+//! buffers, so this module checks them first.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,13 +17,14 @@ use phasefront_core::runtime::file;
 
 type Result<T> = std::result::Result<T, String>;
 
-/// A matrix of columns, as glTF has it.
+/// A matrix of columns, as in glTF.
 type Matrix = [[f32; 4]; 4];
 
-/// glTF's colour factors are linear, its pictures and our amplitudes coded for the eye.
+/// The exponent of the encoding for the eye. glTF's colour factors are linear; its pictures and our amplitudes are
+/// encoded.
 const GAMMA: f64 = 2.2;
 
-/// The parts of the file's default scene, or of its first.
+/// Reads the parts of the file's default scene, or of its first scene if there is no default.
 pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
     let bytes = file::read(path, MAX_MODEL_BYTES).map_err(|e| e.to_string())?;
     check_length(&bytes)?;
@@ -47,7 +48,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
     Ok(reader.parts)
 }
 
-/// The file's buffers, in the file or beside it.
+/// Reads the file's buffers, which are in the file or beside it.
 fn read_buffers(document: &gltf::Document, mut blob: Option<Vec<u8>>, beside: &mut Beside) -> Result<Vec<Vec<u8>>> {
     let mut read = |buffer: gltf::Buffer| {
         let bytes = match buffer.source() {
@@ -70,23 +71,24 @@ fn read_buffers(document: &gltf::Document, mut blob: Option<Vec<u8>>, beside: &m
 struct Reader {
     beside: Beside,
     buffers: Vec<Vec<u8>>,
-    /// What has been made of images: their index, what was asked of them, the texture.
+    /// The textures made so far, each with the image and the material properties that it was made for.
     textures: Vec<(TextureKey, Arc<Texture>)>,
     triangles: usize,
     parts: Vec<Part>,
 }
 
-/// An image and how a material colours and cuts it.
+/// An image, with the colour factor and the alpha cutoff of a material.
 #[derive(PartialEq, Clone)]
 struct TextureKey {
     image: Option<usize>,
     factor: [f32; 4],
-    /// The alpha at which a surface begins; none where all of it is there.
+    /// The alpha at which a surface begins, or `None` if all of it is visible.
     cut: Option<f32>,
 }
 
 impl Reader {
-    /// The nodes and those below them, of `count` in the file. Each has one parent at most, so that none comes twice.
+    /// Adds the nodes and their descendants; the file has `count` nodes. Each node has at most one parent, so none is
+    /// added twice.
     fn nodes<'a>(&mut self, roots: impl Iterator<Item = Node<'a>>, count: usize) -> Result<()> {
         let identity = std::array::from_fn(|i| std::array::from_fn(|j| f32::from(u8::from(i == j))));
         let mut seen = vec![false; count];
@@ -166,7 +168,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Which of `count` vertices the corners of its triangles are.
+    /// Returns the vertex indices of the triangles' corners, each below `count`.
     fn indices(&self, primitive: &Primitive, count: usize) -> Result<Vec<u32>> {
         let Some(indices) = primitive.indices() else {
             return Ok((0..count as u32).collect());
@@ -186,7 +188,7 @@ impl Reader {
         }
     }
 
-    /// Gives the part its texture and where on it its vertices lie.
+    /// Sets the part's texture and texture coordinates.
     fn material(&mut self, primitive: &Primitive, part: &mut Part) -> Result<()> {
         let material = primitive.material();
         let base = material.pbr_metallic_roughness();
@@ -228,7 +230,7 @@ impl Reader {
         let factor = [0, 1, 2].map(|c| coded(key.factor[c]));
         let texels = texels.into_iter().map(|[r, g, b, a]| {
             let [r, g, b] = [(r, 0), (g, 1), (b, 2)].map(|(v, c)| (f32::from(v) * factor[c]).round() as u8);
-            // Where the file's surface begins ours must, at one half.
+            // Maps the material's alpha cutoff to one half, where our surfaces begin.
             let alpha = f32::from(a) / 255.0 * key.factor[3];
             let alpha = key.cut.map_or(1.0, |cut| {
                 if cut > 0.0 {
@@ -245,7 +247,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Width, height and RGBA texels of an image in the file or beside it.
+    /// Reads the width, height and RGBA texels of an image in the file or beside it.
     fn image(&mut self, image: &gltf::Image) -> Result<(usize, usize, Vec<[u8; 4]>)> {
         let texels = match image.source() {
             Source::Uri { uri, .. } => resource(uri, &mut self.beside).and_then(|bytes| self.beside.texels(&bytes)),
@@ -260,10 +262,10 @@ impl Reader {
     }
 }
 
-/// The bytes that a URI names: in itself, or a file beside the model.
+/// Reads the bytes that a URI names: those in the URI itself, or a file beside the model.
 fn resource(uri: &str, beside: &mut Beside) -> Result<Vec<u8>> {
     match uri.strip_prefix("data:") {
-        // The crate decodes what is in the file itself.
+        // The crate decodes data that is in the URI itself.
         Some(_) => buffer::Data::from_source(buffer::Source::Uri(uri), None)
             .map(|data| data.0)
             .map_err(|e| one_line(&e)),
@@ -271,7 +273,7 @@ fn resource(uri: &str, beside: &mut Beside) -> Result<Vec<u8>> {
     }
 }
 
-/// The corners of each triangle. Strips turn every second one, so that all fronts face one way.
+/// Returns the corners of each triangle. In strips, every second triangle is reversed, so all fronts face one way.
 fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => {
@@ -292,12 +294,12 @@ fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     }
 }
 
-/// Moves the part to where its node stands.
+/// Moves the part to the position of its node.
 fn transform(part: &mut Part, m: Matrix) {
     for p in &mut part.positions {
         *p = std::array::from_fn(|i| m[0][i] * p[0] + m[1][i] * p[1] + m[2][i] * p[2] + m[3][i]);
     }
-    // Normals go by the matrix of cofactors: the inverse transposed, but for its length.
+    // The cofactor matrix transforms normals: it is the transposed inverse up to a factor.
     let minor = |r: usize, c: usize| {
         let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
         m[c1][r1] * m[c2][r2] - m[c2][r1] * m[c1][r2]
@@ -307,7 +309,7 @@ fn transform(part: &mut Part, m: Matrix) {
     }
     let determinant: f32 = (0..3).map(|j| m[j][0] * minor(0, j)).sum();
     if determinant < 0.0 {
-        // A mirrored node keeps its fronts in front.
+        // A mirrored node keeps its front faces in front.
         part.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         part.normals.iter_mut().for_each(|n| *n = n.map(|v| -v));
     }
@@ -317,12 +319,12 @@ fn product(a: Matrix, b: Matrix) -> Matrix {
     std::array::from_fn(|j| std::array::from_fn(|i| (0..4).map(|k| a[k][i] * b[j][k]).sum()))
 }
 
-/// A linear colour factor for values coded for the eye.
+/// Encodes a linear colour factor for the eye.
 fn coded(factor: f32) -> f32 {
     libm::pow(f64::from(factor.clamp(0.0, 1.0)), 1.0 / GAMMA) as f32
 }
 
-/// A GLB's length holds its header, which the crate takes off it.
+/// Checks that the length that a GLB states covers its header, because the crate subtracts the header's length.
 fn check_length(bytes: &[u8]) -> Result<()> {
     const HEADER: u32 = 12;
     match bytes {
@@ -336,8 +338,8 @@ fn check_length(bytes: &[u8]) -> Result<()> {
     }
 }
 
-/// What the crate's own validation and reading take for granted: attributes name accessors that are there, images say
-/// where they are and, in the file itself, of which kind.
+/// Checks the assumptions of the crate's own validation and reading: attributes name existing accessors, and images
+/// state their source and, for images in the file, their type.
 fn check_names(root: &gltf::json::Root) -> Result<()> {
     let mut attributes = root
         .meshes
@@ -361,7 +363,7 @@ fn check_names(root: &gltf::json::Root) -> Result<()> {
     }
 }
 
-/// The accessor is of one of these types and shapes and its items do not overlap.
+/// Checks that the accessor has one of these types and shapes and that its items do not overlap.
 fn check(accessor: &Accessor, types: &[DataType], shapes: &[Dimensions]) -> Result<()> {
     let bad = |reason: &str| Err(format!("accessor {}: {reason}", accessor.index()));
     if !types.contains(&accessor.data_type()) || !shapes.contains(&accessor.dimensions()) {
@@ -386,7 +388,7 @@ fn check(accessor: &Accessor, types: &[DataType], shapes: &[Dimensions]) -> Resu
     Ok(())
 }
 
-/// The name of a file that a URI is, its percent signs decoded.
+/// Returns the file name in a URI, with its percent-encoding decoded.
 fn file_name(uri: &str) -> Result<String> {
     let bytes = uri.as_bytes();
     let digit = |index: usize| bytes.get(index).and_then(|&b| char::from(b).to_digit(16));
@@ -406,7 +408,7 @@ fn file_name(uri: &str) -> Result<String> {
     String::from_utf8(decoded).map_err(|_| format!("{uri} is not the name of a file"))
 }
 
-/// The crate's message, on one line.
+/// Returns the crate's message on one line.
 fn one_line(error: &gltf::Error) -> String {
     error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,4 +1,4 @@
-//! Wavefront OBJ files, their MTL files and pictures, as [`Part`]s.
+//! Reads Wavefront OBJ files, their MTL files and pictures, as [`Part`]s.
 
 use std::cell::RefCell;
 use std::io::BufReader;
@@ -57,8 +57,8 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
         .collect()
 }
 
-/// The lines of a material library that are of use: names, diffuse colours of three numbers, and their pictures. The
-/// crate that reads them panics at a colour of one number, which stands for grey.
+/// Keeps the useful lines of a material library: names, diffuse colours of three numbers, and their pictures. The crate
+/// that reads the library panics at a colour of one number, which denotes grey.
 fn materials_of(library: &str) -> String {
     let mut lines = String::new();
     for line in library.lines() {
@@ -74,7 +74,7 @@ fn materials_of(library: &str) -> String {
     lines
 }
 
-/// A model's part; `textures` are those of `materials`.
+/// Makes a part of a model. `textures` are those of `materials`.
 fn part(model: tobj::Model, materials: &[Material], textures: &[Option<Arc<Texture>>]) -> Result<Part> {
     let mesh = model.mesh;
     let mut part = Part {
@@ -82,7 +82,7 @@ fn part(model: tobj::Model, materials: &[Material], textures: &[Option<Arc<Textu
         triangles: triples(&mesh.indices),
         normals: triples(&mesh.normals),
         colour: triples(&mesh.vertex_color),
-        // OBJ counts from the picture's bottom.
+        // OBJ counts from the bottom of the picture.
         uv: mesh.texcoords.chunks_exact(2).map(|t| [t[0], 1.0 - t[1]]).collect(),
         ..Part::default()
     };
@@ -112,7 +112,7 @@ fn part(model: tobj::Model, materials: &[Material], textures: &[Option<Arc<Textu
     Ok(part)
 }
 
-/// Gives a part of the object `name` its picture, or its plain colour.
+/// Sets the picture or the plain colour of a part of the object `name`.
 fn clothe(part: &mut Part, material: &Material, texture: &Option<Arc<Texture>>, name: &str) {
     let pictured = texture.is_some() && part.uv.len() == part.positions.len();
     if texture.is_some() && !pictured {
@@ -120,18 +120,19 @@ fn clothe(part: &mut Part, material: &Material, texture: &Option<Arc<Texture>>, 
     }
     part.texture = texture.clone().filter(|_| pictured);
     let diffuse = material.diffuse.unwrap_or([1.0; 3]).map(|v| v.clamp(0.0, 1.0));
-    // A picture stands for the diffuse colour, which many files leave black beside one.
+    // A picture replaces the diffuse colour, because many files set that to black when they name a picture.
     if !pictured {
         part.texture = Some(Arc::new(Texture::plain(diffuse)));
     }
 }
 
-/// The picture of a material's diffuse colour, if it names one that is there.
+/// Reads the picture of a material's diffuse colour. Returns `None` if the material names none or the file does not
+/// exist.
 fn texture(beside: &mut Beside, material: &Material) -> Result<Option<Arc<Texture>>> {
     let Some(name) = &material.diffuse_texture else {
         return Ok(None);
     };
-    // Some programs write their own separators.
+    // Some programs write backslashes as separators.
     let name = name.trim().replace('\\', "/");
     let Some(bytes) = beside.read_if_there(&name)? else {
         log::warn!(

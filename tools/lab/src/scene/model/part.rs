@@ -1,11 +1,11 @@
-//! Parts of a model, and how large a model may be.
+//! Parts of a model, and the limits of a model's size.
 
 use crate::scene::Texture;
 use std::sync::Arc;
 
-/// Most triangles that a model file may hold.
+/// The most triangles of a model file.
 pub const MAX_MODEL_TRIANGLES: usize = 10_000_000;
-/// Most bytes of a model file, its buffers and pictures not counted.
+/// The most bytes of a model file, without its buffers and pictures.
 pub const MAX_MODEL_BYTES: u64 = 2 << 30;
 
 /// A model's surface of one material, in the file's axes: x right, y up, z toward the viewer.
@@ -13,19 +13,19 @@ pub const MAX_MODEL_BYTES: u64 = 2 << 30;
 pub(super) struct Part {
     pub(super) positions: Vec<[f32; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// As many as positions, or none.
+    /// One normal per position, or empty.
     pub(super) normals: Vec<[f32; 3]>,
-    /// As many as positions, or none: then `texture` has one texel.
+    /// Texture coordinates, one per position, or empty: then `texture` has one texel.
     pub(super) uv: Vec<[f32; 2]>,
-    /// As many as positions, or none.
+    /// One colour per position, or empty.
     pub(super) colour: Vec<[f32; 3]>,
-    /// The picture; white where there is none.
+    /// The picture, or `None` for white.
     pub(super) texture: Option<Arc<Texture>>,
-    /// Whether its back is seen as well.
+    /// Whether the back is visible too.
     pub(super) two_sided: bool,
 }
 
-/// An error if a model of that many triangles is too large.
+/// Returns an error if a model has too many triangles.
 pub(super) fn check_count(triangles: usize) -> std::result::Result<(), String> {
     if triangles > MAX_MODEL_TRIANGLES {
         return Err(format!(

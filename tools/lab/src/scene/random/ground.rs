@@ -1,4 +1,5 @@
-//! The background that fills a random scene's frame: planes, floors, corners, reliefs, curved and stepped surfaces.
+//! The background that fills the frame of a random scene: planes, ground planes, corners, reliefs, curved and stepped
+//! surfaces.
 
 use crate::scene::pattern::Pattern;
 use crate::scene::random::parts::{DEPTH_PER_PX, MARGIN};
@@ -6,20 +7,20 @@ use crate::scene::shapes::Shape;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
-/// Pieces of the background along a side.
+/// The number of pieces of the background along a side.
 const PIECES: usize = 32;
 
-/// How deep the background lies, on a grid over the frame.
+/// The depth of the background on a grid over the frame.
 pub(super) struct Ground(Vec<f64>);
 
 impl Ground {
-    /// What photographs have behind their objects: a wall, a floor, a corner or a relief.
+    /// Makes a photograph-like background: a wall, a ground plane, a corner or a relief.
     pub(super) fn natural(dice: &mut Dice) -> Self {
         Self::of(Self::like_photographs(dice), [0.0, 1.0])
     }
 
-    /// Any surface, its depths pressed into `span`: those of [`natural`](Self::natural), slopes through the whole
-    /// volume, curved surfaces and terraces.
+    /// Makes a surface of any kind, with its depths scaled into `span`: those of [`natural`](Self::natural), slopes
+    /// through the whole volume, curved surfaces and terraces.
     pub(super) fn varied(dice: &mut Dice, span: [f64; 2]) -> Self {
         let depth_at = match dice.weighted(&[0.4, 0.2, 0.3, 0.1]) {
             0 => Self::like_photographs(dice),
@@ -40,9 +41,9 @@ impl Ground {
         )
     }
 
-    /// The depth at (u, v), u from the left and v from below, both in [0, 1].
+    /// Makes the depth at (u, v), u from the left and v from below, both in [0, 1].
     fn like_photographs(dice: &mut Dice) -> Box<dyn Fn(f64, f64) -> f64> {
-        // A plane by its depth at the frame's middle and what it gains toward the edge in a direction.
+        // A plane, by its depth at the frame's middle and the depth that it gains toward the edge in a direction.
         let plane = |dice: &mut Dice, middle: [f64; 2], slope: [f64; 2], angle: f64| {
             let (middle, slope) = (dice.range(middle[0], middle[1]), dice.range(slope[0], slope[1]));
             let (sin, cos) = libm::sincos(angle);
@@ -52,7 +53,7 @@ impl Ground {
         match dice.weighted(&[0.3, 0.3, 0.2, 0.2]) {
             0 => Box::new(plane(dice, [0.5, 1.0], [0.0, 0.5], any)),
             1 => {
-                // A floor that rises to a wall, the camera a little aslant.
+                // A ground plane that rises to a wall, seen by a slightly tilted camera.
                 let (sin, cos) = libm::sincos(dice.range(-0.35, 0.35));
                 let (near, far) = (dice.range(0.0, 0.4), dice.range(0.6, 1.05));
                 let (horizon, bend) = (dice.range(0.25, 0.8), dice.log_range(0.6, 1.8));
@@ -90,7 +91,7 @@ impl Ground {
         }
     }
 
-    /// A plane that runs through much of the volume, in any direction.
+    /// Makes a plane that runs through much of the volume, in any direction.
     fn slope(dice: &mut Dice) -> Box<dyn Fn(f64, f64) -> f64> {
         let (sin, cos) = libm::sincos(TAU * dice.unit());
         let (near, far) = (dice.range(0.0, 0.4), dice.range(0.6, 1.0));
@@ -101,13 +102,13 @@ impl Ground {
         })
     }
 
-    /// A bowl, a dome, a pipe, a saddle or waves.
+    /// Makes a bowl, a dome, a pipe, a saddle or waves.
     fn curved(dice: &mut Dice) -> Box<dyn Fn(f64, f64) -> f64> {
         let (sin, cos) = libm::sincos(TAU * dice.unit());
         let [x0, y0] = [0; 2].map(|_| dice.range(-0.5, 0.5));
         let (middle, height) = (dice.range(0.4, 0.9), dice.range(0.2, 1.0));
         let height = if dice.chance(0.5) { height } else { -height };
-        // How much the surface bends along its two axes.
+        // The curvature along the two axes of the surface.
         let bends = dice.pick(&[[1.0, 1.0], [1.0, 0.0], [1.0, -1.0], [1.0, 0.3]]);
         let waves = dice.chance(0.35).then(|| dice.log_range(0.7, 5.0));
         Box::new(move |u, v| {
@@ -121,20 +122,20 @@ impl Ground {
         })
     }
 
-    /// Steps of one height, as wide as they are many.
+    /// Divides a slope into steps of equal height.
     fn terraces(dice: &mut Dice) -> Box<dyn Fn(f64, f64) -> f64> {
         let slope = Self::slope(dice);
         let steps = dice.log_range(2.0, 10.0).floor();
         Box::new(move |u, v| ((slope(u, v) * steps).floor() + 0.5) / steps)
     }
 
-    /// The depth behind a point, u from the left and v from below.
+    /// Returns the depth behind a point, u from the left and v from below.
     pub(super) fn at(&self, u: f64, v: f64) -> f64 {
         let [i, j] = [u, v].map(|t| (t.clamp(0.0, 1.0) * PIECES as f64 + 0.5) as usize);
         self.0[j * (PIECES + 1) + i]
     }
 
-    /// The surface, a little larger than a frame of that many pixels. Lengths along z are in pixels.
+    /// Returns the surface, a little larger than a frame of this size in pixels. Lengths along z are in pixels.
     pub(super) fn sheet(&self, width: f64, height: f64) -> Shape {
         let (w, h) = (1.02 * width, 1.02 * height);
         Shape::grid(PIECES, PIECES, |u, v| {

@@ -1,7 +1,7 @@
-//! Random scenes like photographs: bright and dark ones, a background that fills the frame, textures whose power falls
-//! as 1/f² with colours that vary together, objects and depth steps of all sizes, thin things and writing.
+//! Photograph-like random scenes. They are bright or dark, with a background that fills the frame, textures whose power
+//! falls as 1/f² and whose colours vary together, objects and depth steps of all sizes, thin objects and writing.
 //!
-//! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
+//! The scenes do not depend on the machine: random numbers come from [`Dice`], sines and powers from `libm`.
 
 use crate::scene::pattern::Pattern;
 use crate::scene::random::ground::Ground;
@@ -14,14 +14,14 @@ use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Most texels of a texture along a side. Larger surfaces show larger texels.
+/// The most texels of a texture along a side. Larger surfaces show larger texels.
 const MAX_TEXELS: f64 = 432.0;
-/// What red, green and blue gain where a colour is warmer, and where it is more purple.
+/// The change of red, green and blue in a warmer and in a more purple colour.
 const WARMER: [f64; 3] = [0.5, 0.0, -0.5];
 const PURPLER: [f64; 3] = [0.25, -0.5, 0.25];
 
-/// A random scene like a photograph for a frame of `height` x `width` pixels. Surfaces show pieces of `photographs`
-/// where there are any. The same arguments give the same scene on every machine.
+/// Makes a random photograph-like scene for a frame of `height` x `width` pixels. Surfaces show pieces of `photographs`
+/// if there are any. The same arguments give the same scene on every machine.
 pub fn natural_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
     let mut dice = Dice::new(seed);
     let ground = Ground::natural(&mut dice);
@@ -36,7 +36,7 @@ pub fn natural_scene(seed: u64, height: usize, width: usize, photographs: &[Text
     Scene { meshes }
 }
 
-/// One scene in the making: its frame, and what its surfaces have in common.
+/// A scene under construction: its frame, and the common properties of its surfaces.
 struct Maker<'a> {
     dice: Dice,
     height: f64,
@@ -44,13 +44,13 @@ struct Maker<'a> {
     ground: Ground,
     photographs: &'a [Texture],
     light: Light,
-    /// About how bright surfaces are.
+    /// The typical brightness of surfaces.
     exposure: f64,
-    /// How far colours stand from grey.
+    /// The distance of colours from grey.
     colourfulness: f64,
-    /// How much of its own brightness a texture varies by.
+    /// The variation of a texture as a fraction of its brightness.
     contrast: f64,
-    /// Radii of the smallest and the largest objects, in pixels.
+    /// The radii of the smallest and the largest objects, in pixels.
     radii: [f64; 2],
 }
 
@@ -80,7 +80,7 @@ impl<'a> Maker<'a> {
         sheet.place(&place, Arc::new(texture))
     }
 
-    /// A thing in front of the background: by little or by much, or anywhere in the volume.
+    /// Makes an object in front of the background: close to it, far from it, or anywhere in the volume.
     fn object(&mut self) -> Mesh {
         let radius = self.radius();
         let (shape, flat) = shape(&mut self.dice, radius);
@@ -98,13 +98,13 @@ impl<'a> Maker<'a> {
         settle(mesh, depth)
     }
 
-    /// A page, a sign: dark on bright or bright on dark, or with the letters alone.
+    /// Makes a page or a sign: dark on bright, bright on dark, or only the letters.
     fn writing(&mut self) -> Mesh {
         let radius = self.radii[1] * self.dice.range(0.3, 1.0);
         let aspect = self.dice.log_range(0.4, 1.0);
         let scale = [radius, radius * aspect, 1.0];
         let size = texels(radius);
-        // Strokes of a texel's width at least.
+        // Strokes are at least a texel wide.
         let most = (size.1 / 12).max(2);
         let lines = self.dice.integer(1, most.min(14));
         let thickness = self.dice.range(0.08, 0.25) as f32;
@@ -133,7 +133,8 @@ impl<'a> Maker<'a> {
         settle(mesh, depth)
     }
 
-    /// A thread that hangs across a part of the frame, one to five pixels thick, one end deeper than the other.
+    /// Makes a thread that hangs across a part of the frame. It is one to five pixels thick, and one end is deeper than
+    /// the other.
     fn wire(&mut self) -> Mesh {
         let length = self.width.max(self.height) * self.dice.log_range(0.2, 1.4);
         let half = self.dice.log_range(0.5, 2.5);
@@ -150,7 +151,7 @@ impl<'a> Maker<'a> {
         )
     }
 
-    /// Twigs, grass, cracks: straight pieces that fork and grow thinner.
+    /// Makes twigs, grass or cracks: straight pieces that fork and become thinner.
     fn branches(&mut self) -> Mesh {
         let side = self.width.min(self.height);
         let length = side * self.dice.log_range(0.08, 0.3);
@@ -161,7 +162,7 @@ impl<'a> Maker<'a> {
         self.thin(shape, turn([0.0, 0.0, 1.0], 0.0), at, depth)
     }
 
-    /// A shape of pixels across and up whose z is depth already.
+    /// Places a shape whose x and y are in pixels and whose z is already a depth.
     fn thin(&mut self, shape: Shape, rotation: [[f64; 3]; 3], at: [f64; 2], depth: f64) -> Mesh {
         let mut colour = self.colour();
         if self.dice.chance(0.5) {
@@ -176,7 +177,7 @@ impl<'a> Maker<'a> {
         self.radii[0] * libm::pow(self.radii[1] / self.radii[0], t)
     }
 
-    /// A place in parts of the frame, from its left and top.
+    /// Returns a random position, as fractions of the frame from its left and top.
     fn somewhere(&mut self) -> [f64; 2] {
         [0; 2].map(|_| self.dice.range(-0.05, 1.05))
     }
@@ -200,7 +201,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    /// A piece of a photograph, or a texture of chance: of one natural surface, or of two in a pattern.
+    /// Makes a piece of a photograph, or a random texture of one natural surface or of two in a pattern.
     fn texture(&mut self, size: (usize, usize)) -> Texture {
         if !self.photographs.is_empty() && self.dice.chance(0.7) {
             let index = self.dice.integer(0, self.photographs.len() - 1);
@@ -220,7 +221,8 @@ impl<'a> Maker<'a> {
         Texture::sized(size.0, size.1, texels.collect())
     }
 
-    /// The colours of one material: brightness, and less and smoother than it hue, vary about a mean as 1/f² noise.
+    /// Makes the colours of one material. Brightness varies around a mean as 1/f² noise; hue varies less and more
+    /// smoothly.
     fn surface(&mut self, size: (usize, usize)) -> Vec<[f32; 3]> {
         let mean = self.colour();
         let dice = &mut self.dice;
@@ -245,7 +247,7 @@ impl<'a> Maker<'a> {
             .collect()
     }
 
-    /// A colour of this scene, in [0, 1].
+    /// Returns a colour of this scene, in [0, 1].
     fn colour(&mut self) -> [f32; 3] {
         let dice = &mut self.dice;
         let brightness = self.exposure * dice.log_range(0.3, 2.0);
@@ -257,7 +259,8 @@ impl<'a> Maker<'a> {
     }
 }
 
-/// The size of the texture of a thing whose largest radius is `radius` pixels: two texels a pixel, up to a limit.
+/// Returns the size of the texture of an object whose largest radius is `radius` pixels: two texels per pixel, up to a
+/// limit.
 fn texels(radius: f64) -> (usize, usize) {
     let size = 2 * radius.round().clamp(4.0, MAX_TEXELS / 4.0) as usize;
     (size, size)
@@ -282,7 +285,7 @@ mod tests {
         Texture::new(width, height, (0..width * height).map(texel).collect()).unwrap()
     }
 
-    /// These numbers are what any machine must get: data sets made in parts on several belong together.
+    /// Every machine must reproduce these numbers, because a data set may be made in parts on several machines.
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         let photographs = [gradient(150, 90), gradient(20, 30)];
@@ -317,7 +320,7 @@ mod tests {
             for &d in &front.depth {
                 deciles[((d * 10.0) as usize).min(9)] += 0.1 / (60.0 * 19.2 * 192.0);
             }
-            // Steps between neighbours beyond what slanted planes have, a decade of size each.
+            // Counts steps between neighbours that exceed those of slanted planes, by decade of size.
             for pair in front.depth.windows((1, 2)) {
                 let step = (pair[(0, 1)] - pair[(0, 0)]).abs();
                 let class = [0.01, 0.03, 0.1, 0.3].iter().rposition(|&least| step > least);

@@ -1,7 +1,7 @@
-//! The random scenes that data sets are made of: many objects of random shape, texture, scale and tilt, with the
-//! depths that are seen spread evenly over the volume, so that every depth and every kind of edge is learnt.
+//! The random scenes for data sets: many objects of random shape, texture, scale and tilt. Their visible depths are
+//! spread evenly over the volume, so networks learn every depth and every kind of edge.
 //!
-//! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
+//! The scenes do not depend on the machine: random numbers come from [`Dice`], sines and powers from `libm`.
 
 use crate::scene::pattern::Pattern;
 use crate::scene::random::parts::{
@@ -13,12 +13,13 @@ use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// A random scene for a frame of `height` x `width` pixels. The same arguments give the same scene on every machine.
+/// Makes a random scene for a frame of `height` x `width` pixels. The same arguments give the same scene on every
+/// machine.
 pub fn random_scene(seed: u64, height: usize, width: usize) -> Scene {
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64);
     let background = maker.background();
     let count = maker.dice.log_range(40.0, 120.0) as usize;
-    // One depth in each of `count` equal parts, in random order: each scene spans the volume.
+    // One depth in each of `count` equal parts, in random order, so that each scene spans the volume.
     let mut depths: Vec<f64> = (0..count)
         .map(|i| (i as f64 + maker.dice.unit()) / count as f64)
         .collect();
@@ -33,20 +34,20 @@ pub fn random_scene(seed: u64, height: usize, width: usize) -> Scene {
     Scene { meshes }
 }
 
-/// One scene in the making: its frame, and what its objects have in common.
+/// A scene under construction: its frame, and the common properties of its objects.
 struct Maker {
     dice: Dice,
     height: f64,
     width: f64,
     light: Option<Light>,
     palette: Palette,
-    /// Radii of the smallest and the largest objects, in pixels.
+    /// The radii of the smallest and the largest objects, in pixels.
     radii: [f64; 2],
-    /// Above one, small objects are more frequent than an even spread of log radius has them.
+    /// Above one, small objects are more frequent than in a uniform distribution of log radius.
     smallness: f64,
 }
 
-/// The colours of one scene: hues about a centre, ranges of saturation and brightness.
+/// The colours of one scene: hues around a centre, and ranges of saturation and brightness.
 struct Palette {
     hue: f64,
     hue_spread: f64,
@@ -78,14 +79,14 @@ impl Maker {
         }
     }
 
-    /// What stands behind all else, if anything.
+    /// Makes the background, if the scene has one.
     fn background(&mut self) -> Option<Mesh> {
         let dice = &mut self.dice;
         let style = dice.weighted(&[0.4, 0.3, 0.15, 0.15]);
         if style == 0 {
             return None;
         }
-        // Depths at the middle and how they change to the frame's edges.
+        // The depth at the middle, its change toward the frame's edges, and the height of bumps.
         let (middle, slope, bumps) = match style {
             1 => (dice.range(0.62, 1.0), dice.range(0.02, 0.35), 0.0),
             2 => (dice.range(0.5, 0.7), dice.range(0.3, 0.5), 0.0),
@@ -95,10 +96,10 @@ impl Maker {
         let pieces = if bumps > 0.0 { 24 } else { 1 };
         let cells = dice.integer(2, 5);
         let relief = Pattern::noise((pieces + 1, pieces + 1), (cells, cells), 2, 0.4, dice);
-        // A texel a pixel, up to a limit, on a sheet a little larger than the frame.
+        // One texel per pixel, up to a limit, on a sheet a little larger than the frame.
         let size = [self.width, self.height].map(|v| v.min(3.0 * MAX_TEXELS) as usize);
         let texture = self.texture((size[0].max(1), size[1].max(1)), &[0.5, 1.0, 1.0]);
-        // The tilt is steepest where it spans as much depth across the frame as `slope` says, whatever its direction.
+        // The division by `reach` makes the steepest tilt span the depth `slope` across the frame in every direction.
         let reach = sin.abs() + cos.abs();
         let depth_at = |u: f64, v: f64| {
             let tilt = slope * (cos * (2.0 * u - 1.0) + sin * (2.0 * v - 1.0)) / reach;
@@ -115,7 +116,7 @@ impl Maker {
         ))
     }
 
-    /// One object about the depth `depth` in [0, 1].
+    /// Makes one object around the depth `depth` in [0, 1].
     fn object(&mut self, depth: f64) -> Mesh {
         let t = libm::pow(self.dice.unit(), self.smallness);
         let radius = self.radii[0] * libm::pow(self.radii[1] / self.radii[0], t);
@@ -123,7 +124,7 @@ impl Maker {
         let dice = &mut self.dice;
         let scale = stretch(dice, radius, flat);
         let rotation = turned(dice, flat);
-        // Objects as deep as they are wide up to several times as deep; never deeper than most of the volume.
+        // Objects are from half as deep as wide to several times as deep, but never deeper than most of the volume.
         let deep = dice.log_range(0.5, 5.0);
         let size = scale[0]
             .max(scale[1])
@@ -141,7 +142,7 @@ impl Maker {
         settle(mesh, depth)
     }
 
-    /// `at`: x and y in parts of the frame, z as it is.
+    /// Returns the placement at `at`: x and y as fractions of the frame, z unchanged.
     fn place(&self, scale_px: [f64; 3], rotation: [[f64; 3]; 3], deep: f64, at: [f64; 3]) -> Place {
         Place {
             scale_px,
@@ -152,7 +153,8 @@ impl Maker {
         }
     }
 
-    /// A texture whose contrast is one of `contrasts`, of the largest that its colours have; 0 is a plain surface.
+    /// Makes a texture with one of the `contrasts`, each a fraction of the largest contrast of its colours. 0 gives a
+    /// plain surface.
     fn texture(&mut self, size: (usize, usize), contrasts: &[f32]) -> Texture {
         let ramp = [0; 3].map(|_| self.palette.colour(&mut self.dice));
         let contrast = self.dice.pick(contrasts);
@@ -172,7 +174,7 @@ impl Palette {
         let hue = self.hue + self.hue_spread * dice.range(-1.0, 1.0);
         let saturation = dice.range(self.saturation[0], self.saturation[1]);
         let brightness = dice.range(self.brightness[0], self.brightness[1]);
-        // Hue on the hexagon of full colours, red at 0, green at ⅓, blue at ⅔.
+        // Hue on the hexagon of full colours, with red at 0, green at ⅓ and blue at ⅔.
         [0.0, 2.0 / 3.0, 1.0 / 3.0].map(|offset| {
             let t = hue + offset;
             let pure = ((6.0 * (t - t.floor()) - 3.0).abs() - 1.0).clamp(0.0, 1.0);
@@ -193,7 +195,7 @@ pub(super) mod tests {
         render_ldi_reference(&random_scene(seed, height, width), height, width, 5).unwrap()
     }
 
-    /// FNV-1a over what the LDI's PNGs hold.
+    /// Computes FNV-1a over the contents of the LDI's PNGs.
     pub(in crate::scene) fn fingerprint(ldi: &Ldi) -> u64 {
         let codes = ldi.quantized().layers.into_iter().flat_map(|layer| {
             let colours = layer.rgb.into_iter().map(|v| (v * 255.0).round() as u32);
@@ -211,7 +213,7 @@ pub(super) mod tests {
         })
     }
 
-    /// These numbers are what any machine must get: data sets made in parts on several belong together.
+    /// Every machine must reproduce these numbers, because a data set may be made in parts on several machines.
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         assert_eq!(
@@ -253,7 +255,7 @@ pub(super) mod tests {
         let total: f64 = deciles.iter().sum();
         let shares = deciles.map(|count| count / total);
         assert!(shares.iter().all(|share| (0.05..=0.16).contains(share)), "{shares:.3?}");
-        // The paper: valid pixels become few with each layer; the fifth still has some.
+        // As in the paper, valid pixels become few with each layer, but the fifth layer still has some.
         assert!(
             layers
                 .windows(2)

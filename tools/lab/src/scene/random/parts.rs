@@ -1,4 +1,4 @@
-//! What random scenes of every kind are made of: shapes, poses and patterns drawn by chance.
+//! The parts of random scenes of every kind: random shapes, poses and patterns.
 
 use crate::scene::Mesh;
 use crate::scene::pattern::Pattern;
@@ -6,15 +6,15 @@ use crate::scene::shapes::{Light, Shape, quaternion, star, turn};
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
-/// Parts of the volume's depth that a length of one pixel takes where nothing is stretched: 8 µm of 6 mm.
+/// The fraction of the volume's depth for a length of one pixel without stretching: 8 µm of 6 mm.
 pub(super) const DEPTH_PER_PX: f64 = 8e-6 / 6e-3;
-/// Most texels of an object's texture along a side. Larger objects show larger texels.
+/// The most texels of an object's texture along a side. Larger objects show larger texels.
 pub(super) const MAX_TEXELS: f64 = 144.0;
-/// How much of the volume stays empty at either end.
+/// The fraction of the volume that stays empty at either end.
 pub(super) const MARGIN: f64 = 0.004;
 
-/// Light from the viewer's side: `front` is added to the part of its direction that points there. Its ambient part lies
-/// from `least` to `most`.
+/// Makes light from the viewer's side: `front` is added to its direction toward the viewer. The ambient part lies
+/// between `least` and `most`.
 pub(super) fn light(dice: &mut Dice, front: f64, [least, most]: [f64; 2]) -> Light {
     let [x, y, z] = dice.direction();
     let toward = z.abs() + front;
@@ -25,7 +25,7 @@ pub(super) fn light(dice: &mut Dice, front: f64, [least, most]: [f64; 2]) -> Lig
     }
 }
 
-/// A shape, and whether it is a sheet. `radius` in pixels decides how finely it is made.
+/// Makes a random shape, and tells whether it is a sheet. `radius`, in pixels, sets its detail.
 pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {
     let detail = (radius.sqrt() * 3.0).clamp(6.0, 32.0) as usize;
     match dice.weighted(&[1.6, 1.2, 0.8, 1.0, 0.8, 0.9, 1.6, 1.0, 0.7, 0.5, 0.6]) {
@@ -58,7 +58,7 @@ pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {
             (Shape::polygon(&star(points, dice.range(0.3, 1.0))), true)
         }
         8 => {
-            // A sheet that waves.
+            // A wavy sheet.
             let (along, across) = (dice.range(0.5, 2.0), dice.range(0.0, 1.0));
             let height = dice.range(0.05, 0.35);
             let wave = |u: f64, v: f64| {
@@ -82,7 +82,7 @@ pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {
             (Shape::loop_tube(3 * detail, dice.range(0.05, 0.14), curve), false)
         }
         _ => {
-            // A swarm: leaves, confetti, gravel.
+            // A swarm of leaves, confetti or gravel.
             let leaf = Shape::polygon(&star(dice.integer(2, 4), dice.range(0.4, 1.0)));
             let mut swarm = Shape::default();
             for _ in 0..dice.integer(6, 24) {
@@ -97,7 +97,7 @@ pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {
     }
 }
 
-/// A rotation: of sheets one that shows their faces, tilted by 80 degrees at most.
+/// Returns a random rotation. A sheet tilts by at most 80 degrees, so its face stays visible.
 pub(super) fn turned(dice: &mut Dice, flat: bool) -> [[f64; 3]; 3] {
     if flat {
         let (sin, cos) = libm::sincos(TAU * dice.unit());
@@ -110,13 +110,13 @@ pub(super) fn turned(dice: &mut Dice, flat: bool) -> [[f64; 3]; 3] {
     }
 }
 
-/// An object's half sizes in pixels: bars, plates and lumps.
+/// Returns an object's half sizes in pixels, for bars, plates and lumps.
 pub(super) fn stretch(dice: &mut Dice, radius: f64, flat: bool) -> [f64; 3] {
     let thinnest = (1.0 / radius).min(1.0);
     match dice.weighted(&[1.0, 1.0, 0.5]) {
         0 => [radius; 3],
         1 => [0; 3].map(|_| radius * dice.range(0.35, 1.0)),
-        // A rod, a slat: longer than the rest is large.
+        // A rod or a slat: thin, and longer than the radius of the other shapes.
         _ => {
             let thin = dice.log_range(0.04, 0.25).max(thinnest);
             let other = if flat { 1.0 } else { thin };
@@ -125,8 +125,8 @@ pub(super) fn stretch(dice: &mut Dice, radius: f64, flat: bool) -> [f64; 3] {
     }
 }
 
-/// The mesh moved along z, and pressed flatter if need be, so that it lies inside the volume about `depth`: at the
-/// ends of the volume its nearest or farthest point touches them.
+/// Moves the mesh along z, and flattens it if needed, so that it lies inside the volume around `depth`. At the ends of
+/// the volume, its nearest or farthest point touches them.
 pub(super) fn settle(mut mesh: Mesh, depth: f64) -> Mesh {
     let heights = || mesh.positions.iter().map(|p| f64::from(p[2]));
     let (low, high) = heights().fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
@@ -144,9 +144,9 @@ fn multiply(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// A pattern of any sort.
+/// Makes a pattern of any kind.
 pub(super) fn pattern(dice: &mut Dice, size: (usize, usize)) -> Pattern {
-    // Features of 3 texels at least.
+    // Features are at least 3 texels wide.
     let finest = (size.0.min(size.1) as f64 / 6.0).max(1.0);
     let repeats = |dice: &mut Dice| dice.log_range(1.0, finest.min(16.0)) as usize;
     match dice.weighted(&[4.0, 1.5, 0.8, 0.8, 0.8, 0.8, 0.8, 0.6, 0.6]) {
@@ -191,7 +191,7 @@ pub(super) fn pattern(dice: &mut Dice, size: (usize, usize)) -> Pattern {
     }
 }
 
-/// Where a sheet has holes: lattices, sieves, writing, tatters.
+/// Makes the holes of a sheet: lattices, sieves, writing, tatters.
 pub(super) fn holes(dice: &mut Dice, size: (usize, usize)) -> Pattern {
     let count = dice.integer(2, (size.0.min(size.1) / 8).clamp(2, 8));
     match dice.integer(0, 4) {

@@ -1,4 +1,4 @@
-//! Pictures that the surfaces of random scenes show: a folder of the user's own.
+//! Pictures for the surfaces of random scenes, from a folder of the user.
 
 use crate::scene::Texture;
 use phasefront_io::dice::Dice;
@@ -6,13 +6,13 @@ use phasefront_io::fingerprint::Fingerprint;
 use phasefront_io::{Error, Result, output, picture};
 use std::path::Path;
 
-/// What the names of pictures end in.
+/// The file extensions of pictures.
 const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
 
-/// The pictures (.jpg, .jpeg, .png) in `folder`, in the order of their names.
+/// Reads the pictures (.jpg, .jpeg, .png) in `folder`, in the order of their names.
 ///
 /// # Errors
-/// A folder without pictures, or a picture that cannot be read.
+/// Returns an error if the folder has no pictures or a picture cannot be read.
 pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut paths = entries
@@ -32,8 +32,8 @@ pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
     paths.iter().map(read).collect()
 }
 
-/// A piece of `photograph` as a texture of `size`, each texel the mean of a square of it: somewhere in it, as coarse as
-/// may be.
+/// Returns a random piece of `photograph` as a texture of `size`. Each texel is the mean of a square of the photograph,
+/// of a random side up to the largest that fits.
 pub(super) fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice) -> Texture {
     let (width, height) = (photograph.width(), photograph.height());
     let largest = (width / size.0).min(height / size.1).max(1);
@@ -55,7 +55,7 @@ pub(super) fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice)
     Texture::sized(size.0, size.1, texels.collect())
 }
 
-/// FNV-1a over sizes and texels, by which a data set knows its photographs again.
+/// Computes FNV-1a over sizes and texels, by which a data set identifies its photographs.
 pub fn fingerprint(photographs: &[Texture]) -> u64 {
     let mut hash = Fingerprint::default();
     for photograph in photographs {

@@ -1,7 +1,7 @@
 //! Textures of every spectrum: noise whose power falls as 1/f^0 to 1/f^3 down to two texels, single points, stripes,
-//! checks, writing, gradients and plain surfaces, of any contrast, grey or with each colour on its own.
+//! checks, writing, gradients and plain surfaces. They have any contrast, in grey or with each colour on its own.
 //!
-//! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
+//! The textures do not depend on the machine: random numbers come from [`Dice`], sines and powers from `libm`.
 
 use crate::scene::Texture;
 use crate::scene::pattern::Pattern;
@@ -10,30 +10,30 @@ use crate::scene::random::photographs::piece;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
-/// How often surfaces are of each kind, where a scene has no favourite: noise, points, stripes, checks, writing,
-/// gradients, plain ones and patterns of [`pattern`].
+/// The relative frequencies of the kinds of surfaces in a scene without a favourite: noise, points, stripes, checks,
+/// writing, gradients, plain surfaces and patterns of [`pattern`].
 const SHARES: [f64; 8] = [6.0, 0.6, 1.2, 0.7, 1.0, 0.5, 1.0, 2.0];
-/// The place of points among them.
+/// The index of points in [`SHARES`].
 const POINTS: usize = 1;
-/// How many times as often a scene's favourite is there.
+/// The factor by which a scene's favourite kind is more frequent.
 const FAVOURITE: f64 = 40.0;
 
-/// What the surfaces of one scene have in common.
+/// The common properties of the surfaces of one scene.
 pub(super) struct Surfaces<'a> {
     photographs: &'a [Texture],
-    /// The brightness that surfaces lie about.
+    /// The typical brightness of surfaces.
     exposure: f64,
-    /// By what factor a surface's brightness differs from it at most.
+    /// The largest factor between a surface's brightness and the typical one.
     spread: f64,
-    /// How far colours stand from grey, in [0, 1].
+    /// The distance of colours from grey, in [0, 1].
     colourfulness: f64,
-    /// The share of surfaces on which each colour has a pattern of its own.
+    /// The share of surfaces on which each colour has its own pattern.
     own_colours: f64,
-    /// Of what brightness leaves room for, how much textures vary by.
+    /// The range of the textures' contrast, as a fraction of the contrast that the brightness allows.
     contrast: [f64; 2],
-    /// The share of surfaces that go from black to white.
+    /// The share of surfaces that range from black to white.
     whole: f64,
-    /// The exponents of 1/f^exponent that the power of noise falls by.
+    /// The range of the exponent in 1/f^exponent, the power of noise.
     exponents: [f64; 2],
     shares: [f64; 8],
 }
@@ -58,7 +58,8 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// The texture of one surface: a piece of a photograph, one of the kinds here, or two of them in a pattern.
+    /// Makes the texture of one surface: a piece of a photograph, one of the kinds of this module, or two of them in a
+    /// pattern.
     pub(super) fn texture(&self, dice: &mut Dice, size: (usize, usize)) -> Texture {
         if !self.photographs.is_empty() && dice.chance(0.35) {
             return piece(
@@ -81,7 +82,7 @@ impl<'a> Surfaces<'a> {
         Texture::sized(size.0, size.1, texels.collect())
     }
 
-    /// A colour of this scene, in [0, 1].
+    /// Returns a colour of this scene, in [0, 1].
     pub(super) fn colour(&self, dice: &mut Dice) -> [f32; 3] {
         let brightness = self.exposure * dice.log_range(1.0 / self.spread, self.spread);
         let tint = self.colourfulness * dice.unit();
@@ -89,14 +90,14 @@ impl<'a> Surfaces<'a> {
         hues.map(|hue| (brightness.min(1.0) * (1.0 + tint * hue)).clamp(0.0, 1.0) as f32)
     }
 
-    /// The colours of a surface of one kind, row by row.
+    /// Returns the colours of a surface of one kind, row by row.
     fn one_kind(&self, dice: &mut Dice, size: (usize, usize)) -> Vec<[f32; 3]> {
         let kind = dice.weighted(&self.shares);
         let mean = self.colour(dice);
         let count = if dice.chance(self.own_colours) { 3 } else { 1 };
         let patterns: Vec<Pattern> = (0..count).map(|_| self.pattern(dice, kind, size)).collect();
         let [dark, bright] = self.ends(dice, mean);
-        // Between black and white a power of the pattern brings about the mean.
+        // Between black and white, a power of the pattern gives approximately the mean.
         let powers = mean.map(|m| 1.0 / m.clamp(0.04, 0.96) - 1.0);
         let whole = dice.chance(if kind == POINTS { 0.8 } else { self.whole });
         (0..size.0 * size.1)
@@ -114,7 +115,7 @@ impl<'a> Surfaces<'a> {
             .collect()
     }
 
-    /// The colours at a pattern's values 0 and 1, about `mean`.
+    /// Returns the colours at a pattern's values 0 and 1, around `mean`.
     fn ends(&self, dice: &mut Dice, mean: [f32; 3]) -> [[f32; 3]; 2] {
         let contrast = dice.range(self.contrast[0], self.contrast[1]) as f32;
         let sign = if dice.chance(0.5) { 1.0 } else { -1.0 };
@@ -136,7 +137,7 @@ impl<'a> Surfaces<'a> {
             }
             3 => Pattern::slanted_checks(size, dice.log_range(1.0, (side / 2.0).max(2.0)), TAU * dice.unit()),
             4 => {
-                // Lines of 6 texels at least.
+                // Lines are at least 6 texels high.
                 let most = (size.1 / 6).clamp(1, 30);
                 let lines = dice.integer(1, most);
                 Pattern::strokes(size, lines, dice.range(0.08, 0.25) as f32, dice)
@@ -147,10 +148,11 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Noise whose power falls as 1/f^exponent, from white noise to clouds; its contrast up to that of two tones.
+    /// Makes noise whose power falls as 1/f^exponent, from white noise to clouds. Its contrast reaches up to that of
+    /// two tones.
     fn noise(&self, dice: &mut Dice, size: (usize, usize)) -> Pattern {
         let exponent = dice.range(self.exponents[0], self.exponents[1]);
-        // An octave's power is 1/f^exponent times the area of its ring of frequencies, f².
+        // The power of an octave is 1/f^exponent times the area of its ring of frequencies, f².
         let roughness = libm::pow(2.0, (2.0 - exponent) / 2.0) as f32;
         let cells = dice.integer(1, 3);
         let stretch = dice.pick(&[1, 1, 1, 1, 1, 2, 6]);
@@ -164,7 +166,7 @@ impl<'a> Surfaces<'a> {
 mod tests {
     use super::*;
 
-    /// The part of a row's variance that differences of neighbours have: 1 of white noise, near 0 of clouds.
+    /// Returns the share of a row's variance in the differences of neighbours: 1 for white noise, near 0 for clouds.
     fn roughness(pattern: &Pattern, side: usize) -> f64 {
         let row = |y: usize| (0..side).map(move |x| f64::from(pattern.at(x, y)));
         let (mut variance, mut steps) = (0.0, 0.0);
@@ -190,7 +192,7 @@ mod tests {
             (0..8).map(rough).sum::<f64>() / 8.0
         };
         let measured = [0.0, 1.0, 2.0, 3.0].map(&mut mean);
-        // White noise over two texels each way, as the finest octave is, has one half.
+        // The finest octave is white noise over two texels in each direction, so its roughness is one half.
         assert!((0.4..0.6).contains(&measured[0]) && measured[3] < 0.1, "{measured:.3?}");
         assert!(
             measured.windows(2).all(|pair| pair[1] < 0.85 * pair[0]),

@@ -1,11 +1,11 @@
-//! Thin things: threads, sticks and twigs, as shapes whose x and y are pixels and whose z is depth already.
+//! Thin objects: threads, sticks and twigs, as shapes whose x and y are in pixels and whose z is already a depth.
 
 use crate::scene::shapes::{Shape, turn};
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
-/// A thread along x that hangs through by `sag` pixels, `half` pixels to either side of its middle line. From its left
-/// end to its right one it comes nearer by `drop`, in parts of the volume's depth.
+/// Makes a thread along x that sags by `sag` pixels and extends `half` pixels to either side of its middle line. From
+/// its left to its right end it comes nearer by `drop`, a fraction of the volume's depth.
 pub(super) fn wire(length: f64, half: f64, sag: f64, drop: f64) -> Shape {
     Shape::grid(24, 1, |u, v| {
         let hang = sag * (4.0 * u * (u - 1.0) + 0.5);
@@ -13,15 +13,15 @@ pub(super) fn wire(length: f64, half: f64, sag: f64, drop: f64) -> Shape {
     })
 }
 
-/// A straight [`wire`].
+/// Makes a straight [`wire`].
 pub(super) fn stick(length: f64, half: f64, drop: f64) -> Shape {
     Shape::grid(1, 1, |u, v| {
         [length * (u - 0.5), half * (2.0 * v - 1.0), drop * (u - 0.5)]
     })
 }
 
-/// Twigs, grass, cracks: straight pieces that fork and grow thinner. The first is `length` pixels long and reaches
-/// `half` pixels to either side.
+/// Makes twigs, grass or cracks: straight pieces that fork and become thinner. The first piece is `length` pixels long
+/// and extends `half` pixels to either side.
 pub(super) fn branches(dice: &mut Dice, length: f64, half: f64) -> Shape {
     let mut tips = vec![([0.0, 0.0, 0.0], TAU * dice.unit(), length, half)];
     let mut shape = Shape::default();
@@ -38,7 +38,7 @@ pub(super) fn branches(dice: &mut Dice, length: f64, half: f64) -> Shape {
                 pieces -= 1;
                 let bent = angle + dice.range(-0.8, 0.8);
                 let shorter = length * dice.range(0.6, 0.95);
-                // Breadth first, so that no single twig takes all pieces.
+                // The order is breadth first, so that no single twig takes all pieces.
                 tips.insert(0, (to, bent, shorter, (half * 0.8).max(0.5)));
             }
         }

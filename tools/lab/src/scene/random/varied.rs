@@ -1,7 +1,7 @@
-//! Random scenes of every kind at once: few large objects, forty that overlap, hundreds of small or thin ones, in front
-//! of planes, slopes, curved surfaces or nothing, at any brightness, with textures of every spectrum.
+//! Random scenes of every kind: a few large objects, forty that overlap, or hundreds of small or thin ones, in front of
+//! planes, slopes, curved surfaces or nothing, at any brightness, with textures of every spectrum.
 //!
-//! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
+//! The scenes do not depend on the machine: random numbers come from [`Dice`], sines and powers from `libm`.
 
 use crate::scene::random::ground::Ground;
 use crate::scene::random::parts::{DEPTH_PER_PX, holes, light, settle, shape, stretch, turned};
@@ -13,11 +13,11 @@ use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Most texels of a texture along a side. Larger surfaces show larger texels.
+/// The most texels of a texture along a side. Larger surfaces show larger texels.
 const MAX_TEXELS: f64 = 432.0;
 
-/// A random scene of any kind for a frame of `height` x `width` pixels. Some surfaces show pieces of `photographs`
-/// where there are any. The same arguments give the same scene on every machine.
+/// Makes a random scene of any kind for a frame of `height` x `width` pixels. Some surfaces show pieces of
+/// `photographs` if there are any. The same arguments give the same scene on every machine.
 pub fn varied_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64, photographs);
     let crowd = &CROWDS[maker.dice.weighted(&CROWDS.each_ref().map(|crowd| crowd.share))];
@@ -29,27 +29,27 @@ pub fn varied_scene(seed: u64, height: usize, width: usize, photographs: &[Textu
     Scene { meshes }
 }
 
-/// The `index`th of `count` equal parts of [0, 1].
+/// Returns the `index`th of `count` equal parts of [0, 1].
 fn part(index: usize, count: usize) -> [f64; 2] {
     [index, index + 1].map(|i| i as f64 / count as f64)
 }
 
-/// How many objects of which size a scene has.
+/// The number and the sizes of the objects in a scene.
 struct Crowd {
-    /// How often scenes are so.
+    /// The share of scenes of this kind.
     share: f64,
-    /// Least and most objects.
+    /// The smallest and largest number of objects.
     objects: [f64; 2],
-    /// Their least and greatest radii, in parts of the frame's shorter side.
+    /// The smallest and largest radius of the objects, as fractions of the frame's shorter side.
     radii: [f64; 2],
-    /// The share of them that are flat sheets; the others are shapes of any kind.
+    /// The share of objects that are flat sheets. The others are shapes of any kind.
     sheets: f64,
-    /// Least and most thin things and specks.
+    /// The smallest and largest number of thin objects and specks.
     thin: [f64; 2],
 }
 
 static CROWDS: [Crowd; 5] = [
-    // Few and large.
+    // A few large objects.
     Crowd {
         share: 0.1,
         objects: [2.0, 10.0],
@@ -57,7 +57,7 @@ static CROWDS: [Crowd; 5] = [
         sheets: 0.3,
         thin: [0.5, 5.0],
     },
-    // About forty that overlap, mostly tilted sheets.
+    // About forty overlapping objects, mostly tilted sheets.
     Crowd {
         share: 0.35,
         objects: [30.0, 60.0],
@@ -65,7 +65,7 @@ static CROWDS: [Crowd; 5] = [
         sheets: 0.6,
         thin: [0.5, 5.0],
     },
-    // Hundreds of small ones.
+    // Hundreds of small objects.
     Crowd {
         share: 0.15,
         objects: [100.0, 400.0],
@@ -73,7 +73,7 @@ static CROWDS: [Crowd; 5] = [
         sheets: 0.3,
         thin: [0.5, 20.0],
     },
-    // Hundreds of sticks, wires, leaves and specks about some objects.
+    // Hundreds of sticks, wires, leaves and specks around some objects.
     Crowd {
         share: 0.2,
         objects: [2.0, 30.0],
@@ -81,7 +81,7 @@ static CROWDS: [Crowd; 5] = [
         sheets: 0.3,
         thin: [80.0, 400.0],
     },
-    // Of all sizes.
+    // Objects of all sizes.
     Crowd {
         share: 0.2,
         objects: [40.0, 200.0],
@@ -91,15 +91,15 @@ static CROWDS: [Crowd; 5] = [
     },
 ];
 
-/// One scene in the making: its frame, and what its surfaces have in common.
+/// A scene under construction: its frame, and the common properties of its surfaces.
 struct Maker<'a> {
     dice: Dice,
     height: f64,
     width: f64,
-    /// The nearest and the farthest depths that it uses: mostly all of the volume.
+    /// The nearest and the farthest depth of the scene, mostly the ends of the volume.
     span: [f64; 2],
     ground: Option<Ground>,
-    /// The share of objects that stand close in front of the ground.
+    /// The share of objects that lie close in front of the background.
     grounded: f64,
     light: Option<Light>,
     surfaces: Surfaces<'a>,
@@ -135,7 +135,7 @@ impl<'a> Maker<'a> {
         Some(sheet.place(&place, Arc::new(texture)))
     }
 
-    /// An object of the crowd in a part of the depths.
+    /// Makes an object of the crowd in a range of depths.
     fn object(&mut self, crowd: &Crowd, part: [f64; 2]) -> Mesh {
         let dice = &mut self.dice;
         let radius = (self.height.min(self.width) * dice.log_range(crowd.radii[0], crowd.radii[1])).max(1.0);
@@ -159,7 +159,7 @@ impl<'a> Maker<'a> {
         )
     }
 
-    /// A stick, a wire, a leaf, twigs or a speck in a part of the depths.
+    /// Makes a stick, a wire, a leaf, twigs or a speck in a range of depths.
     fn thin_thing(&mut self, part: [f64; 2]) -> Mesh {
         let side = self.width.min(self.height);
         let dice = &mut self.dice;
@@ -185,7 +185,7 @@ impl<'a> Maker<'a> {
         let texture = if dice.chance(0.3) {
             self.surfaces.texture(dice, (64, 8))
         } else {
-            // A thin thing is as often as bright as may be.
+            // A gain of 4 makes some thin objects as bright as possible.
             let colour = self.surfaces.colour(dice);
             let gain = dice.pick(&[0.2, 1.0, 1.0, 4.0]);
             Texture::plain(colour.map(|v| (gain * v).min(1.0)))
@@ -197,8 +197,8 @@ impl<'a> Maker<'a> {
         )
     }
 
-    /// A place in parts of the frame, from its left and top, and a depth there: close in front of the ground, or in a
-    /// part of the depths before it.
+    /// Returns a random position, as fractions of the frame from its left and top, and a depth there: close in front of
+    /// the background, or in a range of the depths before it.
     fn somewhere(&mut self, [low, high]: [f64; 2]) -> ([f64; 2], f64) {
         let at = [0; 2].map(|_| self.dice.range(-0.05, 1.05));
         let [near, far] = self.span;
@@ -222,7 +222,8 @@ impl<'a> Maker<'a> {
     }
 }
 
-/// The size of the texture of a thing whose largest radius is `radius` pixels: half to one and a half texels a pixel.
+/// Returns the size of the texture of an object whose largest radius is `radius` pixels: half to one and a half texels
+/// per pixel.
 fn texels(radius: f64, dice: &mut Dice) -> (usize, usize) {
     let size = (2.0 * radius * dice.range(0.5, 1.5)).clamp(8.0, MAX_TEXELS) as usize;
     (size, size)
@@ -246,7 +247,7 @@ mod tests {
         Texture::new(40, 20, (0..800).map(texel).collect()).unwrap()
     }
 
-    /// These numbers are what any machine must get: data sets made in parts on several belong together.
+    /// Every machine must reproduce these numbers, because a data set may be made in parts on several machines.
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         let of = |seed, photographs: &[Texture]| format!("{:016x}", fingerprint(&rendered(seed, 96, photographs)));
@@ -269,7 +270,8 @@ mod tests {
         }
     }
 
-    /// The mean amplitude, and the power of differences of neighbours over the variance: 2 of white noise, 0 if smooth.
+    /// Returns the mean amplitude, and the power of neighbours' differences over the variance: 2 for white noise, 0 for
+    /// a smooth image.
     fn brightness_and_roughness(ldi: &Ldi) -> (f64, f64) {
         let green = ldi.layers[0].rgb.mapv(f64::from);
         let green = green.index_axis(ndarray::Axis(0), 1);

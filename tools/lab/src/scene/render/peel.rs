@@ -1,5 +1,5 @@
-//! LDI rendering by depth peeling (paper, Methods, Algorithm 1) on the render pipeline of a GPU, or of a software
-//! driver in its place. What it renders, [`render_ldi_reference`](crate::scene::render_ldi_reference) defines.
+//! LDI rendering by depth peeling (paper, Methods, Algorithm 1) on the render pipeline of a GPU or of a software
+//! driver. [`render_ldi_reference`](crate::scene::render_ldi_reference) defines the result.
 
 use crate::scene::render::raster::check_size;
 use crate::scene::{Scene, Texture};
@@ -10,24 +10,25 @@ use std::collections::HashMap;
 use std::sync::{Arc, mpsc};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-/// Red, green, blue and depth.
+/// The format of the target: red, green, blue and depth.
 const TARGET: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Bytes of a pixel of [`TARGET`].
+/// The bytes of a pixel of [`TARGET`].
 const PIXEL: usize = 16;
-/// The depth that says that nothing was drawn.
+/// The depth of pixels at which nothing was drawn.
 const NO_HIT: f64 = -1.0;
 
-/// A vertex as `peel.wgsl` takes it: place in clip coordinates, texture coordinates, colour.
+/// A vertex in the layout of `peel.wgsl`: position in clip coordinates, texture coordinates, colour.
 type Vertex = [f32; 8];
 
-/// Renders layered depth images by depth peeling: N passes with two depth buffers, one that works conventionally and
-/// the previous pass's, behind which a fragment must lie. The device is found and the pipeline made once.
+/// Renders layered depth images by depth peeling: N passes with two depth buffers. One buffer works conventionally; the
+/// other is the previous pass's, and a fragment must lie behind it. The device is found and the pipelines are made
+/// once.
 ///
-/// Where the driver keeps 8 bits of subpixel precision, as all known ones do, coverage is the reference's; depths and
-/// colours differ in their last bits, so that a layer's holes, and the order of surfaces that touch, may differ in
-/// single pixels (measured on lavapipe: 19 of 7.4 million). On a software driver the reference is the faster of the
-/// two: five layers of a random scene of 384 x 384 take it 43 ms of processor time, depth peeling on lavapipe 76 ms.
+/// If the driver keeps 8 bits of subpixel precision, as all known drivers do, coverage equals the reference's. Depths
+/// and colours differ in their last bits, so a layer's holes and the order of touching surfaces may differ in single
+/// pixels (measured on lavapipe: 19 of 7.4 million). On a software driver the reference is faster: for five layers of a
+/// random scene of 384 x 384 it takes 43 ms of processor time, and depth peeling on lavapipe takes 76 ms.
 #[derive(Debug)]
 pub struct DepthPeeler {
     device: wgpu::Device,
@@ -47,7 +48,7 @@ struct Uploaded {
     draws: Vec<Draw>,
 }
 
-/// One mesh's part of the buffers, and its picture.
+/// A mesh's part of the buffers, and its picture.
 struct Draw {
     indices: std::ops::Range<u32>,
     base_vertex: i32,
@@ -55,7 +56,7 @@ struct Draw {
 }
 
 impl DepthPeeler {
-    /// Finds a GPU, the fastest if there are several, and makes the pipeline. An error says that there is none.
+    /// Finds a GPU, the fastest if there are several, and makes the pipelines. Returns an error if there is none.
     pub fn new() -> Result<Self> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let options = wgpu::RequestAdapterOptions {
@@ -88,15 +89,15 @@ impl DepthPeeler {
         })
     }
 
-    /// The device's name and interface.
+    /// Returns the device's name and interface.
     pub fn adapter(&self) -> &str {
         &self.adapter
     }
 
     /// Renders the first `layers` front-facing hits of every pixel of a `height` x `width` frame, front first.
     ///
-    /// An error if the frame or `layers` is zero or too large, if the scene fails [`Scene::check`], or if the frame,
-    /// the scene or one of its textures does not fit the device.
+    /// Returns an error if the frame or `layers` is zero or too large, if the scene fails [`Scene::check`], or if the
+    /// frame, the scene or one of its textures does not fit the device.
     pub fn render(&self, scene: &Scene, height: usize, width: usize, layers: usize) -> Result<Ldi> {
         scene.check()?;
         check_size(height, width, layers)?;
@@ -124,7 +125,7 @@ impl DepthPeeler {
         let mut indices: Vec<u32> = Vec::new();
         let mut pictures: HashMap<*const Texture, wgpu::BindGroup> = HashMap::new();
         let mut draws = Vec::with_capacity(scene.meshes.len());
-        // From last to first: of equal depths the scene's first counts, and the last drawn stays.
+        // Draws from last to first: of equal depths the scene's first surface counts, and the last drawn one stays.
         for mesh in scene.meshes.iter().rev() {
             let (texture, most) = (&mesh.texture, limits.max_texture_dimension_2d as usize);
             if texture.width().max(texture.height()) > most {
@@ -148,7 +149,7 @@ impl DepthPeeler {
                 let [x, y, z] = mesh.positions[index];
                 let [u, v] = mesh.uv[index];
                 let [r, g, b] = mesh.colour.get(index).copied().unwrap_or([1.0; 3]);
-                // To 1/256 pixel, as the reference has it.
+                // Rounds to 1/256 pixel, like the reference.
                 let clip = |v: f32, size: usize| 2.0 * (f64::from(v) * 256.0).round() / 256.0 / size as f64 - 1.0;
                 [clip(x, width) as f32, -clip(y, height) as f32, 0.5 - z, u, v, r, g, b]
             }));
@@ -210,7 +211,7 @@ impl DepthPeeler {
         })
     }
 
-    /// Algorithm 1: the passes, each one's picture copied to a buffer of rows of `row` bytes.
+    /// Runs the passes of Algorithm 1 and copies the picture of each to a buffer with rows of `row` bytes.
     fn passes(&self, scene: &Uploaded, height: usize, width: usize, layers: usize, row: usize) -> Vec<wgpu::Buffer> {
         let texture = |format, usage| {
             self.device.create_texture(&wgpu::TextureDescriptor {
@@ -304,8 +305,8 @@ impl DepthPeeler {
     }
 }
 
-/// The layouts of the two bind groups, the previous depths and a mesh's picture; the pipelines of the first pass and
-/// of the later ones.
+/// Makes the layouts of the two bind groups, which are the previous depths and a mesh's picture, and the pipelines of
+/// the first pass and of the later ones.
 fn pipelines(
     device: &wgpu::Device,
 ) -> (
@@ -362,7 +363,8 @@ fn pipelines(
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH,
                 depth_write_enabled: Some(true),
-                // Equal, for what lies at 1, as far as the cleared buffer. Of equal depths the last drawn stays.
+                // `LessEqual` draws surfaces at depth 1, where the buffer is cleared. Of equal depths, the last drawn
+                // one stays.
                 depth_compare: Some(wgpu::CompareFunction::LessEqual),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
@@ -390,7 +392,7 @@ fn extent(height: usize, width: usize) -> wgpu::Extent3d {
     }
 }
 
-/// Does `work` on the device and gives what the device has against it as an error.
+/// Runs `work` on the device and returns the device's error, if any.
 fn guarded<T>(device: &wgpu::Device, work: impl FnOnce() -> T) -> Result<T> {
     let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
@@ -408,7 +410,7 @@ fn one_line(error: &impl std::fmt::Display) -> String {
     error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Begins a pass that paints over an empty `target`, tested against an empty `depth`.
+/// Begins a pass that draws on a cleared `target` and tests against a cleared `depth`.
 fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     target: &wgpu::TextureView,

@@ -1,6 +1,6 @@
-// Depth peeling (paper, Algorithm 1): of the fragments behind the previous layer the nearest is drawn.
+// Depth peeling (paper, Algorithm 1). It draws the nearest of the fragments behind the previous layer.
 
-// Whether there is no previous layer.
+// True for the first layer, which has no previous layer.
 override first: bool;
 
 @group(0) @binding(0) var previous: texture_depth_2d;
@@ -12,13 +12,13 @@ struct Fragment {
     @location(1) @interpolate(linear) colour: vec3f,
 }
 
-// The place comes in clip coordinates: x right and y up from -1 to 1, depth from 0 (nearest) to 1.
+// Passes a vertex on. `place` is in clip coordinates: x right and y up from -1 to 1, depth from 0 (nearest) to 1.
 @vertex
 fn project(@location(0) place: vec3f, @location(1) uv: vec2f, @location(2) colour: vec3f) -> Fragment {
     return Fragment(vec4f(place, 1.0), uv, colour);
 }
 
-// Bilinear on a repeating picture, in full precision: samplers may round the weights to 8 bits.
+// Samples a repeating picture bilinearly in full precision. Hardware samplers may round the weights to 8 bits.
 fn sample(uv: vec2f) -> vec4f {
     let size = vec2f(textureDimensions(picture));
     let position = (uv - floor(uv)) * size - 0.5;
@@ -31,7 +31,7 @@ fn sample(uv: vec2f) -> vec4f {
     return mix(top, bottom, t.y);
 }
 
-// Colour, and the depth as alpha.
+// Returns the colour, with the depth as alpha.
 @fragment
 fn peel(fragment: Fragment) -> @location(0) vec4f {
     let depth = fragment.position.z;

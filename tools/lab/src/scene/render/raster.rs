@@ -1,7 +1,7 @@
-//! The renderer on the CPU: every front-facing hit of every pixel, the first N kept.
+//! The renderer on the CPU. It finds every front-facing hit of every pixel and keeps the first N.
 //!
-//! Coverage is decided in integers (vertices rounded to 1/256 pixel, edges by the top-left rule), so the pixels that
-//! a triangle covers are the same on every machine and neighbouring triangles share no pixel and miss none.
+//! Coverage is decided in integers, with vertices rounded to 1/256 pixel and the top-left rule for edges. A triangle
+//! therefore covers the same pixels on every machine, and neighbouring triangles neither share nor miss a pixel.
 
 use crate::scene::texture::ALPHA_CUT;
 use crate::scene::{Mesh, Scene};
@@ -9,9 +9,9 @@ use ndarray::{Array2, Array3};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};
 
-/// Parts of a pixel that vertices are rounded to.
+/// The number of steps per pixel to which vertices are rounded.
 const SUBPIXEL: i64 = 256;
-/// Most pixels times layers of one rendering: 16 bytes each.
+/// The most pixels times layers of one rendering, at 16 bytes each.
 const MAX_HITS: usize = 1 << 29;
 
 /// One surface on a pixel's line of sight.
@@ -23,11 +23,12 @@ struct Hit {
 
 /// Renders the first `layers` front-facing hits of every pixel of a `height` x `width` frame, front first.
 ///
-/// A hit is where a pixel's centre lies in a front-facing triangle, at a depth in [0, 1], and the texture's alpha is
-/// one half or more there; its colour is texture (bilinear) times vertex colour, held to [0, 1]. Hits of exactly one
-/// depth count once, for the triangle that comes first in the scene: as depth peeling (Algorithm 1) has it.
+/// A pixel has a hit if its centre lies in a front-facing triangle, at a depth in [0, 1], and the texture's alpha there
+/// is at least one half. The colour is the texture's (bilinear) times the vertex colour, clamped to [0, 1]. Hits of
+/// exactly the same depth count once, for the triangle that comes first in the scene, as in depth peeling (Algorithm
+/// 1).
 ///
-/// An error if the frame or `layers` is zero or too large, or if the scene fails [`Scene::check`].
+/// Returns an error if the frame or `layers` is zero or too large, or if the scene fails [`Scene::check`].
 pub fn render_ldi_reference(scene: &Scene, height: usize, width: usize, layers: usize) -> Result<Ldi> {
     scene.check()?;
     check_size(height, width, layers)?;
@@ -49,7 +50,7 @@ pub fn render_ldi_reference(scene: &Scene, height: usize, width: usize, layers: 
     Ldi::new(frame.into_layers())
 }
 
-/// An error if a rendering of that size has nothing in it or too much.
+/// Returns an error if a rendering of this size is empty or too large.
 pub(super) fn check_size(height: usize, width: usize, layers: usize) -> Result<()> {
     let count = height.checked_mul(width).and_then(|pixels| pixels.checked_mul(layers));
     if !count.is_some_and(|count| (1..=MAX_HITS).contains(&count)) {
@@ -60,7 +61,7 @@ pub(super) fn check_size(height: usize, width: usize, layers: usize) -> Result<(
     Ok(())
 }
 
-/// The hits found so far: `layers` a pixel, by rising depth.
+/// The hits found so far: `layers` per pixel, in order of increasing depth.
 struct Frame {
     height: usize,
     width: usize,
@@ -74,8 +75,7 @@ impl Frame {
             let [x, y, _] = mesh.positions[index as usize];
             [x, y].map(|v| (f64::from(v) * SUBPIXEL as f64).round() as i64)
         };
-        // With y down, a front face has negative area; taken the other way round its edge functions are positive
-        // inside.
+        // With y down, a front face has negative area. In the reverse order its edge functions are positive inside.
         let corners = [a, c, b];
         let p = corners.map(fixed);
         let area = edge(p[0], p[1], p[2]);
@@ -93,7 +93,8 @@ impl Frame {
         let span = |axis: usize, size: usize| {
             let low = p.iter().map(|p| p[axis]).min().unwrap_or(0);
             let high = p.iter().map(|p| p[axis]).max().unwrap_or(0);
-            // Pixel i's centre is at i + ½: the first and the last centre within [low, high].
+            // The centre of pixel i is at i + ½, so the range runs from the first to the last centre within [low,
+            // high].
             let first = (low - SUBPIXEL / 2 + SUBPIXEL - 1).div_euclid(SUBPIXEL).max(0);
             let last = (high - SUBPIXEL / 2).div_euclid(SUBPIXEL).min(size as i64 - 1);
             first..last + 1
@@ -116,7 +117,7 @@ impl Frame {
                 entered = true;
                 let [b, c] = [1, 2].map(|i| weights[i] as f64 / area as f64);
                 let at_centre = |v: [f64; 3]| v[0] + b * (v[1] - v[0]) + c * (v[2] - v[0]);
-                // Rounding must not carry a point beyond its corners.
+                // Rounding must not move a point beyond its corners.
                 let depth = at_centre(depths).clamp(nearest, farthest) as f32;
                 let first = (y as usize * self.width + x as usize) * self.layers;
                 let hits = &mut self.hits[first..first + self.layers];
@@ -160,12 +161,13 @@ impl Frame {
     }
 }
 
-/// Twice the area of the triangle (a, b, c), positive if it turns clockwise as seen (y runs down).
+/// Returns twice the area of the triangle (a, b, c), positive if it is clockwise as seen (y runs down).
 fn edge(a: [i64; 2], b: [i64; 2], c: [i64; 2]) -> i64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Whether points exactly on the edge belong to its (clockwise) triangle: they do on left edges and on level top ones.
+/// Checks whether points exactly on the edge belong to its clockwise triangle. They do on left edges and on horizontal
+/// top edges.
 fn is_top_left(from: [i64; 2], to: [i64; 2]) -> bool {
     to[1] < from[1] || (to[1] == from[1] && to[0] > from[0])
 }
@@ -179,7 +181,7 @@ mod tests {
     use super::*;
     use crate::scene::{Texture, random_scene};
 
-    /// A mesh of one colour.
+    /// Makes a mesh of one colour.
     fn plain(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, rgb: [f32; 3]) -> Mesh {
         let uv = vec![[0.5; 2]; positions.len()];
         Mesh {
@@ -191,7 +193,7 @@ mod tests {
         }
     }
 
-    /// A rectangle facing the viewer, its depth d linear from left to right.
+    /// Makes a rectangle facing the viewer whose depth d is linear from left to right.
     fn wall(x: [f32; 2], y: [f32; 2], d: [f32; 2], rgb: [f32; 3]) -> Mesh {
         let corner = |i: usize, j: usize| [x[i], y[j], 0.5 - d[i]];
         plain(
@@ -232,7 +234,8 @@ mod tests {
 
     #[test]
     fn pixels_are_covered_where_their_centre_is_and_depth_is_linear() {
-        // Centres at 2.5 … 5.5 across; 1.5 lies on the left edge (in), 6.5 on the right one (out). Likewise down.
+        // Centres lie at 2.5 … 5.5 across; 1.5 is on the left edge (in) and 6.5 on the right edge (out). The same holds
+        // down.
         let ldi = render(vec![wall([1.5, 6.5], [0.5, 3.5], [0.0, 1.0], RED)], 1);
         for ((y, x), &d) in ldi.layers[0].depth.indexed_iter() {
             if (1..6).contains(&x) && y < 3 {
@@ -247,7 +250,7 @@ mod tests {
     fn backs_and_what_lies_outside_the_volume_are_not_seen() {
         let mut back = wall([0., 9.], [0., 6.], [0.5, 0.5], RED);
         back.triangles.iter_mut().for_each(|t| t.swap(0, 1));
-        // In the volume from the centre of the fourth pixel, d = 0.1, to that of the eighth, d = 0.9.
+        // The surface is in the volume from the centre of the fourth pixel, d = 0.1, to that of the eighth, d = 0.9.
         let slanted = wall([0., 9.], [0., 6.], [-0.6, 1.2], GREEN);
         let ldi = render(vec![back, slanted], 2);
         for ((_, x), &d) in ldi.layers[0].depth.indexed_iter() {
@@ -271,7 +274,7 @@ mod tests {
         front.texture = Arc::new(Texture::new(2, 1, texels).unwrap());
         front.uv = vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
         front.colour = vec![[0.5, 2.0, 1.0]; 4];
-        // 200 / 255 times 2 would be above one.
+        // 200 / 255 times 2 exceeds one.
         front.colour[3] = [0.5, 3.0, 1.0];
         let ldi = render(vec![front, wall([0., 9.], [0., 6.], [0.9, 0.9], BLUE)], 2);
         assert_eq!(colour(&ldi, 1, 5, 2), BLUE);
@@ -281,7 +284,7 @@ mod tests {
         assert!(ldi.layers[0].rgb.iter().all(|v| (0.0..=1.0).contains(v)));
     }
 
-    /// A sheet of slanted triangles has each pixel once: no gap along shared edges, no pixel twice.
+    /// Checks that a sheet of slanted triangles covers each pixel once: no gap along shared edges, no pixel twice.
     #[test]
     fn shared_edges_leave_no_gap_and_no_double() {
         let n = 13;
@@ -316,15 +319,15 @@ mod tests {
         assert!(ldi.layers[1].depth.iter().all(|d| d.is_nan()));
     }
 
-    /// Every hit of the line of sight through (x, y), in floating point: depth and colour, and whether the pixel is
-    /// too near an edge for the rounding of vertices not to matter.
+    /// Returns every hit, depth and colour, on the line of sight through (x, y), in floating point. It also returns
+    /// whether the pixel is so near an edge that the rounding of vertices matters.
     fn cast(scene: &Scene, x: f64, y: f64) -> (Vec<(f64, [f64; 3])>, bool) {
         let (mut hits, mut doubtful) = (Vec::new(), false);
         for mesh in &scene.meshes {
             for t in &mesh.triangles {
                 let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));
                 let turn = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (a[1] - y) - (b[1] - a[1]) * (a[0] - x);
-                // Counter-clockwise as seen, with y down.
+                // The area is positive for counter-clockwise corners as seen, with y down.
                 let area = (c[0] - a[0]) * (b[1] - a[1]) - (b[0] - a[0]) * (c[1] - a[1]);
                 let w = [turn(b, c), turn(c, a), turn(a, b)];
                 let near =
@@ -342,7 +345,7 @@ mod tests {
                     let mix = |v: [f32; 3]| (0..3).map(|k| w[k] * f64::from(v[k])).sum::<f64>();
                     let uv = [0, 1].map(|i| mix(t.map(|v| mesh.uv[v as usize][i])) as f32);
                     let texel = mesh.texture.sample(uv);
-                    // A hole's border, or the depth's slope, is moved by the rounding of vertices.
+                    // Rounding of vertices moves the border of a hole and the depth of a slope.
                     let slope = [a, b, c].iter().map(|p| (0.5 - p[2] - d).abs()).fold(0.0, f64::max) / area.sqrt();
                     doubtful |= (texel[3] - ALPHA_CUT).abs() < 0.1 || slope > 0.05;
                     if texel[3] >= ALPHA_CUT {
