@@ -1,16 +1,15 @@
-//! The scale of a frame where brightness is smoothed, found without leaving the GPU. The twin of the core's
-//! `brightness.rs`.
+//! Computes the scale of a frame with smoothed brightness on the GPU. The counterpart of `brightness.rs` in the core.
 
 use super::Result;
 use super::device::{Constants, Device, Dispatch};
 use phasefront_core::encode::brightness::{BINS, LEAST, MOST, Past, STEP, looked_at};
 
-/// Threads of a workgroup, as in the program.
+/// The threads of a workgroup, as in the program.
 const THREADS: usize = 256;
-/// Most workgroups that count.
+/// The largest number of workgroups that count.
 const MOST_GROUPS: usize = 1024;
 
-/// Finds the scale of (3, H, W) fields in one buffer.
+/// Computes the scale of (3, H, W) fields in one buffer.
 pub(super) struct Smoother {
     past: Constants,
     bins: wgpu::Buffer,
@@ -18,7 +17,7 @@ pub(super) struct Smoother {
 }
 
 impl Smoother {
-    /// `found` is one u32: the bits of the scale's square.
+    /// Plans the stage. It writes the bits of the scale's square to `found`, one u32.
     pub(super) fn new(device: &Device, field: &wgpu::Buffer, len: usize, found: &wgpu::Buffer) -> Result<Self> {
         let (count, over) = looked_at(len);
         let groups = count.div_ceil(THREADS).min(MOST_GROUPS);
@@ -51,7 +50,7 @@ impl Smoother {
         Ok(Smoother { past, bins, steps })
     }
 
-    /// Where the scale of the frame comes from that is submitted next.
+    /// Sets the previous scale for the next submitted frame.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         let words = past.map_or(alone(), |past| [past.scale, past.share, 0.0, 0.0]);
         device
@@ -59,7 +58,7 @@ impl Smoother {
             .write_buffer(&self.past.buffer, 0, bytemuck::cast_slice(&words));
     }
 
-    /// To be called before the pass: nothing is counted yet.
+    /// Clears the histogram. Must be called before the pass of each frame.
     pub(super) fn reset(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.clear_buffer(&self.bins, 0, None);
     }
@@ -69,7 +68,7 @@ impl Smoother {
     }
 }
 
-/// A frame without a past: all the way from 0 to its own percentile.
+/// Returns the past of a frame without a predecessor: a full step from 0 to the frame's own percentile.
 fn alone() -> [f32; 4] {
     [0.0, 1.0, 0.0, 0.0]
 }

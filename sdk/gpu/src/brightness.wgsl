@@ -1,5 +1,5 @@
-// Which amplitude full light stands for where it is smoothed: a histogram of some of the field's amplitudes, and what
-// it says. The twin of ../brightness.rs, whose constants come in the header, in capitals.
+// Finds the amplitude of full brightness for temporally smoothed brightness, from a histogram of some of the field's
+// amplitudes. The counterpart of brightness.rs in the core, whose constants are in the header, in capitals.
 
 struct Past { scale: f32, share: f32, unused_a: u32, unused_b: u32 }
 
@@ -24,7 +24,7 @@ fn count(@builtin(global_invocation_id) at: vec3u) {
     }
 }
 
-// One workgroup: the last bin that has more above its lower bound than may be clipped.
+// One workgroup: finds the highest bin with more amplitudes above its lower bound than may be clipped.
 @compute @workgroup_size(THREADS)
 fn settle(@builtin(local_invocation_index) thread: u32) {
     var sum = 0u;

@@ -1,6 +1,4 @@
-//! A GPU that was opened: its limits, its programs, its memory, and what it has against us as errors.
-//!
-//! Nothing here knows what is computed.
+//! An open GPU: its limits, its programs, its memory and its errors. This module does not depend on the stages.
 
 mod cache;
 mod memory;
@@ -18,23 +16,23 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// How long a frame may take before a device counts as hung: drivers themselves give up after some seconds.
+/// The time after which a frame's device counts as hung. Drivers themselves give up after some seconds.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// The same for drivers in software, which take their time.
+/// The same limit for software drivers, which are slow.
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(300);
 
-/// Which GPU is wanted, and what is known of it from before.
+/// The GPU to open, and the programs that it compiled on an earlier run.
 #[derive(Debug, Clone, Default)]
 pub struct DeviceOptions {
-    /// A part of the adapter's name, in any case; without one the fastest that is hardware is taken. Drivers in
-    /// software are taken by name only: they are slower than the CPU path.
+    /// A part of the adapter's name, in any case. Without a name the fastest hardware GPU is opened. Software drivers
+    /// are opened only by name, because they are slower than the CPU path.
     pub name: Option<String>,
-    /// What [`Device::programs`] gave on an earlier run. What another GPU or driver compiled, or what was damaged
-    /// since, is ignored. A driver trusts the rest: keep it where only the app itself writes.
+    /// The output of [`Device::programs`] on an earlier run. Programs from another GPU or driver and damaged programs
+    /// are ignored. The driver trusts the rest, so store them where only the app itself writes.
     pub programs: Option<Vec<u8>>,
 }
 
-/// What a device offers beyond what every one has.
+/// The optional features of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Features {
     /// 16-bit floating point in programs and memory.
@@ -43,12 +41,12 @@ pub(crate) struct Features {
     pub(crate) timestamps: bool,
 }
 
-/// What a device is opened with at most.
+/// The upper bounds on the features, limits and memory that a device is opened with.
 pub(crate) struct Allowed {
     pub(crate) features: wgpu::Features,
-    /// From the adapter's limits.
+    /// Computes the limits from the adapter's.
     pub(crate) limits: fn(wgpu::Limits) -> wgpu::Limits,
-    /// Of the memory that the driver says is free, where it says so.
+    /// The usable percentage of the memory that the driver reports as free, if it reports it.
     pub(crate) memory_percent: Option<u8>,
 }
 
@@ -62,7 +60,7 @@ impl Default for Allowed {
     }
 }
 
-/// An open GPU. Immutable; threads share it.
+/// An open GPU. It is immutable and threads can share it.
 pub struct Device {
     pub(crate) inner: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -70,11 +68,11 @@ pub struct Device {
     limits: wgpu::Limits,
     features: Features,
     cache: Option<wgpu::PipelineCache>,
-    /// Why the programs of an earlier run were not taken.
+    /// Why the programs of an earlier run were rejected.
     programs_refused: Option<&'static str>,
-    /// How long a frame may take before the device counts as hung.
+    /// The time after which a frame's device counts as hung.
     patience: Duration,
-    /// By entry and text: layers that are alike, and frames of all sizes, share their programs.
+    /// The programs by entry point and text. Identical layers, and frames of all sizes, share their programs.
     compiled: Mutex<HashMap<(&'static str, String), Program>>,
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -89,14 +87,14 @@ impl Device {
     /// Opens a GPU.
     ///
     /// # Errors
-    /// [`GpuError::None`] where there is none, or none of that name, with those that there are;
-    /// [`GpuError::Refused`] where the driver does not open it.
+    /// Returns [`GpuError::None`] if there is no GPU, or none with that name (the message lists the GPUs that exist),
+    /// and [`GpuError::Refused`] if the driver does not open it.
     #[doc(hidden)]
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         Self::open_with(options, &Allowed::default())
     }
 
-    /// [`Device::open`] with no more than `allowed`.
+    /// Opens a GPU as [`Device::open`] does, with at most the features, limits and memory of `allowed`.
     pub(crate) fn open_with(options: &DeviceOptions, allowed: &Allowed) -> Result<Self> {
         let adapter = adapter(options.name.as_deref(), allowed.memory_percent)?;
         let info = adapter.get_info();
@@ -110,14 +108,15 @@ impl Device {
         Ok(Self::of(device, queue, options.programs.as_deref()))
     }
 
-    /// The features that an app's own device should have for [`Device::of`], as far as its adapter has them.
+    /// Returns the features that an app should enable, if its adapter has them, on a device for [`Device::of`].
     pub fn wanted() -> wgpu::Features {
         wgpu::Features::SHADER_F16 | wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE
     }
 
-    /// A device that an app opened, so that it shows on its own surface what is computed, without a copy: best with the
-    /// limits of its adapter, and with what it has of [`Device::wanted`]. Its loss and its uncaptured errors are told
-    /// here from then on. `programs` are those of an earlier run, as in [`DeviceOptions`].
+    /// Wraps a device that an app opened, so that the app can display results on its own surface without a copy. The
+    /// device should have its adapter's limits and the available features of [`Device::wanted`]. From then on this
+    /// object receives the device's loss and its uncaptured errors. `programs` come from an earlier run, as in
+    /// [`DeviceOptions`].
     pub fn of(device: wgpu::Device, queue: wgpu::Queue, programs: Option<&[u8]>) -> Self {
         let (info, limits, granted) = (device.adapter_info(), device.limits(), device.features());
         let lost = Arc::new(Mutex::new(None));
@@ -128,7 +127,7 @@ impl Device {
         device.set_device_lost_callback(move |reason, why| {
             note(&state, format!("{} ({reason:?})", one_line(why)));
         });
-        // Outside of error scopes nothing is expected to fail but on a device that is about to be lost.
+        // Outside error scopes, only a device that is about to be lost should fail.
         let state = lost.clone();
         device.on_uncaptured_error(Arc::new(move |why: wgpu::Error| {
             note(&state, one_line(why));
@@ -157,33 +156,33 @@ impl Device {
         }
     }
 
-    /// The GPU's name and the interface it is spoken to by.
+    /// Returns the GPU's name and graphics API.
     pub fn name(&self) -> String {
         format!("{} ({:?})", self.info.name, self.info.backend)
     }
 
-    /// Whether it is a driver in software.
+    /// Checks whether the driver is a software driver.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether it computes in 16-bit floating point.
+    /// Checks whether the device computes in 16-bit floating point.
     pub fn has_half(&self) -> bool {
         self.features.half
     }
 
-    /// The programs compiled so far, to be kept for the next run; none where the platform keeps them itself.
+    /// Returns the programs compiled so far, for the next run, or `None` if the platform caches them itself.
     pub fn programs(&self) -> Option<Vec<u8>> {
         let programs = self.cache.as_ref()?.get_data()?;
         Some(cache::seal(&programs, &self.info))
     }
 
-    /// Why [`DeviceOptions::programs`] were not taken, if they were not.
+    /// Returns why [`DeviceOptions::programs`] were rejected, if they were.
     pub fn programs_refused(&self) -> Option<&str> {
         self.programs_refused
     }
 
-    /// The device and the queue themselves, for an app that shows what is computed.
+    /// Returns the wgpu device and queue, for an app that displays the results.
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.inner, &self.queue)
     }
@@ -196,7 +195,7 @@ impl Device {
         &self.limits
     }
 
-    /// Why the device is of no use any more, if so.
+    /// Returns [`GpuError::Lost`] with the reason if the device is lost.
     pub(crate) fn check(&self) -> Result<()> {
         match lock(&self.lost).as_ref() {
             Some(why) => Err(GpuError::Lost(why.clone())),
@@ -204,13 +203,13 @@ impl Device {
         }
     }
 
-    /// Gives the device up; what runs on it is lost.
+    /// Destroys the device. Work that runs on it is lost.
     pub(crate) fn give_up(&self, why: &str) {
         lock(&self.lost).get_or_insert_with(|| why.to_owned());
         self.inner.destroy();
     }
 
-    /// Waits for what was submitted up to `submission`.
+    /// Waits for the work submitted up to `submission`.
     pub(crate) fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
         self.check()?;
         let waited = self.inner.poll(wgpu::PollType::Wait {
@@ -227,7 +226,7 @@ impl Device {
         self.check()
     }
 
-    /// Asks the device, which says only then that it was lost since.
+    /// Polls the device, because a loss is reported only then.
     fn ask(&self) -> Result<()> {
         if let Err(why) = self.inner.poll(wgpu::PollType::Poll) {
             self.give_up(&one_line(why));
@@ -235,7 +234,7 @@ impl Device {
         self.check()
     }
 
-    /// Does `work` and gives what the device has against it as an error.
+    /// Runs `work` and returns the device's errors during it.
     pub(crate) fn guarded<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.ask()?;
         let memory = self.inner.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -245,10 +244,10 @@ impl Device {
         // Scopes are popped last in, first out.
         let errors = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
         self.check()?;
-        // What there was no memory for is invalid wherever it is used next: the cause comes before its consequences.
+        // A resource that memory was too short for is invalid in later calls: report the cause before its consequences.
         let error = errors.into_iter().rev().flatten().next();
         if error.is_some() {
-            // It may be a loss that was not told yet.
+            // The cause may be a loss that was not reported yet.
             self.ask()?;
         }
         match error {
@@ -259,7 +258,7 @@ impl Device {
     }
 }
 
-/// The adapter of that name, or the fastest that is hardware.
+/// Returns the adapter with that name, or the fastest hardware adapter.
 fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<wgpu::Adapter> {
     let mut wanted = wgpu::InstanceDescriptor::new_without_display_handle();
     wanted.memory_budget_thresholds.for_resource_creation = memory_percent;
@@ -340,13 +339,13 @@ mod tests {
         assert!(!device.has_half() && !device.features().timestamps);
         let refused = device.buffer("a frame", 1 << 21).unwrap_err();
         assert!(refused.to_string().contains("a frame of 2 MB"), "{refused}");
-        // What goes wrong in the driver comes back from where it is guarded.
+        // Driver errors are returned by `guarded`.
         let wrong = device.guarded(|| {
             device.program("nonsense", "fn main( {".into(), "main");
             Ok(())
         });
         assert!(matches!(wrong, Err(GpuError::Refused(_))), "{wrong:?}");
-        // A lost device says so, and why, to all that comes.
+        // A lost device returns the reason from every call.
         device.give_up("pulled out");
         assert!(matches!(device.check(), Err(GpuError::Lost(why)) if why == "pulled out"));
         assert!(matches!(device.guarded(|| Ok(())), Err(GpuError::Lost(_))));
@@ -358,12 +357,12 @@ mod tests {
             memory_percent: Some(1),
             ..Default::default()
         };
-        // Drivers in software do not respect what memory there is.
+        // Software drivers ignore the memory budget.
         let hardware = Device::open_with(&DeviceOptions::default(), &little);
         let device = opened(hardware.or_else(|_| Device::open_with(&software(), &little)));
         let most = device.limits.max_storage_buffer_binding_size.min(1 << 28) as usize;
         let taken = device.guarded(|| {
-            // More than a hundredth of any machine's memory.
+            // This is more than a hundredth of any machine's memory.
             let all = (0..64).map(|_| device.buffer("a frame", most));
             all.collect::<Result<Vec<_>>>()
         });
@@ -372,7 +371,7 @@ mod tests {
             return;
         }
         assert!(matches!(taken, Err(GpuError::OutOfMemory(_))), "{taken:?}");
-        // Also where what was not given is used.
+        // The error is the same if the missing buffer is used.
         let used = device.guarded(|| {
             let all = (0..64)
                 .map(|_| device.buffer("a frame", most))
@@ -383,7 +382,7 @@ mod tests {
             Ok(())
         });
         assert!(matches!(used, Err(GpuError::OutOfMemory(_))), "{used:?}");
-        // What does fit still works.
+        // A buffer that fits still works.
         let buffer = device.guarded(|| device.buffer("a frame", 64)).unwrap();
         assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
     }
@@ -426,7 +425,7 @@ mod tests {
         assert!(device.is_software());
         let buffer = device.guarded(|| device.buffer("a frame", 64)).unwrap();
         assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
-        // The app takes it away.
+        // The app destroys the device.
         inner.destroy();
         assert!(matches!(device.guarded(|| Ok(())), Err(GpuError::Lost(_))));
     }

@@ -1,5 +1,6 @@
-//! From the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM, BL-DPM and DDPM,
-//! double phase, the response. The twin of [`phasefront_core::encode`] and [`phasefront_core::display::response`].
+//! Converts the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM, BL-DPM and DDPM,
+//! double phase and the response. The counterpart of [`phasefront_core::encode`] and
+//! [`phasefront_core::display::response`].
 
 mod blur;
 mod double_phase;
@@ -23,14 +24,14 @@ use phasefront_core::encode::EncoderOptions;
 use phasefront_core::encode::brightness::{Brightness, Past};
 use shared::Shared;
 
-/// Columns of a workgroup.
+/// The columns of a workgroup.
 const COLUMNS: usize = 64;
 
-/// Where a frame's levels go.
+/// The output of one frame.
 pub(super) struct LevelsBuffers {
-    /// (H, W) words: red, green, blue, 255 from the lowest byte on.
+    /// (H, W) words: red, green, blue and 255, from the lowest byte up.
     pub(super) levels: wgpu::Buffer,
-    /// The same as a picture.
+    /// The same levels as a texture.
     pub(super) texture: wgpu::Texture,
 }
 
@@ -65,25 +66,25 @@ impl LevelsBuffers {
     }
 }
 
-/// What an [`Encoder`] is made for.
+/// The input and the settings of an [`Encoder`].
 pub(super) struct EncoderJob<'a> {
     /// (3, H, W) complex f32.
     pub(super) field: &'a wgpu::Buffer,
     /// (H, W).
     pub(super) size: (usize, usize),
     pub(super) options: &'a EncoderOptions,
-    /// How a pre-filter computes.
+    /// The options for computing a pre-filter.
     pub(super) chain: ChainOptions,
     pub(super) target: &'a Target,
-    /// That of the target, for this size.
+    /// The target's response, for this size.
     pub(super) response: &'a Response,
-    /// What the field's colours are multiplied by on the way in, if anything.
+    /// The factors that the field's colours are multiplied by when they are read, if any.
     pub(super) turn: Option<&'a wgpu::Buffer>,
 }
 
-/// The encoding of one field buffer into several buffers.
+/// Encodes one field buffer into several output buffers.
 pub(super) struct Encoder {
-    /// Of smoothed brightness.
+    /// The stage that computes smoothed brightness, if the options request it.
     smoother: Option<Smoother>,
     filter: Filter,
     double_phase: DoublePhase,
@@ -118,8 +119,7 @@ impl Encoder {
         })
     }
 
-    /// Which frame the one follows that is submitted next: smoothed brightness and steps at the midpoint go on from
-    /// there.
+    /// Sets the previous frame of the next submission. Smoothed brightness and midpoint steps continue from it.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         self.double_phase.set_past(device, past);
         if let Some(smoother) = &self.smoother {
@@ -127,7 +127,7 @@ impl Encoder {
         }
     }
 
-    /// To be called before the pass: the largest amplitude of this frame is not known yet.
+    /// Resets the largest amplitude. Must be called before the pass of each frame.
     pub(super) fn reset(&self, encoder: &mut wgpu::CommandEncoder) {
         if self.brightness == Brightness::FrameMax {
             encoder.clear_buffer(&self.largest, 0, None);
@@ -137,9 +137,9 @@ impl Encoder {
         }
     }
 
-    /// Encodes into the buffers of that index.
+    /// Encodes into the output buffers with that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
-        // Brightness is that of the unfiltered field, as on the CPU.
+        // Brightness is measured on the unfiltered field, as on the CPU.
         if let Some(smoother) = &self.smoother {
             smoother.run(pass);
         }
@@ -148,7 +148,7 @@ impl Encoder {
         self.double_phase.run(pass, buffers);
     }
 
-    /// The scale that a frame had whose `largest` was read back.
+    /// Returns the scale of a frame from its `largest`, read back.
     pub(super) fn scale(&self, largest: u32) -> f32 {
         match self.brightness {
             Brightness::Fixed(scale) => scale,
@@ -182,7 +182,7 @@ mod tests {
         let wide = || wide.clone();
         let (nodes, intervals) = (per_pixel::nodes(61, 47, 16), 8);
         let count = 3 * nodes.0 * nodes.1;
-        // Curves that differ from node to node; the steepest do not reach 2π.
+        // Each node has a different curve. The steepest curves do not reach 2π.
         let knots: Vec<f32> = (0..count)
             .flat_map(|n| (0..=intervals).map(move |k| 3.0 + k as f32 * (20.0 + n as f32 * 0.35)))
             .collect();
@@ -277,7 +277,7 @@ mod tests {
                 (found - used).abs() < 1e-4 * used,
                 "{size:?} {encoding:?}: {found} {used}"
             );
-            // A level may be its neighbour where the phase lies within rounding of the bound between them.
+            // A level may differ by one if the phase is within rounding of the bound between two levels.
             let steps = match response {
                 Response::Linear { bits } => (1 << bits) as f32,
                 _ => 256.0,
@@ -288,9 +288,9 @@ mod tests {
                 for i in 0..area {
                     let (level, expected) = ((words[i] >> (8 * c)) as u8, levels[c * area + i]);
                     let step = phase[c * area + i] / std::f32::consts::TAU * steps;
-                    // acos is steep at full light.
+                    // acos is steep at full brightness.
                     let near = (step - step.floor() - 0.5).abs();
-                    // Where curves say, or where a step left little of a value, another, and seldom.
+                    // With per-pixel curves, or where a step left a small value, a few levels may differ.
                     let other = (pixels && level.abs_diff(expected) == 1) || local_steps > 0;
                     let same = level == expected || near < 0.1;
                     beside += usize::from(!same && other);

@@ -1,7 +1,7 @@
-//! A filter in the Fourier domain of zero-padded planes, in three dispatches: rows, columns with the filter between
-//! their two transforms, rows back. The twin of [`phasefront_core::optics::fft`].
+//! Applies a filter in the Fourier domain of zero-padded planes in three dispatches: rows, columns with the filter
+//! between their two transforms, and rows back. The counterpart of [`phasefront_core::optics::fft`].
 //!
-//! A line is transformed in workgroup memory, so its length is bounded by that: 4096 where there are 32 KiB.
+//! A line is transformed in workgroup memory, which limits its length: to 4096 with 32 KiB.
 
 use super::device::{Constants, Device, Dispatch};
 use super::{GpuError, Result};
@@ -9,12 +9,12 @@ use num_complex::Complex32;
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-/// Most threads of a workgroup: what every GPU has.
+/// The largest number of threads of a workgroup that every GPU supports.
 const MOST_THREADS: usize = 256;
-/// Values that a thread holds at a time, where there are threads enough.
+/// The values that a thread holds at a time if there are enough threads.
 const PER_THREAD: usize = 8;
 
-/// The quadrant, `(W'/2 + 1, H'/2 + 1)`, of what `factor` gives for (kx, ky), times the transforms' 1/(H'·W').
+/// Returns one quadrant, `(W'/2 + 1, H'/2 + 1)`, of `factor`(kx, ky), times the transforms' 1/(H'·W').
 pub(super) fn quadrant(
     (padded_height, padded_width): (usize, usize),
     factor: impl Fn(usize, usize) -> f32,
@@ -26,18 +26,18 @@ pub(super) fn quadrant(
         .collect()
 }
 
-/// What a convolution is made from.
+/// The input of a convolution.
 pub(super) struct Planes<'a> {
-    /// (3, H, W), replaced by itself filtered.
+    /// (3, H, W). The filtered field replaces it.
     pub(super) field: &'a wgpu::Buffer,
     /// (H, W).
     pub(super) size: (usize, usize),
     /// (H', W').
     pub(super) padded: (usize, usize),
-    /// The filter, with 1/(H'·W') in it, one for all colours or three: one quadrant of it, (W'/2 + 1, H'/2 + 1), where
-    /// it is even in both frequencies, else (W', H').
+    /// One filter for all colours or three, including the factor 1/(H'·W'). Each is one quadrant, (W'/2 + 1, H'/2 + 1),
+    /// if it is even in both frequencies, else (W', H').
     pub(super) factors: &'a [&'a [Complex32]],
-    /// What each colour is multiplied by on the way in, if anything.
+    /// The factors that the colours are multiplied by when they are read, if any.
     pub(super) turn: Option<&'a wgpu::Buffer>,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Convolution {
     steps: [Dispatch; 3],
 }
 
-/// What one of the three dispatches does.
+/// The operations of one of the three dispatches.
 #[derive(Clone, Copy)]
 struct Stage {
     length: usize,
@@ -58,18 +58,18 @@ struct Stage {
     turn: bool,
 }
 
-/// Lines of three planes in one buffer: values from plane to plane, from line to line and along a line, and how many
-/// there are along it.
+/// Lines of three planes in one buffer. `places` holds the strides from plane to plane, from line to line and along a
+/// line, and the length of a line.
 struct Lines<'a> {
     buffer: &'a wgpu::Buffer,
     places: [usize; 4],
 }
 
-/// What the three dispatches share.
+/// The resources that the three dispatches share.
 struct Shared<'a> {
     device: &'a Device,
     filter: &'a wgpu::Buffer,
-    /// From one colour's filter to the next one's; 0 where one serves all.
+    /// The stride between the filters of two colours, or 0 if one filter serves all.
     filter_plane: usize,
     turn: &'a wgpu::Buffer,
 }
@@ -98,7 +98,7 @@ impl Convolution {
         let columns = [height * padded_width, 1, padded_width, height];
         let steps = [
             shared.step("rows", row, &row_roots, (frame(), spectra()), height)?,
-            // In place: the program reads its result's buffer; what is bound as its source it leaves alone.
+            // In place: the program reads the result's buffer and ignores the one bound as its source.
             shared.step(
                 "columns",
                 column,
@@ -116,7 +116,7 @@ impl Convolution {
     }
 }
 
-/// exp(2πi j/n) for each j below `n`.
+/// Creates a table of exp(2πi j/n) for each j below `n`.
 fn roots(device: &Device, n: usize) -> Result<Constants> {
     let root = |j: usize| {
         let (sin, cos) = (2.0 * PI * j as f64 / n as f64).sin_cos();
@@ -127,7 +127,7 @@ fn roots(device: &Device, n: usize) -> Result<Constants> {
 }
 
 impl Shared<'_> {
-    /// `stage` of so many `lines`, from the first place to the second.
+    /// Creates the dispatch of `stage` on this number of `lines`, from `from` to `to`.
     fn step(
         &self,
         what: &str,
@@ -156,7 +156,7 @@ impl Shared<'_> {
 }
 
 impl Stage {
-    /// Rows, columns, rows back; `even` where the filter is one quadrant.
+    /// Returns the stages for rows, columns and rows back. `even` means that the filter is one quadrant.
     fn of(planes: &Planes<'_>, even: bool) -> [Stage; 3] {
         let row = Stage {
             length: planes.padded.1,
@@ -184,8 +184,8 @@ impl Stage {
         [row, column, back]
     }
 
-    /// How many lines a workgroup transforms: columns in fours where they fit, since four values are what memory
-    /// hands out at a time.
+    /// Returns the number of lines that a workgroup transforms: four columns if they fit, because a memory access reads
+    /// four values at a time.
     fn lines_together(&self, device: &Device) -> Result<usize> {
         let most = device.limits().max_compute_workgroup_storage_size as usize;
         let wanted: &[usize] = if self.in_place { &[4, 2, 1] } else { &[1] };
@@ -199,7 +199,7 @@ impl Stage {
         })
     }
 
-    /// The program for so many lines a workgroup.
+    /// Returns the source of the program for this number of lines per workgroup.
     fn source(&self, lines: usize) -> String {
         let Stage { length, .. } = *self;
         let each = length
@@ -230,7 +230,7 @@ impl Stage {
     }
 }
 
-/// The radices of a length, whose product it is: those that have a form of their own, then other primes.
+/// Factors a length into radices: first those with their own butterfly, then other primes.
 fn radices(mut n: usize) -> Vec<usize> {
     let mut all = Vec::new();
     for radix in [7, 5, 4, 3, 2] {
@@ -254,8 +254,8 @@ fn radices(mut n: usize) -> Vec<usize> {
     all
 }
 
-/// The stages of a transform of length `n` by `each` threads, and `transform`, which runs them: a thread holds what
-/// its butterflies give until all have read.
+/// Returns the stages of a transform of length `n` by `each` threads, and `transform`, which runs them. A thread keeps
+/// the results of its butterflies until all threads have read.
 fn stages(n: usize, each: usize) -> String {
     let mut text = String::new();
     let mut calls = String::new();
@@ -271,14 +271,14 @@ fn stages(n: usize, each: usize) -> String {
         done *= radix;
     }
     if radices(n).len() <= 1 {
-        // Nothing is turned in a single butterfly; an argument that no program reads could not be bound.
+        // A single butterfly needs no roots, but an argument that no program reads cannot be bound.
         calls += "    _ = roots[0];\n";
     }
     text + "\nfn transform(t: u32, l: u32, sign: f32) {\n" + &calls + "}\n"
 }
 
-/// A stage of radix `r` after stages of product `done`: butterfly j reads j + q·n/r, turned by the root
-/// q·(j mod done)/(done·r), and writes ⌊j/done⌋·done·r + (j mod done) + q·done.
+/// Writes a stage of radix `r` after stages of product `done`: butterfly j reads j + q·n/r, multiplies by the root q·(j
+/// mod done)/(done·r), and writes ⌊j/done⌋·done·r + (j mod done) + q·done.
 fn butterflies(text: &mut String, n: usize, each: usize, r: usize, done: usize) {
     let count = n / r;
     let rounds = count.div_ceil(each);
@@ -316,7 +316,7 @@ fn butterflies(text: &mut String, n: usize, each: usize, r: usize, done: usize) 
     *text += "    workgroupBarrier();\n";
 }
 
-/// The same for a prime that has no butterfly here: each value by its sum.
+/// Writes a stage for a prime without a butterfly. It computes each value as a direct sum.
 fn direct(text: &mut String, n: usize, each: usize, r: usize, done: usize) {
     let rounds = n.div_ceil(each);
     for k in 0..rounds {
@@ -406,7 +406,7 @@ mod twins {
         for (size, distance_m, padding) in [
             ((61, 47), 6e-3, Padding::Reach),
             ((61, 47), -20e-3, Padding::Double),
-            // 7 and 49 have a form of their own; 11, 13 and 61 have not.
+            // 7 and 49 have their own butterflies; 11, 13 and 61 do not.
             ((49, 22), 1e-3, Padding::Circular),
             ((61, 26), 1e-3, Padding::Circular),
             ((1, 1), 1e-3, Padding::Reach),

@@ -1,20 +1,20 @@
-// 1D Fourier transforms of the lines of a plane, each in workgroup memory, with what a convolution does before and
-// after them. The header that fft.rs writes before this text gives the constants in capitals; behind it stand the
-// stages of this length (Stockham's form, radices 2, 3, 4, 5 and 7; other primes by their sums) and `transform`.
+// 1D Fourier transforms of the lines of a plane in workgroup memory, with the operations of a convolution before and
+// after them. The header from fft.rs defines the constants in capitals. fft.rs appends the stages for this length
+// (Stockham's form, radices 2, 3, 4, 5 and 7; other primes by direct sums) and `transform`.
 
 struct Lines {
-    // How many lines there are, and where a value lies: plane·colour + line·i + step·j, for j below count.
+    // The number of lines. A value is at plane·colour + line·i + step·j, for j below count.
     lines: u32, from_plane: u32, from_line: u32, from_step: u32,
     from_count: u32, to_plane: u32, to_line: u32, to_step: u32,
     to_count: u32, table_plane: u32, unused_a: u32, unused_b: u32,
 }
 
 @group(0) @binding(0) var<uniform> lines: Lines;
-// exp(2πi j/N), from f64: drivers' sines are not good enough.
+// exp(2πi j/N), computed in f64 because drivers' sines are too inaccurate.
 @group(0) @binding(1) var<storage, read> roots: array<vec2f>;
 @group(0) @binding(2) var<storage, read> source: array<vec2f>;
 @group(0) @binding(3) var<storage, read_write> result: array<vec2f>;
-// The filter, columns first: one quadrant of it where it is EVEN in both frequencies.
+// The filter, columns first. If EVEN in both frequencies, it is one quadrant.
 @group(0) @binding(4) var<storage, read> table: array<vec2f>;
 @group(0) @binding(5) var<storage, read> turn: array<vec2f>;
 
@@ -22,7 +22,7 @@ var<workgroup> row: array<vec2f, N * LINES>;
 
 fn times(a: vec2f, b: vec2f) -> vec2f { return vec2f(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 
-// sign·i·a
+// Returns sign·i·a.
 fn quarter(a: vec2f, sign: f32) -> vec2f { return vec2f(-sign * a.y, sign * a.x); }
 
 fn root(k: u32, sign: f32) -> vec2f { return roots[k] * vec2f(1, sign); }
@@ -83,7 +83,7 @@ fn dft7(
 @compute @workgroup_size(THREADS)
 fn convolve(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
     let colour = group.y;
-    // Neighbouring threads work on neighbouring lines, which in columns are neighbours in memory.
+    // Neighbouring threads work on neighbouring lines, which for columns are adjacent in memory.
     let l = thread % LINES;
     let t = thread / LINES;
     let line = group.x * LINES + l;

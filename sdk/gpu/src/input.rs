@@ -1,5 +1,5 @@
-//! Converts a captured frame to what a chain reads: groups of four channels in the chain's numbers. The twins are
-//! [`phasefront_core::frame`] and the kernels' quantiser.
+//! Converts a captured frame to the input of a chain: groups of four channels in the chain's number format. The CPU
+//! counterparts are [`phasefront_core::frame`] and the quantiser of the kernels.
 
 mod camera;
 mod frame;
@@ -15,12 +15,12 @@ use super::numbers::{GROUP, Numbers};
 use phasefront_core::method::network::chain::Chain;
 use source::{Frames, Reader};
 
-/// What a [`Packer`] writes.
+/// The output format of a [`Packer`].
 #[derive(Clone, Copy)]
 pub(super) enum Form<'a> {
-    /// The input of a chain in its numbers, depth stretched by so much about the middle.
+    /// The input of a chain in its number format, with depth stretched about the middle by this factor.
     Chain(&'a Chain, Numbers, f32),
-    /// Red, green, blue and depth of each pixel, f32, as they are: what the plane sweep reads.
+    /// Unmodified f32 red, green, blue and depth of each pixel, the input of the plane sweep.
     Surfaces,
 }
 
@@ -32,7 +32,7 @@ impl Form<'_> {
         }
     }
 
-    /// Pixels along each side of what the chain's layers take as one.
+    /// Returns the side of the square of pixels that the chain's layers treat as one.
     fn side(&self) -> usize {
         match self {
             Form::Chain(chain, ..) => chain.side(),
@@ -47,7 +47,7 @@ impl Form<'_> {
         }
     }
 
-    /// The text of the program that takes pixels from `reader` to this form.
+    /// Returns the source of the program that converts the pixels of `reader` to this format.
     fn program(&self, reader: &Reader) -> String {
         let numbers = self.numbers();
         let (enable, store) = match numbers {
@@ -70,19 +70,19 @@ impl Form<'_> {
     }
 }
 
-/// What a chain reads, on the GPU.
+/// The input of a chain on the GPU.
 #[derive(Clone)]
 pub(super) struct ChainInput {
-    /// The first layer's input, or a frame's surfaces.
+    /// The input of the first layer, or the surfaces of a frame.
     pub(super) first: wgpu::Buffer,
-    /// What the last layer reads of it: the same buffer but in int8.
+    /// The input in the last layer's rounding. It is the same buffer except in int8.
     pub(super) last: wgpu::Buffer,
-    /// It in f32, for a head that adds to it; the same buffer but in int8.
+    /// The input in f32, for a head that adds to it. It is the same buffer except in int8.
     pub(super) image: wgpu::Buffer,
 }
 
 impl ChainInput {
-    /// Memory for so many groups of four channels at a pixel.
+    /// Allocates this number of groups of four channels, over all pixels.
     fn new(device: &Device, groups: usize, numbers: Numbers) -> Result<Self> {
         let first = device.buffer("the network's input", groups * numbers.value_bytes())?;
         Ok(match numbers {
@@ -102,7 +102,7 @@ impl ChainInput {
 
 /// The input stage for one frame size.
 pub(super) struct Packer {
-    /// Where the network's input planes go, where they come by themselves.
+    /// The buffer for the network's input planes if the source is [`Source::Planes`].
     pub(super) planes: wgpu::Buffer,
     frames: Option<Frames>,
     pub(super) input: ChainInput,
@@ -110,8 +110,8 @@ pub(super) struct Packer {
 }
 
 impl Packer {
-    /// The stage for frames of `size` (height, width), into memory of its own or `input`, which another stage of the
-    /// same form and size had.
+    /// Plans the stage for frames of `size` (height, width). It writes to new memory or to `input`, the memory of
+    /// another stage of the same form and size.
     pub(super) fn new(
         device: &Device,
         form: Form<'_>,
@@ -162,7 +162,7 @@ impl Packer {
         })
     }
 
-    /// Sends a frame on its way; it is there when what is submitted next begins.
+    /// Uploads a frame. The upload is complete before the next submission starts.
     pub(super) fn upload(&self, device: &Device, frame: &Frame<'_>) -> Result<()> {
         match &self.frames {
             Some(frames) => frames.upload(device, frame),
@@ -170,7 +170,7 @@ impl Packer {
         }
     }
 
-    /// What frames come as, where they do.
+    /// Returns the formats of the frames, or `None` if the source is not frames.
     pub(super) fn formats(&self) -> Option<(Colour, Depth)> {
         self.frames.as_ref().map(|frames| frames.formats)
     }
@@ -188,7 +188,7 @@ mod tests {
     use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding};
     use phasefront_core::method::network::Network;
 
-    /// Camera images of odd sizes, turned, made larger and smaller, in the numbers of float chains.
+    /// Checks camera images of odd sizes, rotated, enlarged and reduced, in the number formats of float chains.
     #[test]
     fn the_input_is_that_of_the_cpu() {
         let device = device();
@@ -259,7 +259,7 @@ mod tests {
         }
     }
 
-    /// A depth's last bit says which plane its pixel is on.
+    /// Checks depth bit for bit, because its last bit decides which plane a pixel is on.
     #[test]
     fn surfaces_have_the_bits_of_the_cpu() {
         let device = device();

@@ -1,28 +1,29 @@
-//! Whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as compute passes of wgpu, for Vulkan, Metal
-//! and DirectX 12. A frame goes in, modulator levels come out, and nothing comes back to the CPU between.
+//! Runs whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as wgpu compute passes for Vulkan, Metal
+//! and DirectX 12. The input is a frame and the output is modulator levels. No intermediate result returns to the CPU.
 //!
-//! Each stage is a .wgsl file beside its Rust. A header that the Rust writes before the text holds the constants, so
-//! that loops have constant bounds. The CPU's stage is the oracle: f32 agrees with it to 1e-4, int8 networks agree to
-//! the bit. A device is used only after it has computed a small frame as the CPU does.
+//! Each stage is a .wgsl file beside its Rust file. The Rust code prepends a header of constants to the shader text, so
+//! that loops have constant bounds. The CPU stage is the reference: f32 agrees with it to 1e-4, int8 networks agree bit
+//! for bit. A device is used only after it has computed a small frame as the CPU does.
 //!
-//! | module | what it does |
+//! | module | purpose |
 //! |---|---|
-//! | `device` | opens a GPU, compiles programs, holds memory; errors are values |
-//! | `input` | camera formats to groups of four channels |
-//! | `method` | a network (`chain`), the plane sweep (`sweep`, `hidden`), or the network on the sweep's field |
-//! | `fft` | a filter in the Fourier domain in three dispatches |
+//! | `device` | opens a GPU, compiles programs, allocates memory, returns failures as errors |
+//! | `input` | converts camera formats to groups of four channels |
+//! | `method` | runs a network (`chain`), the plane sweep (`sweep`, `hidden`), or the network on the sweep's field |
+//! | `fft` | applies a filter in the Fourier domain in three dispatches |
 //! | `encode` | filters, largest amplitude, double phase, levels, local and midpoint correction |
-//! | `pipeline` | all of it, three frames in flight |
+//! | `pipeline` | runs all stages, with three frames in flight |
 //! | `probe` | compares a small frame with the CPU's |
-//! | `renderer` | opens a lost device again |
-//! | `watch` | gives up on drivers that do not answer |
+//! | `renderer` | reopens a lost device |
+//! | `watch` | abandons calls into drivers that do not return |
 //!
-//! In `chain` a thread computes four pixels of a column for eight filters at a time, with weights in uniform memory in
-//! reading order. Two layers and the skip around them can be one dispatch: fewer reads and writes of memory for a fifth
-//! more arithmetic. `sweep` can take one or two planes in a dispatch. The plan measures both ways and takes the faster.
-//! Sines, arc functions and tanh are polynomials of our own, because drivers promise only 5e-4.
+//! In `chain` each thread computes four pixels of a column for eight filters at a time. The weights are in uniform
+//! memory in the order in which they are read. Two layers and the skip around them can be one dispatch, which saves
+//! memory reads and writes and costs a fifth more arithmetic. `sweep` can process one or two planes per dispatch. The
+//! plan measures both variants and takes the faster. Sines, arc functions and tanh are polynomials in this crate,
+//! because drivers guarantee an error of only 5e-4.
 //!
-//! A session falls back to the CPU by itself. To display levels without a copy to the CPU, plan here:
+//! A session falls back to the CPU by itself. To display levels without a copy to the CPU, use this crate directly:
 //!
 //! ```no_run
 //! use phasefront_gpu::{Deliver, Device, DeviceOptions, Frame, GpuError, GpuPipeline, Job, probe};
@@ -63,29 +64,29 @@ pub use pipeline::{Deliver, FLIGHTS, GpuPipeline, GpuReport, Job, Ticket};
 pub use probe::probe;
 pub use renderer::{InFlight, Renderer};
 
-/// Why the GPU does not serve.
+/// The reason why the GPU cannot be used.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// No GPU, or none that is wanted.
+    /// There is no GPU, or none that matches the options.
     #[error("no GPU: {0}")]
     None(String),
-    /// A feature, a limit or a size that this GPU refuses.
+    /// The GPU does not support a feature, a limit or a size.
     #[error("the GPU refuses: {0}")]
     Refused(String),
-    /// Memory that this GPU does not have.
+    /// The GPU has too little memory.
     #[error("the GPU is out of memory: {0}")]
     OutOfMemory(String),
-    /// Results that are not the CPU's.
+    /// The results differ from the CPU's.
     #[error("the GPU answers wrongly: {0}")]
     Wrong(String),
-    /// A device that went away, with what it was computing.
+    /// The device was lost, with the frames in flight.
     #[error("the GPU was lost: {0}")]
     Lost(String),
-    /// What the CPU would refuse too.
+    /// An error that the CPU path returns too.
     #[error(transparent)]
     Core(#[from] phasefront_core::runtime::error::Error),
 }
 
-/// A result of the GPU.
+/// The result type of this crate.
 pub(crate) type Result<T> = std::result::Result<T, GpuError>;

@@ -1,4 +1,4 @@
-//! Makes the hologram's field of a captured frame on the GPU: the twin of [`phasefront_core::method`].
+//! Computes the hologram's field of a captured frame on the GPU: the counterpart of [`phasefront_core::method`].
 
 pub(crate) mod chain;
 mod hidden;
@@ -20,7 +20,7 @@ use sweep::Sweeper;
 /// A method for one frame size.
 pub(super) struct MethodPlan {
     size: (usize, usize),
-    /// From the frame to what the network or the sweep reads.
+    /// Converts the frame to the input of the network or the sweep.
     packer: Packer,
     plan: Plan,
 }
@@ -28,11 +28,11 @@ pub(super) struct MethodPlan {
 enum Plan {
     Network(Trained),
     Sweep(Sweeper),
-    /// The sweep, from it and the frame to the network's input, and the network.
+    /// The sweep, the conversion of its field and the frame to the network's input, and the network.
     Seeded(Sweeper, Box<Packer>, Trained),
 }
 
-/// A network in its numbers.
+/// A network in its number format.
 struct Trained {
     network: Arc<Network>,
     numbers: Numbers,
@@ -41,7 +41,7 @@ struct Trained {
 }
 
 impl Trained {
-    /// Plans `network`, in numbers and with its depth stretched, on what `packer` writes.
+    /// Plans `network`, with its number format and stretched depth, on the output of `packer`.
     fn new(
         device: &Device,
         network: &Arc<Network>,
@@ -62,7 +62,7 @@ impl Trained {
 }
 
 impl MethodPlan {
-    /// Plans `method` for frames of `size` (height, width) that come in `formats`.
+    /// Plans `method` for frames of `size` (height, width) in `formats`.
     pub(super) fn new(
         device: &Device,
         method: &Method,
@@ -116,7 +116,7 @@ impl MethodPlan {
         Ok(MethodPlan { size, packer, plan })
     }
 
-    /// Frames come in `formats` from now on.
+    /// Plans the input stage again for frames in `formats`.
     pub(super) fn expect(&mut self, device: &Device, formats: (Colour, Depth)) -> Result<()> {
         if self.packer.formats() == Some(formats) {
             return Ok(());
@@ -131,17 +131,17 @@ impl MethodPlan {
         Ok(())
     }
 
-    /// Sends a frame on its way; it is there when what is submitted next begins.
+    /// Uploads a frame. The upload is complete before the next submission starts.
     pub(super) fn upload(&self, device: &Device, frame: &Frame<'_>) -> Result<()> {
         self.packer.upload(device, frame)
     }
 
-    /// Reads the frame.
+    /// Converts the uploaded frame to the method's input.
     pub(super) fn read(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.packer.run(pass);
     }
 
-    /// Makes the field of what was read.
+    /// Computes the field from the converted input.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
         match &self.plan {
             Plan::Network(trained) => trained.chain.run(pass),
@@ -154,7 +154,7 @@ impl MethodPlan {
         }
     }
 
-    /// (3, H, W) complex f32.
+    /// Returns the field, (3, H, W) complex f32.
     pub(super) fn field(&self) -> &wgpu::Buffer {
         match &self.plan {
             Plan::Network(trained) | Plan::Seeded(_, _, trained) => &trained.chain.field,
@@ -162,7 +162,7 @@ impl MethodPlan {
         }
     }
 
-    /// Its sums: three complex f32 for each of so many workgroups.
+    /// Returns the sums of the field, three complex f32 for each workgroup, and the number of workgroups.
     pub(super) fn sums(&self) -> (&wgpu::Buffer, usize) {
         match &self.plan {
             Plan::Network(trained) | Plan::Seeded(_, _, trained) => (&trained.chain.partial, trained.chain.parts),
@@ -170,7 +170,7 @@ impl MethodPlan {
         }
     }
 
-    /// Where the hologram stands, metres from the midpoint toward the viewer.
+    /// Returns the hologram's position in metres from the midpoint toward the viewer.
     pub(super) fn z_m(&self) -> f64 {
         match &self.plan {
             Plan::Network(_) | Plan::Seeded(..) => 0.0,
@@ -178,7 +178,7 @@ impl MethodPlan {
         }
     }
 
-    /// What it is computed in.
+    /// Returns the number format of the computation.
     pub(super) fn numbers(&self) -> Numbers {
         match &self.plan {
             Plan::Network(trained) | Plan::Seeded(_, _, trained) => trained.numbers,
@@ -186,7 +186,7 @@ impl MethodPlan {
         }
     }
 
-    /// What the device does in a frame, in words.
+    /// Describes the device's work per frame.
     pub(super) fn describe(&self) -> String {
         let swept = |sweep: &Sweeper| {
             let (planes, dispatches) = (sweep.together, sweep.dispatches());
@@ -203,7 +203,7 @@ impl MethodPlan {
         }
     }
 
-    /// Bytes that the field's dispatches read and write in a frame, each value once.
+    /// Returns the bytes that the field's dispatches read and write in a frame, counting each value once.
     pub(super) fn bytes(&self) -> usize {
         match &self.plan {
             Plan::Network(trained) => trained.chain.bytes,

@@ -1,25 +1,26 @@
-//! The numbers that a network is computed in on a GPU.
+//! The number formats of a network on a GPU.
 
 use super::{Device, GpuError, Result};
 use phasefront_core::method::network::Precision;
 use phasefront_core::method::network::chain::Chain;
 
-/// Channels of a group: a program reads and writes channels in fours.
+/// The channels of a group: programs read and write four channels at a time.
 pub(super) const GROUP: usize = 4;
 
-/// The numbers that an f32 chain is computed in.
+/// The number format of an f32 chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Float {
-    /// 16 bits where the GPU has them, else 32.
+    /// 16 bits if the GPU supports them, else 32.
     #[default]
     Fastest,
-    /// 16 bits for activations and weights, sums in both: to 2 % of the largest value, typically 0.3 %.
+    /// 16 bits for activations and weights, and both widths in sums. The error is up to 2 % of the largest value,
+    /// typically 0.3 %.
     F16,
     /// 32 bits.
     F32,
 }
 
-/// The numbers of a planned chain.
+/// The number format of a planned chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Numbers {
     F32,
@@ -28,7 +29,7 @@ pub(super) enum Numbers {
 }
 
 impl Numbers {
-    /// What a chain is computed in on `device`.
+    /// Returns the number format of a chain on `device`.
     pub(super) fn of(device: &Device, chain: &Chain, float: Float) -> Result<Numbers> {
         if chain.halved && !chain.inputs.is_multiple_of(GROUP) {
             return Err(GpuError::Refused(format!(
@@ -50,7 +51,7 @@ impl Numbers {
         })
     }
 
-    /// Its name in reports.
+    /// Returns the name for reports.
     pub(super) fn name(self) -> &'static str {
         match self {
             Numbers::F32 => "f32",
@@ -59,7 +60,7 @@ impl Numbers {
         }
     }
 
-    /// Bytes of a group's value at a pixel.
+    /// Returns the bytes of one group at a pixel.
     pub(super) fn value_bytes(self) -> usize {
         match self {
             Numbers::F32 => 16,
@@ -68,7 +69,7 @@ impl Numbers {
         }
     }
 
-    /// How programs call a group's value at a pixel.
+    /// Returns the WGSL type of one group at a pixel.
     pub(super) fn value(self) -> &'static str {
         match self {
             Numbers::F32 => "vec4<f32>",

@@ -1,4 +1,5 @@
-//! One RGB-D frame through all stages on the GPU, several frames in flight: the twin of [`phasefront_core::pipeline`].
+//! Runs RGB-D frames through all stages on the GPU, several in flight: the counterpart of
+//! [`phasefront_core::pipeline`].
 
 use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, EncoderJob, LevelsBuffers, MeanPhase};
@@ -17,36 +18,36 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Frames that may be in flight at a time.
+/// The number of frames that may be in flight at a time.
 pub const FLIGHTS: usize = 3;
-/// Where a frame's levels begin in what is read back: behind the largest amplitude and the time stamps.
+/// The offset of a frame's levels in its readback buffer, after the largest amplitude and the time stamps.
 const LEVELS_AT: usize = 256;
 const STAMPS_AT: u64 = 16;
-/// Time stamps of a frame: before and after each stage.
+/// The number of time stamps of a frame: one before and one after each stage.
 const STAMPS: u32 = 8;
 
-/// What is to be computed.
+/// A description of the holograms to compute.
 #[derive(Clone)]
 pub struct Job {
     /// (H, W).
     pub shape: (usize, usize),
-    /// What makes the midpoint hologram.
+    /// The method that computes the midpoint hologram.
     pub method: Method,
-    /// What it is for.
+    /// The display that the holograms are computed for.
     pub target: Target,
-    /// How fields become levels.
+    /// The options for converting fields to levels.
     pub encoder: EncoderOptions,
-    /// How colour comes.
+    /// The format of colour images.
     pub colour: Colour,
-    /// How depth comes.
+    /// The format of depth images.
     pub depth: Depth,
-    /// How a network is computed.
+    /// The options for computing a network.
     pub chain: ChainOptions,
 }
 
 impl Job {
-    /// Frames as [`phasefront_core::frame::RgbdFrame`] by `method` to `target` as
-    /// [`phasefront_core::pipeline::Pipeline`] makes them.
+    /// Describes frames of type [`phasefront_core::frame::RgbdFrame`] that `method` computes for `target`, with the
+    /// defaults of [`phasefront_core::pipeline::Pipeline`].
     pub fn new(shape: (usize, usize), method: Method, target: impl Into<Target>) -> Self {
         Job {
             shape,
@@ -59,48 +60,48 @@ impl Job {
         }
     }
 
-    /// The same on the CPU.
+    /// Plans the same job on the CPU.
     ///
     /// # Errors
-    /// What [`phasefront_core::pipeline::Pipeline::new`] refuses.
+    /// Returns the errors of [`phasefront_core::pipeline::Pipeline::new`].
     pub fn on_cpu(&self) -> phasefront_core::runtime::error::Result<phasefront_core::pipeline::Pipeline> {
         phasefront_core::pipeline::Pipeline::new(self.shape, self.method.clone(), &self.target, &self.encoder)
     }
 }
 
-/// Who wants a frame's levels.
+/// The destination of a frame's levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deliver {
-    /// The CPU: they are copied to where it reads them.
+    /// The levels are copied to memory that the CPU reads.
     Levels,
-    /// The GPU, as [`GpuPipeline::texture`] or [`GpuPipeline::levels`]: nothing is copied.
+    /// The levels stay on the GPU, in [`GpuPipeline::texture`] and [`GpuPipeline::levels`]. Nothing is copied.
     Shown,
 }
 
-/// A frame in flight. Given back by [`GpuPipeline::collect`] or [`GpuPipeline::finish`].
+/// A frame in flight, returned to the pipeline by [`GpuPipeline::collect`] or [`GpuPipeline::finish`].
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ticket {
     slot: usize,
     serial: u64,
 }
 
-/// What became of a frame on the GPU.
+/// Data about a completed frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GpuReport {
-    /// The amplitude that full light stands for.
+    /// The amplitude that corresponds to full brightness.
     pub scale: f32,
-    /// How long it took, where the device has time stamps.
+    /// The time of each stage, if the device has time stamps.
     pub times: Option<FrameTimes>,
 }
 
-/// A plan for one [`Job`] on one device: all buffers and programs are made with it.
+/// A plan for one [`Job`] on one device. Creating the plan creates all buffers and programs.
 pub struct GpuPipeline {
     device: Arc<Device>,
     size: (usize, usize),
     method: MethodPlan,
-    /// None for an encoding that was trained on the field's phase as it is.
+    /// `None` for an encoding that was trained on the field's unmodified phase.
     mean: Option<MeanPhase>,
-    /// None where the modulator stands at the midpoint.
+    /// `None` if the modulator is at the midpoint.
     offset: Option<Convolution>,
     encoder: Encoder,
     buffers: Vec<LevelsBuffers>,
@@ -108,9 +109,9 @@ pub struct GpuPipeline {
     serial: u64,
 }
 
-/// What a frame in flight has to itself, besides its target.
+/// The resources of a frame in flight, besides its levels buffers.
 struct Slot {
-    /// The largest amplitude, the time stamps, the levels.
+    /// The largest amplitude, the time stamps and the levels.
     readable: wgpu::Buffer,
     stamps: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     flight: Option<Flight>,
@@ -123,11 +124,11 @@ struct Flight {
 }
 
 impl GpuPipeline {
-    /// Plans `job` on `device`. Whether the device is to be trusted is [`super::probe`]'s question.
+    /// Plans `job` on `device`. It does not check the device's results: see [`super::probe`].
     ///
     /// # Errors
-    /// What [`phasefront_core::pipeline::Pipeline::new`] refuses, and [`GpuError::Refused`] or
-    /// [`GpuError::OutOfMemory`] for what this device cannot do.
+    /// Returns the errors of [`phasefront_core::pipeline::Pipeline::new`], and [`GpuError::Refused`] or
+    /// [`GpuError::OutOfMemory`] if the device cannot run the job.
     pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
         let display = &job.target.display;
         job.method.check(display)?;
@@ -161,9 +162,9 @@ impl GpuPipeline {
             true => None,
             false => Some(MeanPhase::new(device, sums, parts)?),
         };
-        // The first to read the field turns it.
+        // The first stage that reads the field applies the turn.
         let mut turn = mean.as_ref().map(|mean| &mean.turn);
-        // The rest of the way.
+        // The distance from the method's plane to the modulator.
         let distance_m = display.offset_m() - method.z_m();
         let plans = target.propagators(size, 1, distance_m, target.correction.as_ref())?;
         let offset = match &plans {
@@ -207,60 +208,61 @@ impl GpuPipeline {
         })
     }
 
-    /// (H, W).
+    /// Returns (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.size
     }
 
-    /// The device.
+    /// Returns the device.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
 
-    /// What the hologram is computed in, and how.
+    /// Describes the numbers, the device and the method's dispatches.
     pub fn describe(&self) -> String {
         let (numbers, device) = (self.numbers(), self.device.name());
         format!("{numbers} on {device}, {}", self.method.describe())
     }
 
-    /// What the network, or a sweep by itself, is computed in: `f32`, `f16` or `int8`.
+    /// Returns the numbers that the network, or a sweep without one, is computed in: `f32`, `f16` or `int8`.
     pub fn numbers(&self) -> &'static str {
         self.method.numbers().name()
     }
 
-    /// What the device does at its best, measured now, in these numbers.
+    /// Measures the device's peak performance in these numbers.
     ///
     /// # Errors
-    /// What the device refuses; [`GpuError::Lost`].
+    /// Returns an error if the device cannot run the measurement, or [`GpuError::Lost`].
     pub fn peak(&self) -> Result<Peak> {
         crate::device::peak::measure(&self.device, self.method.numbers())
     }
 
-    /// Bytes that the method's dispatches read and write in a frame, each value once.
+    /// Returns the bytes that the method's dispatches read and write in a frame, counting each value once.
     pub fn method_bytes(&self) -> usize {
         self.method.bytes()
     }
 
-    /// Frames come so from now on: the input stage alone is planned again. Frames in flight are not harmed.
+    /// Plans the input stage again for frames in these formats. The other stages and the frames in flight stay.
     ///
     /// # Errors
-    /// A format that the CPU refuses too, or what this device cannot do; frames then come as before.
+    /// Returns an error if the CPU path refuses the format or the device cannot run it. The earlier formats then stay.
     pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
         self.method.expect(&self.device, (colour, depth))
     }
 
-    /// Sends a frame through. At most [`FLIGHTS`] may be in flight.
+    /// Submits a frame. At most [`FLIGHTS`] may be in flight.
     ///
     /// # Errors
-    /// Bytes of another length than planned, too many frames in flight, or a device that is lost.
+    /// Returns an error if the frame's byte lengths differ from the plan, too many frames are in flight or the device
+    /// is lost.
     pub fn submit(&mut self, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
         self.submit_after(None, frame, deliver)
     }
 
-    /// [`GpuPipeline::submit`] for smoothed brightness, whose scale comes from `past`.
+    /// Submits a frame whose smoothed brightness starts from the scale in `past`.
     ///
     /// # Errors
-    /// As [`GpuPipeline::submit`].
+    /// Returns the errors of [`GpuPipeline::submit`].
     pub fn submit_after(&mut self, past: Option<Past>, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
         let Some(slot) = self.slots.iter().position(|slot| slot.flight.is_none()) else {
             return Err(phasefront_core::runtime::error::Error::Setting(format!(
@@ -329,13 +331,14 @@ impl GpuPipeline {
         encoder.finish()
     }
 
-    /// Where a frame's picture is, or will be: RGBA of 8 bits, levels of red, green and blue. It stays until the frame
-    /// is collected or finished.
+    /// Returns the texture that holds or will hold a frame's levels: 8-bit RGBA, with the levels of red, green and
+    /// blue. It stays valid until the frame is collected or finished.
     pub fn texture(&self, ticket: &Ticket) -> &wgpu::Texture {
         &self.buffers[ticket.slot].texture
     }
 
-    /// The same as a buffer: (H, W) words, red in the lowest byte, then green, blue and 255.
+    /// Returns the levels of [`GpuPipeline::texture`] as a buffer: (H, W) words, red in the lowest byte, then green,
+    /// blue and 255.
     pub fn levels(&self, ticket: &Ticket) -> &wgpu::Buffer {
         &self.buffers[ticket.slot].levels
     }
@@ -343,10 +346,10 @@ impl GpuPipeline {
     /// Waits for a frame and copies its levels, (3, H, W).
     ///
     /// # Errors
-    /// A frame that was not asked for with [`Deliver::Levels`]; [`GpuError::Lost`].
+    /// Returns an error if the frame was not submitted with [`Deliver::Levels`], or [`GpuError::Lost`].
     ///
     /// # Panics
-    /// If `levels` has not 3·H·W values.
+    /// Panics if `levels` does not have 3·H·W values.
     pub fn collect(&mut self, ticket: Ticket, levels: &mut [u8]) -> Result<GpuReport> {
         let area = self.size.0 * self.size.1;
         assert_eq!(levels.len(), 3 * area);
@@ -365,10 +368,10 @@ impl GpuPipeline {
         })
     }
 
-    /// Waits for a frame that stays on the GPU, and gives its place to another.
+    /// Waits for a frame that stays on the GPU and frees its slot.
     ///
     /// # Errors
-    /// [`GpuError::Lost`].
+    /// Returns [`GpuError::Lost`] if the device is lost.
     pub fn finish(&mut self, ticket: Ticket) -> Result<GpuReport> {
         self.take(ticket, Deliver::Shown, |_| {})
     }
@@ -420,13 +423,13 @@ impl GpuPipeline {
         })
     }
 
-    /// [`GpuPipeline::submit`] and [`GpuPipeline::collect`] in one.
+    /// Submits a frame and collects it, as [`GpuPipeline::submit`] and [`GpuPipeline::collect`] do.
     ///
     /// # Errors
-    /// As theirs.
+    /// Returns the errors of both.
     ///
     /// # Panics
-    /// If `levels` has not 3·H·W values.
+    /// Panics if `levels` does not have 3·H·W values.
     pub fn process(&mut self, frame: &Frame<'_>, levels: &mut [u8]) -> Result<GpuReport> {
         let ticket = self.submit(frame, Deliver::Levels)?;
         self.collect(ticket, levels)

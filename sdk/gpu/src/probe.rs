@@ -1,4 +1,4 @@
-//! Trust, then use: a small frame on the device beside the same on the CPU.
+//! Checks a device by comparing a small frame with the CPU's.
 
 use super::device::Device;
 use super::input::Frame;
@@ -11,19 +11,19 @@ use phasefront_core::display::target::Target;
 use phasefront_core::frame::RgbdFrame;
 use std::sync::Arc;
 
-/// Rows and columns of the frame: odd, and more than one tile of every program.
+/// The rows and columns of the frame: odd, and more than one tile of every program.
 const SIZE: (usize, usize) = (37, 43);
 
 /// Runs a small frame of `job` on `device` and on the CPU and compares their phases.
 ///
 /// # Errors
-/// [`GpuError::Wrong`] where they differ by more than the numbers' rounding, [`GpuError::Lost`] where no answer comes,
-/// and what [`GpuPipeline::new`] refuses.
+/// Returns [`GpuError::Wrong`] if the phases differ by more than the rounding of the numbers, [`GpuError::Lost`] if the
+/// device does not respond, and the errors of [`GpuPipeline::new`].
 pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let job = Job {
         shape: SIZE,
         target: Target {
-            // A table for each pixel is for one size.
+            // A per-pixel table fits only one frame size.
             response: match &job.target.response {
                 Response::PerPixel(_) => Response::Linear { bits: 8 },
                 other => other.clone(),
@@ -34,7 +34,7 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
         depth: super::Depth::F32,
         ..job.clone()
     };
-    // What it refuses is known before the CPU works.
+    // The GPU goes first, so that its errors are known before the CPU works.
     let mut gpu = GpuPipeline::new(device, &job)?;
     let size = 3 * SIZE.0 * SIZE.1;
     let frame = frame()?;
@@ -43,7 +43,7 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let mut expected = vec![0; size];
     cpu.process(&frame, &mut expected, &mut scratch)?;
     let mut levels = vec![0; size];
-    // Twice: what one frame leaves behind must not reach the next.
+    // Two frames, because the state that one leaves must not affect the next.
     for _ in 0..2 {
         gpu.process(&Frame::of(&frame), &mut levels)?;
         let apart = apart(&levels, &expected, &job.target.response);
@@ -58,7 +58,7 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
+/// Returns the mean of |exp(iφ) − exp(iφ')| for the levels of two frames.
 pub(super) fn apart(levels: &[u8], others: &[u8], response: &Response) -> f32 {
     let shown: [Complex32; 256] = std::array::from_fn(|l| Complex32::from_polar(1.0, response.phase(l as u8, 0)));
     let sum: f32 = levels
@@ -69,7 +69,7 @@ pub(super) fn apart(levels: &[u8], others: &[u8], response: &Response) -> f32 {
     sum / levels.len() as f32
 }
 
-/// Waves of several lengths in colour, steps and a ramp in depth.
+/// Creates a frame with waves of several lengths in colour, and steps and a ramp in depth.
 fn frame() -> Result<RgbdFrame> {
     let (height, width) = SIZE;
     let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
@@ -94,7 +94,7 @@ mod tests {
     use phasefront_core::method::Method;
     use phasefront_core::method::network::Network;
 
-    /// A driver that compiles one program wrongly is found out.
+    /// Checks that a driver that compiles one program wrongly is detected.
     #[test]
     fn a_device_that_answers_wrongly_is_not_used() {
         let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));

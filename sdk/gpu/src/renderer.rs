@@ -1,5 +1,5 @@
-//! Frames on a GPU that was found to be right. A device that is lost is opened again; what becomes of a frame where
-//! none serves is the session's to say.
+//! Renders frames on a GPU that passed [`probe`] and reopens a device that is lost. The session decides what happens to
+//! a frame if no device is available.
 
 use super::device::{Device, DeviceOptions};
 use super::input::{Colour, Depth, Frame};
@@ -11,28 +11,28 @@ use phasefront_core::encode::brightness::Past;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often in a row a lost device is opened again before it counts as of no use.
+/// The number of consecutive losses of a device after which it is not reopened.
 const ATTEMPTS: usize = 3;
-/// How long opening may take, and compiling programs and trying them out: drivers in software compile slowly.
+/// The time limits for opening a device and for compiling and checking its programs. Software drivers compile slowly.
 const OPENING: Duration = Duration::from_secs(30);
 const TRYING: Duration = Duration::from_secs(60);
 const TRYING_SOFTWARE: Duration = Duration::from_secs(600);
 
-/// Frames of one [`Job`].
+/// Renders the frames of one [`Job`].
 pub struct Renderer {
     job: Job,
     options: DeviceOptions,
-    /// None where a device was lost: the next frame opens another.
+    /// `None` after a device was lost: the next frame opens another.
     pipeline: Option<Box<GpuPipeline>>,
-    /// Why a device was lost.
+    /// The latest loss or failure to open.
     reason: Option<GpuError>,
-    /// How often a device was opened: a frame of an earlier one is lost.
+    /// The number of times a device was opened. Frames of an earlier epoch are lost.
     epoch: usize,
-    /// Losses since the last frame that came through.
+    /// The number of losses since the last completed frame.
     losses: usize,
 }
 
-/// A frame on its way.
+/// A frame in flight.
 #[derive(Debug)]
 pub struct InFlight {
     epoch: usize,
@@ -40,10 +40,10 @@ pub struct InFlight {
 }
 
 impl Renderer {
-    /// Plans `job` on `device`, or on one that is opened as `options` say, and tries it out by [`probe`].
+    /// Plans `job` on `device`, or on a device opened with `options`, and checks the plan with [`probe`].
     ///
     /// # Errors
-    /// What the CPU refuses too, and what only the GPU does.
+    /// Returns an error if the CPU path refuses the job or the GPU cannot be used.
     pub fn new(device: Option<Arc<Device>>, options: DeviceOptions, job: Job) -> Result<Self> {
         let mut renderer = Renderer {
             job,
@@ -57,22 +57,22 @@ impl Renderer {
         Ok(renderer)
     }
 
-    /// Why a device was lost, if one was.
+    /// Returns why a device was lost, if one was.
     pub fn reason(&self) -> Option<&GpuError> {
         self.reason.as_ref()
     }
 
-    /// The GPU's plan; none where its device was lost.
+    /// Returns the GPU's plan, or `None` after its device was lost.
     pub fn pipeline(&self) -> Option<&GpuPipeline> {
         self.pipeline.as_deref()
     }
 
-    /// How often a device was opened.
+    /// Returns the number of times a device was opened.
     pub fn openings(&self) -> usize {
         self.epoch
     }
 
-    /// Gives the device's memory back, and what is on it up; the next frame opens one again.
+    /// Frees the device's memory and drops the frames on it. The next frame opens a device again.
     pub fn release(&mut self) {
         self.pipeline = None;
     }
@@ -95,14 +95,14 @@ impl Renderer {
         }
     }
 
-    /// Frames come so from now on, as [`GpuPipeline::expect`].
+    /// Plans the input stage again for frames in these formats, as [`GpuPipeline::expect`] does.
     ///
     /// # Errors
-    /// As that.
+    /// Returns the errors of [`GpuPipeline::expect`] except a loss.
     pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
         if let Some(pipeline) = &mut self.pipeline {
             match pipeline.expect(colour, depth) {
-                // The next frame finds out, and opens another device for these formats.
+                // The next frame notices the loss and opens another device for these formats.
                 Ok(()) | Err(GpuError::Lost(_)) => {}
                 Err(why) => return Err(why),
             }
@@ -111,11 +111,12 @@ impl Renderer {
         Ok(())
     }
 
-    /// Hands a frame in, in the formats of the job, whose smoothed brightness comes from `past`. [`super::FLIGHTS`] may
-    /// be on their way.
+    /// Submits a frame in the formats of the job. Smoothed brightness starts from `past`. At most [`super::FLIGHTS`]
+    /// frames may be in flight.
     ///
     /// # Errors
-    /// Bytes of another length than planned, or what [`Renderer::new`] refuses where a device was lost before.
+    /// Returns an error if the frame's byte lengths differ from the plan, or, after a loss, the errors of
+    /// [`Renderer::new`].
     pub fn submit(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<InFlight> {
         loop {
             let submitted = match &mut self.pipeline {
@@ -135,10 +136,10 @@ impl Renderer {
     /// Waits for a frame and copies its levels, (3, H, W).
     ///
     /// # Errors
-    /// [`GpuError::Lost`] for a frame that went with its device; the next one goes on.
+    /// Returns [`GpuError::Lost`] if the frame was lost with its device. The next frame opens another.
     ///
     /// # Panics
-    /// If `levels` has not 3·H·W values.
+    /// Panics if `levels` does not have 3·H·W values.
     pub fn collect(&mut self, frame: InFlight, levels: &mut [u8]) -> Result<GpuReport> {
         let pipeline = self.pipeline.as_mut().filter(|_| frame.epoch == self.epoch);
         let Some(pipeline) = pipeline else {
@@ -156,7 +157,7 @@ impl Renderer {
         }
     }
 
-    /// Keeps the reason of a loss, after which the next frame opens another device; gives back other errors.
+    /// Records a loss, after which the next frame opens another device. Returns any other error.
     fn note(&mut self, why: GpuError) -> Result<()> {
         match why {
             GpuError::Core(_) => Err(why),
@@ -170,7 +171,8 @@ impl Renderer {
     }
 }
 
-/// Plans `job` on `device`, or on one that is opened, if it answers, and as the CPU does.
+/// Plans `job` on `device`, or on a newly opened one, and returns the plan if the device responds and agrees with the
+/// CPU.
 fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> Result<GpuPipeline> {
     let device = match device {
         Some(device) => device,
@@ -225,7 +227,7 @@ mod tests {
         RgbdFrame::new(rgb, Array2::from_elem(SIZE, 0.3)).unwrap()
     }
 
-    /// Takes the device away, as drivers do.
+    /// Destroys the device, as drivers do.
     fn lose(renderer: &Renderer) {
         renderer.pipeline().unwrap().device().wgpu().0.destroy();
     }
@@ -255,7 +257,7 @@ mod tests {
         assert_eq!(levels, before);
         assert!(matches!(renderer.reason(), Some(GpuError::Lost(_))));
 
-        // Lost with nothing in flight: the next frame finds out, and goes on.
+        // The device is lost with nothing in flight: the next frame notices and succeeds on a new device.
         lose(&renderer);
         let next = renderer.submit(None, &bytes).unwrap();
         renderer.collect(next, &mut levels).unwrap();

@@ -1,4 +1,4 @@
-//! Calls into drivers that may never come back, opening and compiling, made on a thread that can be left behind.
+//! Runs driver calls that may never return (opening and compiling) on a thread that can be abandoned.
 
 use super::device::one_line;
 use super::{GpuError, Result};
@@ -6,13 +6,13 @@ use phasefront_core::runtime::caught::caught;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// What `work` gives on a thread of its own, and [`GpuError::Lost`] where that takes over `patience` or panics.
+/// Runs `work` on a thread of its own. Returns [`GpuError::Lost`] if it takes longer than `patience` or panics.
 pub(super) fn watched<T: Send + 'static>(
     what: &str,
     patience: Duration,
     work: impl FnOnce() -> Result<T> + Send + 'static,
 ) -> Result<T> {
-    // A pool of one, so that the CPU's twins that are run for comparison do not wake all cores.
+    // A pool of one thread, so that the CPU stages run for comparison do not wake all cores.
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .thread_name(|_| "phasefront gpu".into())
@@ -21,7 +21,7 @@ pub(super) fn watched<T: Send + 'static>(
     let (send, receive) = channel();
     pool.spawn(move || {
         let done = caught(work).unwrap_or_else(|_| Err(GpuError::Lost("its driver's interface panicked".into())));
-        // Nobody waits any more where it took too long.
+        // If the work took too long, nobody receives the result.
         let _ = send.send(done);
     });
     match receive.recv_timeout(patience) {

@@ -1,4 +1,4 @@
-//! What runs on the GPU against its twin on the CPU, on whatever device there is: Mesa's driver in software will do.
+//! Compares GPU stages with their CPU counterparts on any device, including Mesa's software driver.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../../tests/driver.rs"]
@@ -29,7 +29,7 @@ use phasefront_gpu::{
 };
 use std::sync::{Arc, OnceLock};
 
-/// The device of all tests.
+/// Returns the device of all tests.
 fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Result<Arc<Device>, phasefront_gpu::GpuError>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
@@ -83,7 +83,7 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
             input: "ldi5",
             ..Model::new(8, 16)
         },
-        // Filters that fill no block of eight, and a width that fills no group.
+        // Filter counts that are no multiple of eight or four, and a width that fills no group.
         Model::new(7, 12),
         Model::new(6, 5),
         Model::new(4, 16).halved(),
@@ -127,7 +127,7 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
     }
 }
 
-/// The sizes of phones' frames, against the kernels of the CPU.
+/// Compares frames of phone sizes with the CPU kernels.
 #[test]
 fn chains_of_whole_frames_agree_with_the_cpu() {
     let device = device();
@@ -214,7 +214,7 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
     }
 }
 
-/// A frame with detail everywhere, of values that 8 bits and 16 bits hold.
+/// Creates a frame with detail everywhere and values that 8 bits and 16 bits represent.
 fn rgbd(height: usize, width: usize) -> RgbdFrame {
     let byte = |c: usize, y: usize, x: usize| ((c * 70 + x * 3 + y * 5) % 256) as f32 / 255.0;
     RgbdFrame::new(
@@ -236,7 +236,7 @@ fn f32_network() -> Arc<Network> {
     Arc::new(Network::from_onnx(bytes).unwrap())
 }
 
-/// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
+/// Returns the mean of |exp(iφ) − exp(iφ')| for the levels of two frames.
 fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
     let shown = |level: u8| Complex32::from_polar(1.0, response.phase(level, 0));
     let sum: f32 = a.iter().zip(b).map(|(&a, &b)| (shown(a) - shown(b)).norm()).sum();
@@ -259,7 +259,7 @@ fn planned(
     }
 }
 
-/// The CPU's levels and scale of a job.
+/// Returns the CPU's levels and scale of a job.
 fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
     let (h, w) = job.shape;
     let plan = job.on_cpu().unwrap();
@@ -333,7 +333,7 @@ fn whole_frames_are_those_of_the_cpu() {
         ),
     ];
     for (network, (h, w), offset_m, encoding, scale, response, float) in cases {
-        // Off the midpoint on a display that the network was not trained for.
+        // Away from the midpoint, the display differs from the one that the network was trained for.
         let volume_mm = if offset_m > 0.0 { 4.0 } else { 6.0 };
         let display = Display::from_toml(&format!("volume_depth_mm = {volume_mm:?}")).unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
@@ -357,7 +357,7 @@ fn whole_frames_are_those_of_the_cpu() {
     }
 }
 
-/// Swept to the midpoint and propagated, and swept on to the modulator; seeded networks in all numbers.
+/// Checks sweeps to the midpoint with propagation, sweeps to the modulator, and seeded networks in all number formats.
 #[test]
 fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     let device = device();
@@ -388,7 +388,7 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
         (Method::Sweep(plain), (61, 47), 20e-3, Encoding::DoublePhase, f32, 0.002),
         (seeded(&float), (61, 47), 2e-3, Encoding::ANTI_ALIAS, f32, 0.002),
         (seeded(&float), (61, 47), 0.0, Encoding::ANTI_ALIAS, half, 0.05),
-        // A step of 8 bits to the other side is worth more than rounding.
+        // One 8-bit step outweighs rounding.
         (seeded(&int8), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.02),
     ] {
         let display = display.clone().with_offset_m(offset_m).unwrap();
@@ -405,7 +405,7 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
         assert!(apart < tolerance, "{what}: {apart}");
         let scales = (report.scale - expected_scale).abs() / expected_scale;
         assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
-        // In another form from then on; the sweep asks for the last bit of each depth.
+        // Change the depth format. The sweep depends on the last bit of each depth.
         let words: Vec<u16> = (frame.depth().iter()).map(|d| (d * 65535.0).round() as u16).collect();
         let frame = Frame {
             depth: DepthData::U16(&words),
@@ -419,7 +419,7 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     }
 }
 
-/// Bytes of camera planes for an odd-sided sensor, with strides as cameras have them.
+/// Bytes of camera planes for a sensor with odd sides and strides as in cameras.
 struct Sensor {
     format: ColourFormat,
     planes: Vec<(Vec<u8>, usize, usize)>,
@@ -461,7 +461,7 @@ impl Sensor {
                 planes: vec![
                     plane(h, w, 1, 3, 6),
                     plane(half_h, half_w, 2, 1, 7),
-                    // A stride beyond what there is room for.
+                    // A stride that exceeds the planned capacity.
                     plane(half_h, half_w, 9, 900, 8),
                 ],
             },
@@ -587,7 +587,7 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
         let mut plan = GpuPipeline::new(&device, &job).unwrap();
         let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
         let apart = apart(&levels, &expected, &job.target.response);
-        // A step of 8 bits to the other side is worth more than rounding.
+        // One 8-bit step outweighs rounding.
         let tolerance = if model.int8 { 0.02 } else { 0.003 };
         assert!(apart < tolerance, "{} {}: {apart}", model.head, model.int8);
         assert!((report.scale - scale).abs() < tolerance * scale, "{report:?} {scale}");
@@ -618,7 +618,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let full = plan.submit(&Frame::of(&frames[0]), Deliver::Levels);
     assert!(full.unwrap_err().to_string().contains("in flight"));
     let mut scales = Vec::new();
-    // Collected in another order than submitted.
+    // Collect in another order than submitted.
     for (ticket, frame) in tickets.into_iter().zip(&frames).rev() {
         let (expected, scale) = on_cpu(&job, frame);
         let mut levels = vec![0; 3 * h * w];
@@ -629,7 +629,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
         scales.push(report.scale);
     }
     assert!(scales[0] < scales[1] && scales[1] < scales[2]);
-    // One that is shown, and its picture.
+    // Check a frame that stays on the GPU, and its texture.
     let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
     let texture = plan.texture(&ticket);
     assert_eq!((texture.width(), texture.height()), (w as u32, h as u32));
@@ -639,7 +639,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     assert!(refused.to_string().contains("shown"), "{refused}");
 }
 
-/// An app draws the levels from the texture that they were written to, on the device that computed them.
+/// Checks that an app can draw the levels from the texture that they were written to, on the same device.
 #[test]
 #[expect(clippy::too_many_lines, reason = "what an app does, from its shader to its picture")]
 fn an_app_shows_the_texture_itself() {
@@ -699,7 +699,7 @@ fn an_app_shows_the_texture_itself() {
             resource: wgpu::BindingResource::TextureView(&view),
         }],
     });
-    // What stands for the app's screen.
+    // A texture in place of the app's screen.
     let size = plan.texture(&ticket).size();
     let screen = inner.create_texture(&wgpu::TextureDescriptor {
         label: None,
@@ -800,7 +800,7 @@ fn a_calibrated_display_gets_the_levels_of_the_cpu() {
         (2e-3, Some(beam), Some(bent.clone())),
         (0.0, None, Some(bent)),
     ] {
-        // A modulator that is wider than the frame, and lower.
+        // A modulator that is wider and lower than the frame.
         let display = Display::default().with_size(h - 3, w + 9).unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
         let method = Method::Network(network.clone());

@@ -1,4 +1,5 @@
-//! The paper's 8-layer chain and the pre-filter's shape on every instruction set, one thread, one small frame.
+//! Benchmarks the paper's 8-layer chain and the pre-filter's shape on every instruction set, with one thread and one
+//! small frame.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use divan::{Bencher, counter::ItemsCount};
@@ -13,7 +14,7 @@ fn main() {
     divan::main();
 }
 
-/// `(inputs, outputs)` of each layer.
+/// Returns `(inputs, outputs)` of each layer.
 fn layers((inputs, filters, count): (usize, usize, usize)) -> Vec<(usize, usize)> {
     (0..count)
         .map(|i| match i {
@@ -24,7 +25,7 @@ fn layers((inputs, filters, count): (usize, usize, usize)) -> Vec<(usize, usize)
         .collect()
 }
 
-/// What divan names a benchmark by.
+/// The argument of a benchmark, which divan uses as its name.
 #[derive(Clone, Copy)]
 struct Case {
     isa: Isa,

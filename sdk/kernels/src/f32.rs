@@ -1,8 +1,8 @@
-//! The chain in 32-bit floating point, and how its weights are packed for the kernels.
+//! The chain in 32-bit floating point and the packing of its weights for the kernels.
 //!
-//! A row is one run of pixels for each channel; the network's input follows the features in the last layer's rows. A
-//! hidden layer yields `max(sum + bias, 0)`, plus the skip's value where there is one. Instruction sets differ in
-//! whether products are fused into sums, so they agree to rounding and not to the bit.
+//! A row is one run of pixels for each channel. In the last layer's rows the network's input follows the features. A
+//! hidden layer returns `max(sum + bias, 0)`, plus the skip's value if there is one. Instruction sets differ in whether
+//! they fuse products into sums, so they agree to rounding and not bit for bit.
 
 use crate::rows::Rows;
 use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
@@ -11,18 +11,18 @@ use crate::{Isa, OUTPUTS};
 /// One layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct F32Layer {
-    /// Channels read, the concatenated ones of the last layer included.
+    /// The input channels, including the concatenated ones of the last layer.
     pub inputs: usize,
-    /// Filters.
+    /// The number of filters.
     pub outputs: usize,
     /// `(outputs, inputs, 3, 3)`.
     pub kernel: Vec<f32>,
-    /// One a filter.
+    /// One bias per filter.
     pub bias: Vec<f32>,
 }
 
 impl F32Layer {
-    /// Of a last layer, what gives the outputs of one pixel of each place.
+    /// Returns the part of a last layer that computes the outputs of one pixel of each place.
     fn of_pixel(&self, pixel: usize) -> F32Layer {
         let weights = OUTPUTS * self.inputs * 9;
         F32Layer {
@@ -34,7 +34,7 @@ impl F32Layer {
     }
 }
 
-/// A layer as the kernels read it.
+/// A layer in the layout of the kernels.
 pub(crate) struct Packed {
     pub(crate) inputs: usize,
     pub(crate) outputs: usize,
@@ -43,15 +43,15 @@ pub(crate) struct Packed {
     pub(crate) weights: Vec<f32>,
 }
 
-/// An instruction set's kernels.
+/// The kernels of an instruction set.
 #[derive(Clone, Copy)]
 #[allow(clippy::type_complexity)]
 pub(crate) struct Kernels {
-    /// How many filters are computed together, for as many as are left.
+    /// Returns the number of filters computed together, given the number of filters left.
     pub(crate) size: fn(usize) -> usize,
-    /// Layer, three rows, the skip's row, the row of features to write.
+    /// Computes a row of a hidden layer: layer, three rows, the skip's row, the row of features to write.
     pub(crate) hidden_row: fn(&Packed, &[&[f32]; 3], Option<&[f32]>, &mut [f32], Geometry),
-    /// Layer, three rows, the output planes' rows, the first pixel to yield.
+    /// Computes a row of the last layer: layer, three rows, the output planes' rows, the first pixel to compute.
     pub(crate) last_row: fn(&Packed, &[&[f32]; 3], [&mut [f32]; OUTPUTS], usize, Geometry),
 }
 
@@ -70,15 +70,15 @@ fn kernels(isa: Isa) -> Option<Kernels> {
     }
 }
 
-/// An f32 chain packed for one instruction set. Immutable; threads share it.
+/// An f32 chain packed for one instruction set. It is immutable and threads can share it.
 pub struct F32Chain {
     isa: Isa,
     kernels: Kernels,
-    /// Pixels along each side of a place.
+    /// The pixels along each side of a place.
     side: usize,
-    /// All but the last.
+    /// All layers but the last.
     layers: Vec<Packed>,
-    /// The last one, of each pixel of a place.
+    /// The last layer for each pixel of a place.
     last: Vec<Packed>,
 }
 
@@ -86,8 +86,8 @@ impl F32Chain {
     /// Packs a chain.
     ///
     /// # Errors
-    /// What the kernels cannot run: shapes that are no chain, filters not in eights, or an instruction set that this
-    /// processor lacks.
+    /// Returns an error if the kernels cannot run the chain: the shapes form no chain, the filters are not in eights,
+    /// or this processor lacks the instruction set.
     pub fn new(layers: &[F32Layer], isa: Isa) -> Result<F32Chain, String> {
         let kernels = kernels(isa)
             .filter(|_| Isa::f32().contains(&isa))
@@ -134,25 +134,25 @@ impl F32Chain {
         })
     }
 
-    /// The kernels in use.
+    /// Returns the instruction set in use.
     pub fn isa(&self) -> Isa {
         self.isa
     }
 
-    /// How many layers.
+    /// Returns the number of layers.
     pub fn layers(&self) -> usize {
         self.layers.len() + 1
     }
 
-    /// The tiling that suits a frame size and the current rayon pool.
+    /// Returns the tiling for a frame size and the current rayon pool.
     pub fn tiling(&self, height: usize, width: usize) -> Tiling {
         wavefront::tiling_for(self, height, width)
     }
 
-    /// Runs the chain on the current rayon pool: `input` planar `(C, H, W)`, `output` `(6, H, W)`.
+    /// Runs the chain on the current rayon pool. `input` is planar `(C, H, W)` and `output` is `(6, H, W)`.
     ///
     /// # Panics
-    /// If a length does not fit the size.
+    /// Panics if a length does not match the size.
     pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<f32>) {
         let area = size.0 * size.1;
         let inputs = self.inputs() / (self.side * self.side);
@@ -164,11 +164,11 @@ impl F32Chain {
         self.run_rows(&rows, planes, size, tiling, scratch);
     }
 
-    /// The same with input and output that need not be planes in memory: `rows` are read, and written to `planes`,
-    /// each (H, W).
+    /// Runs the chain with input and output that need not be planes in memory: reads the input from `rows` and writes
+    /// the output through them to `planes`, each (H, W).
     ///
     /// # Panics
-    /// If a length does not fit the size, and where `rows` do.
+    /// Panics if a length does not match the size, or if `rows` panics.
     pub fn run_rows<R: Rows<PLANES>, const PLANES: usize>(
         &self,
         rows: &R,
@@ -184,7 +184,7 @@ impl F32Chain {
 impl Chain for F32Chain {
     type Element = f32;
     const GROUP: usize = 1;
-    // A core's second-level cache, half of it: strips of the whole width took a third longer.
+    // Half of a core's second-level cache: strips of the full width took a third longer.
     const CACHE: usize = 1 << 20;
 
     fn layers(&self) -> usize {

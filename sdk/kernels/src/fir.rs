@@ -1,7 +1,7 @@
-//! Symmetric complex filters along one axis of a plane: half of a separable step of a wave.
+//! Symmetric complex filters along one axis of a plane: half of a separable propagation step of a wave.
 //!
-//! A plane is two runs of f32, real and imaginary. The arithmetic of every value is the same sequence of additions and
-//! fused multiply-adds on every instruction set, so all give the same bits; but for WebAssembly, which cannot fuse.
+//! A plane is two runs of f32, real and imaginary. Every value is computed by the same sequence of additions and fused
+//! multiply-adds on every instruction set, so all give the same bits, except WebAssembly, which cannot fuse.
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
@@ -16,31 +16,32 @@ mod simd128;
 
 use crate::Isa;
 
-/// What a run is cut into: its length is a multiple of this.
+/// The divisor of the length of every run.
 pub const RUN: usize = 16;
 
-/// A filter c with c₋ⱼ = cⱼ: `taps[0]` is the centre, `taps[j]` stands at both distances j. Real and imaginary part.
+/// A filter c with c₋ⱼ = cⱼ: `taps[0]` is the centre and `taps[j]` applies at both distances j. Each tap is a real and
+/// an imaginary part.
 pub type Taps = [[f32; 2]];
 
-/// One value of a register: what an instruction set must know to run the filter.
+/// A register of an instruction set, with the operations that the filter needs.
 trait Lanes: Copy {
     const LANES: usize;
     fn splat(value: f32) -> Self;
     /// # Safety
-    /// `LANES` values can be read.
+    /// The caller must ensure that `LANES` values can be read.
     unsafe fn load(from: *const f32) -> Self;
     /// # Safety
-    /// `LANES` values can be written.
+    /// The caller must ensure that `LANES` values can be written.
     unsafe fn store(self, to: *mut f32);
     fn add(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
-    /// self + a·b, rounded once where the instruction set can.
+    /// Returns self + a·b, rounded once if the instruction set can.
     fn plus(self, a: Self, b: Self) -> Self;
-    /// self − a·b, likewise.
+    /// Returns self − a·b, rounded once if the instruction set can.
     fn minus(self, a: Self, b: Self) -> Self;
 }
 
-/// What a kernel is given: the source, the run's first output, and its length.
+/// The arguments of a kernel: the source, the places of the taps, the run's first output and its length.
 #[derive(Clone, Copy)]
 struct Run<'a> {
     source: [*const f32; 2],
@@ -59,7 +60,7 @@ pub struct Fir {
 }
 
 impl Fir {
-    /// The kernel for `isa`; None where this processor lacks it.
+    /// Returns the kernel for `isa`, or `None` if this processor lacks the instruction set.
     pub fn new(isa: Isa) -> Option<Fir> {
         let kernel: Kernel = match isa {
             Isa::Portable => Some(portable::kernel as Kernel),
@@ -76,7 +77,7 @@ impl Fir {
         Some(Fir { isa, kernel })
     }
 
-    /// The fastest kernel of this processor.
+    /// Returns the fastest kernel of this processor.
     pub fn fastest() -> Fir {
         let portable = Fir {
             isa: Isa::Portable,
@@ -85,17 +86,18 @@ impl Fir {
         Isa::f32().into_iter().find_map(Fir::new).unwrap_or(portable)
     }
 
-    /// The instruction set in use.
+    /// Returns the instruction set in use.
     pub fn isa(&self) -> Isa {
         self.isa
     }
 
     /// Filters a run: out\[x] = c₀·source\[places\[0]\[0] + x] + Σⱼ cⱼ·(source\[places\[j]\[0] + x] +
-    /// source\[places\[j]\[1] + x]) for all x of `out`. Along a row the places of tap j lie j before and j behind the
-    /// centre; along a column they are wherever those rows are kept.
+    /// source\[places\[j]\[1] + x]) for all x of `out`. Along a row the places of tap j are j before and j after the
+    /// centre. Along a column they are wherever those rows are stored.
     ///
     /// # Panics
-    /// If `out` is no whole number of [`RUN`]s, its parts differ in length, or a place lies beyond `source`.
+    /// Panics if the length of `out` is not a multiple of [`RUN`], its parts differ in length, or a place is outside
+    /// `source`.
     pub fn filter(&self, taps: &Taps, source: [&[f32]; 2], places: &[[usize; 2]], out: [&mut [f32]; 2]) {
         let length = out[0].len();
         assert!(!taps.is_empty() && taps.len() == places.len());
@@ -109,17 +111,17 @@ impl Fir {
             out: [re.as_mut_ptr(), im.as_mut_ptr()],
             length,
         };
-        // SAFETY: the asserts above; `new` has found the instruction set.
+        // SAFETY: the asserts above hold, and `new` has detected the instruction set.
         unsafe { (self.kernel)(taps, run) };
     }
 }
 
-/// The filter over a run, `REGISTERS` registers at a time.
+/// Filters a run, `REGISTERS` registers at a time.
 ///
-/// No closures here: they would not inherit the caller's instruction set.
+/// It uses no closures, because they would not inherit the caller's instruction set.
 ///
 /// # Safety
-/// As [`Run`] says; the caller has the instruction set of `V`.
+/// The caller must uphold the contract of [`Run`] and have detected the instruction set of `V`.
 #[inline(always)]
 unsafe fn filter<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run<'_>) {
     let mut x = 0;
@@ -137,14 +139,14 @@ unsafe fn filter<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run<'_>) {
 }
 
 /// # Safety
-/// As [`filter`], for `REGISTERS` registers from `x`.
+/// The contract of [`filter`], for `REGISTERS` registers from `x`.
 #[inline(always)]
 unsafe fn block<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run<'_>, x: usize) {
     let zero = V::splat(0.0);
     let (mut re, mut im) = ([zero; REGISTERS], [zero; REGISTERS]);
     let (c, d) = (V::splat(taps[0][0]), V::splat(taps[0][1]));
     let centre = run.places[0][0] + x;
-    // SAFETY: the caller's.
+    // SAFETY: the caller upholds this function's contract.
     unsafe {
         for r in 0..REGISTERS {
             let a = V::load(run.source[0].add(centre + r * V::LANES));

@@ -1,77 +1,77 @@
-//! The quantised chain: what it computes, to the bit, and how its weights are packed for the kernels.
+//! The quantised chain: its bit-exact definition and the packing of its weights for the kernels.
 //!
-//! Activations are u8, weights s8, sums exact in 32 bits. After a sum come, in f32 and in this order (`rint` rounds
-//! half to even, `sat` clamps to 0…255, each operation rounds by itself, nothing is fused):
+//! Activations are u8, weights s8, and sums exact in 32 bits. Each sum is followed by these f32 operations in this
+//! order (`rint` rounds half to even, `sat` clamps to 0…255, each operation rounds separately, and nothing is fused):
 //!
 //! - `v = f32(sum + bias) · multiplier[filter]`;
-//! - without a skip, `q = sat(rint(v))`: saturation is the ReLU;
-//! - with a skip of value `s`, `q = sat(rint(a + f32(s) · skip))`, where `a = max(v, 0)`, or, where the file rounds the
+//! - without a skip, `q = sat(rint(v))`, where saturation acts as the ReLU;
+//! - with a skip of value `s`, `q = sat(rint(a + f32(s) · skip))`, where `a = max(v, 0)`, or, if the file rounds the
 //!   ReLU before the sum, `a = rint(min(max(v, 0), 255)) · relu`;
-//! - where the file rounds once more before the concatenation, `q = sat(rint(f32(q) · rescale))`;
+//! - if the file rounds once more before the concatenation, `q = sat(rint(f32(q) · rescale))`;
 //! - `sat(q + zero_point)`.
 //!
-//! The last layer yields `f32(sum + bias) · multiplier[filter]`.
+//! The last layer returns `f32(sum + bias) · multiplier[filter]`.
 //!
-//! A row is grouped by four channels: `[channel/4][pixel][4]`. The concatenated network input starts a group of its
-//! own.
+//! The channels of a row are in groups of four: `[channel/4][pixel][4]`. The concatenated network input starts a new
+//! group.
 
 use crate::rows::Rows;
 use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
 use crate::{Isa, OUTPUTS};
 
-/// Channels that lie together.
+/// The channels of a group, which are adjacent in memory.
 pub(crate) const GROUP: usize = 4;
-/// Products of a sum and a multiplier stay below this, so that every conversion to an integer is exact.
+/// The bound on products of a sum and a multiplier, below which every conversion to an integer is exact.
 const LARGEST: f64 = (1u32 << 30) as f64;
 
-/// Real numbers to u8: `sat(rint(real / scale) + zero_point)`.
+/// Converts real numbers to u8: `sat(rint(real / scale) + zero_point)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantiser {
-    /// Size of one step.
+    /// The size of one step.
     pub scale: f32,
-    /// The value that stands for 0.
+    /// The value that represents 0.
     pub zero_point: u8,
 }
 
-/// The sum with a skip: see the module's arithmetic.
+/// The factors of the sum with a skip. See the module's arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkipSum {
-    /// Steps of the rounded ReLU in steps of the sum; `None` where the ReLU is not rounded by itself.
+    /// The step of the rounded ReLU in steps of the sum, or `None` if the ReLU is not rounded separately.
     pub relu: Option<f32>,
-    /// Steps of the skip in steps of the sum.
+    /// The step of the skip in steps of the sum.
     pub skip: f32,
 }
 
-/// From a hidden layer's sums to the next layer's input.
+/// The conversion of a hidden layer's sums to the next layer's input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Requantise {
-    /// The sum with a skip, where there is one.
+    /// The sum with a skip, if there is one.
     pub skip: Option<SkipSum>,
-    /// The factor of a second rounding.
+    /// The factor of the second rounding, if there is one.
     pub rescale: Option<f32>,
 }
 
 /// One layer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Int8Layer {
-    /// Channels read, the concatenated ones of the last layer included.
+    /// The input channels, including the concatenated ones of the last layer.
     pub inputs: usize,
-    /// Filters.
+    /// The number of filters.
     pub outputs: usize,
-    /// The value that stands for 0 in the layer's input.
+    /// The value that represents 0 in the layer's input.
     pub zero_point: u8,
     /// `(outputs, inputs, 3, 3)`.
     pub kernel: Vec<i8>,
-    /// Without the zero point's share.
+    /// One bias per filter, without the zero point's share.
     pub bias: Vec<i32>,
-    /// One a filter.
+    /// One multiplier per filter.
     pub multiplier: Vec<f32>,
-    /// What follows a hidden layer; means nothing for the last.
+    /// The conversion after a hidden layer. Unused in the last layer.
     pub requantise: Requantise,
 }
 
 impl Int8Layer {
-    /// Of a last layer, what gives the outputs of one pixel of each place.
+    /// Returns the part of a last layer that computes the outputs of one pixel of each place.
     fn of_pixel(&self, pixel: usize) -> Int8Layer {
         let (weights, from) = (OUTPUTS * self.inputs * 9, pixel * OUTPUTS);
         Int8Layer {
@@ -84,23 +84,24 @@ impl Int8Layer {
     }
 }
 
-/// A layer as the kernels read it.
+/// A layer in the layout of the kernels.
 pub(crate) struct Packed {
-    /// Groups of four input channels.
+    /// The number of groups of four input channels.
     pub(crate) groups: usize,
     pub(crate) outputs: usize,
-    /// With the shares of the zero point and of the kernels' offset; one a filter, then zeros to a multiple of 32.
+    /// One bias per filter, including the shares of the zero point and of the kernels' offset, then zeros to a multiple
+    /// of 32.
     pub(crate) bias: Vec<i32>,
     pub(crate) multiplier: Vec<f32>,
     pub(crate) skip: Option<SkipSum>,
-    /// Added, saturating, to what a hidden layer yields; 0 where a second rounding follows.
+    /// The saturating addend of a hidden layer's output, or 0 if a second rounding follows.
     pub(crate) zero_point: u8,
-    /// In the order of the kernels' own `pack`.
+    /// The weights, in the order of the kernels' `pack`.
     pub(crate) weights: Vec<i32>,
 }
 
 impl Packed {
-    /// A layer for `kernels`; `next_zero` stands for 0 in what reads it.
+    /// Packs a layer for `kernels`. `next_zero` represents 0 in the input of the next layer.
     fn new(taps: &Taps<'_>, next_zero: u8, kernels: &Kernels) -> Packed {
         let layer = taps.layer;
         let of_filter = |(w, b): (&[i8], &i32)| {
@@ -128,15 +129,15 @@ impl Packed {
     }
 }
 
-/// A layer's weights by filter, group of channels and tap, for packing: channels that pad a group have weight 0.
+/// A layer's weights by filter, group of channels and tap, for packing. Channels that pad a group have weight 0.
 pub(crate) struct Taps<'a> {
     layer: &'a Int8Layer,
-    /// Channels before the concatenated ones.
+    /// The number of channels before the concatenated ones.
     features: usize,
 }
 
 impl Taps<'_> {
-    /// Four weights of `filter` (0 for filters that are padding) at row `ky` and column `kx`.
+    /// Returns four weights of `filter` (0 for padding filters) at row `ky` and column `kx`.
     pub(crate) fn group(&self, filter: usize, group: usize, ky: usize, kx: usize) -> [i8; GROUP] {
         let split = self.features.div_ceil(GROUP);
         std::array::from_fn(|k| {
@@ -161,8 +162,8 @@ impl Taps<'_> {
         self.layer.outputs
     }
 
-    /// Words of four weights in the order `[filters by `size`][ky][group][kx][filter]`, as dot-product kernels read
-    /// them.
+    /// Returns words of four weights in the order `[filters by `size`][ky][group][kx][filter]`, as the dot-product
+    /// kernels read them.
     pub(crate) fn dot_words(&self, sizes: &[usize]) -> Vec<i32> {
         let mut words = Vec::new();
         let mut first = 0;
@@ -181,7 +182,7 @@ impl Taps<'_> {
         words
     }
 
-    /// Each of [`Self::dot_words`] as two words of two 16-bit weights, of the even channels and of the odd ones.
+    /// Returns each of [`Self::dot_words`] as two words of two 16-bit weights: the even channels, then the odd ones.
     #[cfg(any(target_arch = "x86_64", target_arch = "wasm32"))]
     pub(crate) fn pair_words(&self, sizes: &[usize]) -> Vec<i32> {
         let pair = |low: i8, high: i8| i32::from(low) & 0xffff | i32::from(high) << 16;
@@ -195,24 +196,24 @@ impl Taps<'_> {
     }
 }
 
-/// An instruction set's kernels.
+/// The kernels of an instruction set.
 #[derive(Clone, Copy)]
 #[allow(clippy::type_complexity)]
 pub(crate) struct Kernels {
     pub(crate) pack: fn(&Taps<'_>) -> Vec<i32>,
-    /// Layer, three rows, the skip's row, the row of features to write.
+    /// Computes a row of a hidden layer: layer, three rows, the skip's row, the row of features to write.
     pub(crate) hidden_row: fn(&Packed, Window<'_, u8>, Option<&[u8]>, &mut [u8], Geometry),
-    /// Layer, three rows, the output planes' rows, the first pixel to yield.
+    /// Computes a row of the last layer: layer, three rows, the output planes' rows, the first pixel to compute.
     pub(crate) last_row: fn(&Packed, Window<'_, u8>, [&mut [f32]; OUTPUTS], usize, Geometry),
-    /// What these kernels take off the activations as they load them; the biases give it back.
+    /// The offset that these kernels subtract from the activations on loading. The biases compensate for it.
     pub(crate) offset: i32,
-    /// [`quantise_row`].
+    /// [`quantise_row`], compiled for the instruction set.
     pub(crate) quantise_row: fn(SourceRow<'_>, Rounding, &mut [u8], Geometry),
-    /// [`rescale_row`].
+    /// [`rescale_row`], compiled for the instruction set.
     pub(crate) rescale_row: fn(&mut [u8], f32, u8, Geometry),
 }
 
-/// How the network's input becomes u8: `channels` of it, rounded to `to`, after a rounding to `before` if there is one.
+/// The conversion of `channels` input channels to u8, rounded to `to`, after a rounding to `before` if there is one.
 #[derive(Clone, Copy)]
 pub(crate) struct Rounding {
     channels: usize,
@@ -239,32 +240,32 @@ fn kernels(isa: Isa) -> Option<Kernels> {
     }
 }
 
-/// A quantised chain packed for one instruction set. Immutable; threads share it.
+/// A quantised chain packed for one instruction set. It is immutable and threads can share it.
 pub struct Int8Chain {
     isa: Isa,
     kernels: Kernels,
     inputs: usize,
     input: Quantiser,
     concatenated: Quantiser,
-    /// Whether the concatenated input is rounded as `input` before.
+    /// Whether the concatenated input is first rounded by `input`.
     rounded_twice: bool,
-    /// Pixels along each side of a place.
+    /// The pixels along each side of a place.
     side: usize,
-    /// All but the last.
+    /// All layers but the last.
     layers: Vec<Packed>,
-    /// The last one, of each pixel of a place.
+    /// The last layer for each pixel of a place.
     last: Vec<Packed>,
     rescale: Option<f32>,
     zero_points: Vec<u8>,
 }
 
 impl Int8Chain {
-    /// Packs a chain. `input` rounds the network's input for the first layer; for the last it is rounded by
-    /// `concatenated`, after a first rounding by `input` if `rounded_twice`.
+    /// Packs a chain. `input` rounds the network's input for the first layer. For the last layer `concatenated` rounds
+    /// it, after a first rounding by `input` if `rounded_twice`.
     ///
     /// # Errors
-    /// What the kernels cannot run: shapes that are no chain, filters not in eights, factors out of range, or an
-    /// instruction set that this processor lacks.
+    /// Returns an error if the kernels cannot run the chain: the shapes form no chain, the filters are not in eights, a
+    /// factor is out of range, or this processor lacks the instruction set.
     pub fn new(
         layers: &[Int8Layer],
         input: Quantiser,
@@ -331,25 +332,25 @@ impl Int8Chain {
         })
     }
 
-    /// The kernels in use.
+    /// Returns the instruction set in use.
     pub fn isa(&self) -> Isa {
         self.isa
     }
 
-    /// How many layers.
+    /// Returns the number of layers.
     pub fn layers(&self) -> usize {
         self.layers.len() + 1
     }
 
-    /// The tiling that suits a frame size and the current rayon pool.
+    /// Returns the tiling for a frame size and the current rayon pool.
     pub fn tiling(&self, height: usize, width: usize) -> Tiling {
         wavefront::tiling_for(self, height, width)
     }
 
-    /// Runs the chain on the current rayon pool: `input` planar `(C, H, W)`, `output` `(6, H, W)`.
+    /// Runs the chain on the current rayon pool. `input` is planar `(C, H, W)` and `output` is `(6, H, W)`.
     ///
     /// # Panics
-    /// If a length does not fit the size.
+    /// Panics if a length does not match the size.
     pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<u8>) {
         let area = size.0 * size.1;
         let inputs = self.inputs / (self.side * self.side);
@@ -361,11 +362,11 @@ impl Int8Chain {
         self.run_rows(&rows, planes, size, tiling, scratch);
     }
 
-    /// The same with input and output that need not be planes in memory: `rows` are read, and written to `planes`,
-    /// each (H, W).
+    /// Runs the chain with input and output that need not be planes in memory: reads the input from `rows` and writes
+    /// the output through them to `planes`, each (H, W).
     ///
     /// # Panics
-    /// If a length does not fit the size, and where `rows` do.
+    /// Panics if a length does not match the size, or if `rows` panics.
     pub fn run_rows<R: Rows<PLANES>, const PLANES: usize>(
         &self,
         rows: &R,
@@ -378,7 +379,7 @@ impl Int8Chain {
     }
 }
 
-/// Sums must fit 32 bits, and their products with the factors stay where conversions are exact.
+/// Checks that sums fit 32 bits and that their products with the factors can be converted exactly.
 fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
     let (outputs, per_filter) = (layer.outputs, layer.inputs * 9);
     if layer.kernel.len() != outputs * per_filter || layer.bias.len() != outputs || layer.multiplier.len() != outputs {
@@ -416,7 +417,7 @@ fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
 impl Chain for Int8Chain {
     type Element = u8;
     const GROUP: usize = GROUP;
-    // A byte is worked on as long as four of f32, so rings may outgrow the cache: narrower strips only cost their
+    // Each byte takes as long to process as four bytes of f32, so rings may exceed the cache: narrower strips only add
     // edges, 4 % at 30 layers.
     const CACHE: usize = 1 << 21;
 
@@ -480,7 +481,8 @@ impl Chain for Int8Chain {
     }
 }
 
-/// `x` rounded half to even as an integer in the low bits: adding 1.5·2²³ leaves no room for a fraction. For |x| < 2²².
+/// Returns `x` rounded half to even, as an integer in the low bits: adding 1.5·2²³ leaves no fraction bits. For |x| <
+/// 2²².
 #[inline(always)]
 fn rint_bits(x: f32) -> u32 {
     (x + 12_582_912.0).to_bits()
@@ -500,8 +502,8 @@ impl Quantiser {
     }
 }
 
-/// Writes planes of a source row as groups of four; channels that pad a group get 0, and have weight 0. Inlined into
-/// each instruction set's own copy.
+/// Writes planes of a source row as groups of four. Channels that pad a group get 0 and have weight 0. Inlined into the
+/// copy of each instruction set.
 #[inline(always)]
 pub(crate) fn quantise_row(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
     let Rounding { channels, before, to } = rounding;
@@ -544,7 +546,7 @@ fn quantise_by(
     }
 }
 
-/// The second rounding of a row of features. Inlined into each instruction set's own copy.
+/// Applies the second rounding to a row of features. Inlined into the copy of each instruction set.
 #[inline(always)]
 pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
     for group in row.chunks_exact_mut(geometry.stride()) {

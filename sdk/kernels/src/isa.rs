@@ -1,31 +1,31 @@
-//! The instruction sets that kernels exist for, and which of them this processor has.
+//! The instruction sets that have kernels, and their detection on this processor.
 
-/// An instruction set with kernels of its own.
+/// An instruction set with its own kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Isa {
-    /// Plain Rust; runs everywhere.
+    /// Plain Rust, for every processor.
     Portable,
     /// x86-64 AVX2 with FMA.
     Avx2,
-    /// x86-64 AVX-512 (F, BW); f32 only.
+    /// x86-64 AVX-512 (F, BW), for f32 only.
     Avx512,
-    /// x86-64 AVX-512 with VNNI; int8 only.
+    /// x86-64 AVX-512 with VNNI, for int8 only.
     Avx512Vnni,
-    /// x86-64 AMX tiles with int8, beside AVX-512; int8 only.
+    /// x86-64 AMX tiles with int8, in addition to AVX-512, for int8 only.
     Amx,
-    /// ARM64 NEON; f32 only.
+    /// ARM64 NEON, for f32 only.
     Neon,
-    /// ARM64 NEON with signed dot products; int8 only.
+    /// ARM64 NEON with signed dot products, for int8 only.
     NeonDotprod,
-    /// ARM64 NEON with mixed-sign dot products (i8mm); int8 only.
+    /// ARM64 NEON with mixed-sign dot products (i8mm), for int8 only.
     NeonI8mm,
-    /// WebAssembly's 128-bit vectors.
+    /// WebAssembly 128-bit vectors.
     Simd128,
 }
 
 impl Isa {
-    /// A short name for reports.
+    /// Returns a short name for reports.
     pub fn name(self) -> &'static str {
         match self {
             Isa::Portable => "portable",
@@ -40,7 +40,7 @@ impl Isa {
         }
     }
 
-    /// The int8 kernels that this processor runs, fastest first; the last is always [`Isa::Portable`].
+    /// Returns the int8 kernels that this processor runs, fastest first. The last is always [`Isa::Portable`].
     pub fn int8() -> Vec<Isa> {
         let mut found = Vec::new();
         #[cfg(target_arch = "x86_64")]
@@ -73,8 +73,8 @@ impl Isa {
         found
     }
 
-    /// The int8 kernels that are fastest here for hidden layers of `filters` filters: a tile of AMX that is half empty
-    /// loses to VNNI.
+    /// Returns the fastest int8 kernels here for hidden layers of `filters` filters. A half-empty AMX tile is slower
+    /// than VNNI.
     pub fn int8_for(filters: usize) -> Isa {
         let found = Isa::int8();
         match (found[0], found.get(1)) {
@@ -83,7 +83,7 @@ impl Isa {
         }
     }
 
-    /// The f32 kernels that this processor runs, fastest first; the last is always [`Isa::Portable`].
+    /// Returns the f32 kernels that this processor runs, fastest first. The last is always [`Isa::Portable`].
     pub fn f32() -> Vec<Isa> {
         let mut found = Vec::new();
         #[cfg(target_arch = "x86_64")]

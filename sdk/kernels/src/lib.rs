@@ -1,20 +1,21 @@
 //! Fused chains of 3×3 convolutions: the inner loops of Phasefront's hologram networks.
 //!
-//! A chain runs depth first. A frame is cut into bands of rows, each a task for the current rayon pool; in a band,
-//! rows flow through all layers at once, three rows of each layer's input being kept ([`wavefront`](self)). So the
-//! working memory is small and independent of the frame's height, and a result does not depend on how a frame was cut.
+//! A chain runs depth first. A frame is cut into bands of rows, and each band is a task of the current rayon pool.
+//! Within a band, rows flow through all layers at once, and three rows of each layer's input are kept
+//! ([`wavefront`](self)). The working memory is therefore small and independent of the frame's height, and the result
+//! does not depend on how the frame is cut.
 //!
-//! `int8` defines the quantised chain's arithmetic so that every instruction set gives the same bits; `f32`
-//! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
-//! against. `unsafe` lives in those files, and in two that serve the optics: [`wide!`] runs plain loops in the widest
-//! vectors, [`each_tile_rows`] lets threads fill a plane whose tiles lie column by column.
+//! `int8` defines the arithmetic of the quantised chain so that every instruction set gives the same bits; `f32` chains
+//! agree to rounding. Each instruction set is one file. The others are tested against `portable`, which is plain Rust.
+//! `unsafe` is confined to those files and two that serve the optics: [`wide!`] runs plain loops in the widest vectors,
+//! and [`each_tile_rows`] lets threads fill a plane whose tiles are stored column by column.
 //!
-//! [`fir`] is apart from them: the filter that carries a wave from plane to plane.
+//! [`fir`] is separate: it is the filter that propagates a wave from plane to plane.
 //!
-//! A chain may run at half the resolution: then its last layer has an output for each of a square's four pixels
+//! A chain may run at half the resolution. Its last layer then has an output for each of a square's four pixels
 //! (`places`).
 //!
-//! Nothing here knows ONNX, tract or optics.
+//! This crate does not depend on ONNX, tract or optics.
 
 mod f32;
 pub mod fir;
@@ -47,10 +48,10 @@ pub use tiles::{TILE, TILE_VALUES, TileRows, each_tile_rows};
 pub use wavefront::{Scratch, Tiling};
 pub use wide::{has_avx2, has_avx512, in_avx2, in_avx512};
 
-/// Planes of a hologram network's output: two a colour.
+/// The number of planes of a hologram network's output: two per colour.
 pub const OUTPUTS: usize = 6;
 
-/// Checks a chain's shapes, `(inputs, outputs)` of each layer, and gives the side of its places: 2 where the last layer
+/// Checks a chain's shapes, `(inputs, outputs)` of each layer, and returns the side of its places: 2 if the last layer
 /// has outputs for the four pixels of a square, else 1.
 fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Result<usize, String> {
     let count = layers.len();

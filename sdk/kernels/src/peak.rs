@@ -1,5 +1,5 @@
-//! The multiply-accumulates that an instruction set does here at its best: registers alone, no memory. A kernel is
-//! measured against this, in the same run, on the same threads.
+//! Measures the peak multiply-accumulate rate of an instruction set, on registers only. Benchmarks compare kernels with
+//! it in the same run on the same threads.
 #![allow(unsafe_code)]
 
 use crate::Isa;
@@ -11,13 +11,14 @@ use std::arch::x86_64::*;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// Rounds between looks at the clock.
+/// The number of rounds between two readings of the clock.
 const ROUNDS: u64 = 10_000;
 
-/// Runs rounds of multiply-accumulates in registers and yields how many it did.
+/// A function that runs rounds of multiply-accumulates in registers and returns their number.
 type Burn = fn(u64) -> u64;
 
-/// A [`Burn`] of `$sums` registers, all `$zero` at first, by `$features`: `$step` does `$lanes` multiply-accumulates.
+/// Defines a [`Burn`] with `$sums` registers, initially `$zero`, and `$features`. Each `$step` does `$lanes`
+/// multiply-accumulates.
 macro_rules! burn {
     ($name:ident, $features:literal, $register:ident $text:literal, $sums:literal x $lanes:literal, $zero:expr,
         |$sum:ident, $x:ident| $step:expr) => {
@@ -31,14 +32,15 @@ macro_rules! burn {
                         let $sum = *sum;
                         *sum = $step;
                     }
-                    // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+                    // SAFETY: the assembly is empty. It hides a register's value from the compiler, so that the rounds
+                    // are not folded.
                     unsafe {
                         asm!($text, inout($register) sums[0], options(nomem, nostack, preserves_flags));
                     }
                 }
                 black_box(sums);
             }
-            // SAFETY: the caller has found the features.
+            // SAFETY: the caller has detected the features.
             unsafe { run(rounds) };
             rounds * $sums * $lanes
         }
@@ -67,7 +69,7 @@ burn!(neon_i8mm, "neon,i8mm", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
 #[cfg(target_arch = "x86_64")]
 fn amx(rounds: u64) -> u64 {
     use crate::x86::amx::{CONFIG, TILE};
-    // SAFETY: the caller has found AMX; tiles are this thread's own until they are released.
+    // SAFETY: the caller has detected AMX. The tiles belong to this thread until they are released.
     unsafe {
         asm!("ldtilecfg [{}]", "tilezero tmm0", "tilezero tmm1", "tilezero tmm4", "tilezero tmm6", "tilezero tmm7",
             in(reg) &raw const CONFIG, options(nostack, readonly));
@@ -83,8 +85,8 @@ fn amx(rounds: u64) -> u64 {
     rounds * 2 * (TILE * TILE * TILE * crate::int8::GROUP) as u64
 }
 
-/// Multiply-accumulates a second of all threads of the current rayon pool together, with the int8 instructions of
-/// `isa`; `None` where this processor lacks them, for plain Rust, and on WebAssembly.
+/// Returns the multiply-accumulates per second of all threads of the current rayon pool together, with the int8
+/// instructions of `isa`. Returns `None` if this processor lacks them, for plain Rust, and on WebAssembly.
 pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
     let burn: Burn = match isa {
         #[cfg(target_arch = "x86_64")]
@@ -102,7 +104,7 @@ pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
     Isa::int8().contains(&isa).then(|| rate(burn, duration))
 }
 
-/// The same with the f32 instructions of `isa`.
+/// Returns the multiply-accumulates per second with the f32 instructions of `isa`, as [`int8_peak`] does.
 pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
     let burn: Burn = match isa {
         #[cfg(target_arch = "x86_64")]
@@ -116,8 +118,8 @@ pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
     Isa::f32().contains(&isa).then(|| rate(burn, duration))
 }
 
-/// The sum of the threads' median rates: like the frames beside it, neither a round that the system interrupted nor the
-/// clock's best moment.
+/// Returns the sum of the threads' median rates. The median ignores interrupted rounds and the highest clock rates, as
+/// the median of frame times does.
 fn rate(burn: Burn, duration: Duration) -> f64 {
     let rates = rayon::broadcast(|_| {
         let start = Instant::now();

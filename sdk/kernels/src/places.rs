@@ -1,9 +1,8 @@
-//! A chain's places: the pixels of a frame, or squares of two by two of them where the chain runs at half the
+//! A chain's places: the pixels of a frame, or its squares of two by two pixels if the chain runs at half the
 //! resolution.
 //!
-//! A square's pixels are channels of its place, those of the upper left first, then upper right, lower left, lower
-//! right; so are the outputs (SpaceToDepth and DepthToSpace of ONNX). Where a side is odd, its last row or column is
-//! repeated.
+//! A square's pixels are channels of its place in the order upper left, upper right, lower left, lower right. The same
+//! holds for the outputs (SpaceToDepth and DepthToSpace of ONNX). If a side is odd, its last row or column is repeated.
 
 use crate::OUTPUTS;
 use crate::rows::{Band, Rows, grown};
@@ -11,19 +10,19 @@ use crate::rows::{Band, Rows, grown};
 /// The places of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Places {
-    /// Pixels along each side of a place, 1 or 2.
+    /// The pixels along each side of a place, 1 or 2.
     pub(crate) side: usize,
     /// The frame's height and width in pixels.
     pub(crate) frame: (usize, usize),
 }
 
 impl Places {
-    /// Rows and columns of places.
+    /// Returns the rows and columns of places.
     pub(crate) fn size(&self) -> (usize, usize) {
         (self.frame.0.div_ceil(self.side), self.frame.1.div_ceil(self.side))
     }
 
-    /// The first pixel's column and how many pixels `count` places from `from` on have in a row.
+    /// Returns the first column and the number of pixels in a row of `count` places from place `from` on.
     fn columns(&self, from: usize, count: usize) -> (usize, usize) {
         let left = self.side * from;
         (left, (self.side * count).min(self.frame.1 - left))
@@ -60,7 +59,7 @@ impl Places {
         }
     }
 
-    /// Hands `values`, a run of `count` places for each of the chain's outputs, to `rows`.
+    /// Passes `values`, a run of `count` places for each of the chain's outputs, to `rows`.
     pub(crate) fn write<R: Rows<PLANES>, const PLANES: usize>(
         &self,
         rows: &R,
@@ -95,7 +94,7 @@ impl Places {
     }
 }
 
-/// The runs of `count` values of each output.
+/// Returns the runs of `count` values of each output.
 pub(crate) fn runs(values: &mut [f32], count: usize) -> [&mut [f32]; OUTPUTS] {
     let mut runs = values.chunks_exact_mut(count);
     std::array::from_fn(|_| runs.next().unwrap_or_default())

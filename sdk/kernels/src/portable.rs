@@ -13,12 +13,12 @@ pub(crate) const INT8: Kernels = Kernels {
     rescale_row,
 };
 
-/// `[filter][ky][group][kx]`, words of four weights.
+/// Packs words of four weights as `[filter][ky][group][kx]`.
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.dot_words(&vec![1; taps.outputs()])
 }
 
-/// The sum of `filter` at pixel `x`, its bias included.
+/// Returns the sum of `filter` at pixel `x`, including its bias.
 fn sum(layer: &Packed, rows: &[&[u8]; 3], filter: usize, x: usize, geometry: Geometry) -> i32 {
     let per_row = layer.groups * 3;
     let weights = &layer.weights[filter * 3 * per_row..][..3 * per_row];
@@ -73,7 +73,7 @@ pub(crate) const F32: f32::Kernels = f32::Kernels {
     last_row: f32_last_row,
 };
 
-/// The sums of `filter` along a row, bias included.
+/// Computes the sums of `filter` along a row, including the bias.
 fn f32_sums(layer: &f32::Packed, rows: &[&[f32]; 3], filter: usize, sums: &mut [f32], from: usize, geometry: Geometry) {
     sums.fill(layer.bias[filter]);
     let per_row = layer.inputs * 3;

@@ -1,17 +1,17 @@
-//! A plane cut into square tiles that threads fill a row of tiles at a time, while the tiles lie in memory column by
-//! column: so that a transform of columns after one of rows reads and writes whole pieces of memory, in one buffer.
+//! A plane of square tiles. Threads fill it one row of tiles at a time, while the tiles are stored column by column. A
+//! transform of columns after one of rows thus accesses contiguous memory in a single buffer.
 #![allow(unsafe_code)]
 
 use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Side of a tile.
+/// The side of a tile.
 pub const TILE: usize = 16;
-/// Values of a tile.
+/// The number of values of a tile.
 pub const TILE_VALUES: usize = TILE * TILE;
 
-/// Some rows of tiles of a plane: no one else has these.
+/// Exclusive access to some rows of tiles of a plane.
 pub struct TileRows<'a, T> {
     first: *mut T,
     rows: usize,
@@ -21,29 +21,30 @@ pub struct TileRows<'a, T> {
 }
 
 impl<T> TileRows<'_, T> {
-    /// Which rows of tiles these are.
+    /// Returns the range of these rows of tiles.
     pub fn rows(&self) -> Range<usize> {
         self.own.clone()
     }
 
-    /// The tile in `column` and `row`.
+    /// Returns the tile in `column` and `row`.
     ///
     /// # Panics
-    /// For a row or column that is not among these.
+    /// Panics if the row or the column is not in this part.
     pub fn tile(&mut self, row: usize, column: usize) -> &mut [T] {
         assert!(self.own.contains(&row) && column < self.columns);
         let at = (column * self.rows + row) * TILE_VALUES;
-        // SAFETY: the plane has columns · rows tiles, so these values lie in it; the row is of this part alone, and
+        // SAFETY: the plane has columns · rows tiles, so these values are inside it. Only this part has the row, and
         // `self` is borrowed as long as the tile.
         unsafe { std::slice::from_raw_parts_mut(self.first.add(at), TILE_VALUES) }
     }
 }
 
-/// Hands all rows of tiles of `plane` to `then`, in as many parts as `work` has pieces of `piece` values, each with
-/// one of them. Tiles lie column by column: the tile in row `r` and column `c` at c·rows + r.
+/// Divides the rows of tiles of `plane` into as many parts as `work` has pieces of `piece` values, and calls `then`
+/// with each part and its piece. Tiles are stored column by column: the tile in row `r` and column `c` is at c·rows +
+/// r.
 ///
 /// # Panics
-/// If `plane` has not rows·columns tiles.
+/// Panics if `plane` does not have rows·columns tiles.
 pub fn each_tile_rows<T: Send, W: Send>(
     plane: &mut [T],
     (rows, columns): (usize, usize),
@@ -52,9 +53,9 @@ pub fn each_tile_rows<T: Send, W: Send>(
     then: impl Fn(TileRows<'_, T>, &mut [W]) + Sync,
 ) {
     assert_eq!(plane.len(), rows * columns * TILE_VALUES, "tiles");
-    /// The plane's start, for threads that take different tiles.
+    /// The plane's start, for threads that access different tiles.
     struct Start<T>(*mut T);
-    // SAFETY: each part makes references to its own rows of tiles alone, and T may be sent.
+    // SAFETY: each part creates references only to its own rows of tiles, and T is `Send`.
     unsafe impl<T: Send> Sync for Start<T> {}
     let start = Start(plane.as_mut_ptr());
     let start = &start;

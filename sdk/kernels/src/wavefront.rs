@@ -1,37 +1,38 @@
-//! The schedule: bands of rows in parallel, and in a band every layer one row behind the one before it.
+//! The schedule: bands run in parallel, and within a band every layer runs one row behind the previous one.
 //!
-//! `x[i]` is layer `i`'s input. While row `r + 1` of `x[i]` is written, row `r` of `x[i+1]` can be: it needs rows
-//! `r−1 … r+1` of `x[i]`, and row `r` of `x[i−1]` for a skip. Three rows of each `x[i]` are therefore enough, in a
-//! ring. A row lies in memory group by group (see [`Geometry`]) with [`MARGIN`] pixels before and after, which hold the
+//! `x[i]` is layer `i`'s input. When row `r + 1` of `x[i]` is written, row `r` of `x[i+1]` can be computed: it needs
+//! rows `r−1 … r+1` of `x[i]`, and row `r` of `x[i−1]` for a skip. A ring of three rows of each `x[i]` is therefore
+//! enough. A row is stored group by group (see [`Geometry`]) with [`MARGIN`] pixels before and after it, which hold the
 //! padding value at the frame's edges.
 //!
-//! At a band's inner edges the rows beyond are computed again, one more for each layer yet to come, so that a result
-//! is the same to the bit however the frame was cut. The same holds for columns where a band is cut into strips.
+//! At a band's inner edges the rows beyond are computed again, one more for each remaining layer, so that the result is
+//! bit-identical however the frame is cut. The same holds for columns if a band is cut into strips.
 
 use crate::OUTPUTS;
 use crate::places::{Places, runs};
 use crate::rows::{Band, Rows, grown};
 use std::sync::{Mutex, PoisonError};
 
-/// Pixels before a row's first and after its last one; kernels may read one and write up to this many past the end.
+/// The pixels before a row's first and after its last pixel. Kernels may read one and write up to this many past the
+/// end.
 pub(crate) const MARGIN: usize = 16;
-/// Rows are as long as a multiple of this many pixels, so that kernels write whole blocks.
+/// The divisor of the length of rows in pixels, so that kernels write whole blocks.
 pub(crate) const BLOCK: usize = 64;
-/// Rows kept of each layer's input.
+/// The number of rows kept of each layer's input.
 const RING: usize = 3;
 
-/// How a frame is cut. The result does not depend on it. Rows and columns are those of the chain's places: pixels, or
-/// squares of two by two where it runs at half the resolution.
+/// The division of a frame into bands and strips. The result does not depend on it. Rows and columns are those of the
+/// chain's places: pixels, or squares of two by two at half the resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tiling {
-    /// Rows of a band; a band is one task.
+    /// The rows of a band. A band is one task.
     pub band_rows: usize,
-    /// Columns of a strip within a band.
+    /// The columns of a strip within a band.
     pub strip_columns: usize,
 }
 
-/// A tiling for `chain` on the current pool: up to three bands a thread, so that a slower core gets fewer of them, as
-/// long as a sixteenth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
+/// Returns a tiling for `chain` on the current pool: up to three bands per thread, so that a slower core gets fewer of
+/// them, if at most a sixteenth is computed twice; and strips whose rings fit in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let places = Places {
         side: chain.side(),
@@ -58,12 +59,13 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
     }
 }
 
-/// Whether `x[i]` is a sum with `x[i−2]`.
+/// Checks whether `x[i]` is a sum with `x[i−2]`.
 pub(crate) fn has_skip(i: usize) -> bool {
     i >= 3 && i % 2 == 1
 }
 
-/// Runs `block` on the whole blocks of a row that hold pixels `from..`, and copies those into the output's rows.
+/// Runs `block` on the whole blocks of a row that contain pixels `from..`, and copies those pixels to the output's
+/// rows.
 pub(crate) fn last_row_by_blocks(
     mut out: [&mut [f32]; OUTPUTS],
     from: usize,
@@ -80,14 +82,14 @@ pub(crate) fn last_row_by_blocks(
     }
 }
 
-/// Where a row's pixels lie: `groups` runs of `stride` elements, each of [`MARGIN`] pixels, the row, and the margin.
+/// The layout of a row: `groups` runs of `stride` elements, each of [`MARGIN`] pixels, the row, and the margin.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Geometry {
-    /// Elements of one pixel in a group: 4 for the int8 chain, 1 for f32.
+    /// The elements of one pixel in a group: 4 for the int8 chain, 1 for f32.
     pub(crate) group: usize,
-    /// Pixels of a row, its whole blocks.
+    /// The pixels of a row in whole blocks.
     pub(crate) padded: usize,
-    /// Pixels of a row that mean something.
+    /// The pixels of a row that belong to the strip.
     pub(crate) width: usize,
 }
 
@@ -100,40 +102,40 @@ impl Geometry {
         }
     }
 
-    /// Elements from one group of a row to the next.
+    /// Returns the number of elements from one group of a row to the next.
     pub(crate) fn stride(&self) -> usize {
         (self.padded + 2 * MARGIN) * self.group
     }
 
-    /// Element of a row's group where pixel 0 lies.
+    /// Returns the element of pixel 0 in a row's group.
     pub(crate) fn start(&self) -> usize {
         MARGIN * self.group
     }
 }
 
-/// What a chain is to the schedule. Rows are slices of `groups(i) · geometry.stride()` elements.
+/// A chain that the schedule can run. Rows are slices of `groups(i) · geometry.stride()` elements.
 pub(crate) trait Chain: Sync {
     /// An element of a row.
     type Element: Copy + Default + Send + Sync;
-    /// Channels in a group: elements of one pixel that lie together.
+    /// The channels of a group: the adjacent elements of one pixel.
     const GROUP: usize;
-    /// Bytes that the rings of a strip may take.
+    /// The bytes that the rings of a strip may occupy.
     const CACHE: usize;
 
     fn layers(&self) -> usize;
-    /// Pixels along each side of a place: 1, or 2 at half the resolution.
+    /// Returns the pixels along each side of a place: 1, or 2 at half the resolution.
     fn side(&self) -> usize;
-    /// Channels of a place of the network's input.
+    /// Returns the channels of a place of the network's input.
     fn inputs(&self) -> usize;
-    /// Groups of `x[i]`, the concatenated network input of the last layer included.
+    /// Returns the groups of `x[i]`, including the concatenated network input of the last layer.
     fn groups(&self, i: usize) -> usize;
-    /// The element that stands for 0 in `x[i]`.
+    /// Returns the element that represents 0 in `x[i]`.
     fn zero(&self, i: usize) -> Self::Element;
     /// Writes a row of `x[0]` from the network input's planes.
     fn input_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
-    /// Writes the concatenated part of a row of `x[last]`; `out` is the whole row.
+    /// Writes the concatenated part of a row of `x[last]`. `out` is the whole row.
     fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
-    /// Runs layer `i` on three rows of `x[i]` and writes the features of a row of `x[i+1]`; `skip` is the row of
+    /// Runs layer `i` on three rows of `x[i]` and writes the features of a row of `x[i+1]`. `skip` is the row of
     /// `x[i−1]`.
     fn hidden_row(
         &self,
@@ -143,8 +145,8 @@ pub(crate) trait Chain: Sync {
         out: &mut [Self::Element],
         geometry: Geometry,
     );
-    /// Runs the last layer for one pixel of each place (see [`crate::places`]): places `from..from + out[c].len()` of
-    /// the row, into the output planes' rows.
+    /// Runs the last layer for one pixel of each place (see [`crate::places`]) and writes places `from..from +
+    /// out[c].len()` of the row to the output planes' rows.
     fn last_row(
         &self,
         pixel: usize,
@@ -155,8 +157,8 @@ pub(crate) trait Chain: Sync {
     );
 }
 
-/// Three rows of a layer's input, adjacent in memory but turned: the row above lies in slot `first`, the next ones
-/// in the slots after it, modulo 3.
+/// Three rows of a layer's input, adjacent in memory but rotated: the row above is in slot `first` and the next rows in
+/// the following slots, modulo 3.
 #[derive(Clone, Copy)]
 pub(crate) struct Window<'a, E> {
     pub(crate) slots: &'a [E],
@@ -164,7 +166,7 @@ pub(crate) struct Window<'a, E> {
 }
 
 impl<'a, E> Window<'a, E> {
-    /// The rows from above to below.
+    /// Returns the rows from top to bottom.
     pub(crate) fn rows(&self) -> [&'a [E]; RING] {
         let length = self.slots.len() / RING;
         std::array::from_fn(|k| &self.slots[(self.first + k) % RING * length..][..length])
@@ -175,18 +177,18 @@ impl<'a, E> Window<'a, E> {
 #[derive(Clone, Copy)]
 pub(crate) struct SourceRow<'a> {
     pub(crate) planes: &'a [f32],
-    /// Elements from one plane to the next.
+    /// The number of elements from one plane to the next.
     pub(crate) plane: usize,
 }
 
 impl<'a> SourceRow<'a> {
-    /// `count` pixels of channel `c`.
+    /// Returns `count` pixels of channel `c`.
     pub(crate) fn channel(&self, c: usize, count: usize) -> &'a [f32] {
         &self.planes[c * self.plane..][..count]
     }
 }
 
-/// The plain case: planes in, planes out.
+/// Planar input and output in memory.
 pub(crate) struct Planar<'a> {
     pub(crate) input: &'a [f32],
     pub(crate) size: (usize, usize),
@@ -212,7 +214,7 @@ impl Rows<OUTPUTS> for Planar<'_> {
     }
 }
 
-/// Working memory for as many bands as run at once; grows in the first frame and is kept.
+/// Working memory for all bands that run at once. It grows in the first frame and is then kept.
 #[derive(Debug)]
 pub struct Scratch<E> {
     free: Mutex<Vec<Memory<E>>>,
@@ -227,7 +229,7 @@ impl<E> Default for Scratch<E> {
 }
 
 impl<E> Scratch<E> {
-    /// Bytes held between frames.
+    /// Returns the bytes held between frames.
     pub fn bytes(&self) -> usize {
         let free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
         free.iter()
@@ -240,16 +242,16 @@ impl<E> Scratch<E> {
     }
 }
 
-/// What one band works in.
+/// The working memory of one band.
 #[derive(Debug)]
 struct Memory<E> {
-    /// One a layer.
+    /// One ring per layer.
     rings: Vec<Ring<E>>,
     /// A row of the network's input.
     input: Vec<f32>,
-    /// A row of its output.
+    /// A row of the network's output.
     output: Vec<f32>,
-    /// A frame's row of either, on its way to or from places.
+    /// A row of input or output pixels, before or after the conversion to places.
     pixels: Vec<f32>,
 }
 
@@ -264,11 +266,11 @@ impl<E> Default for Memory<E> {
     }
 }
 
-/// The last three rows of one layer's input: row `r` in slot `r mod 3`.
+/// The last three rows of one layer's input, with row `r` in slot `r mod 3`.
 #[derive(Debug, Default)]
 struct Ring<E> {
     memory: Vec<E>,
-    /// Where the first slot starts: at a cache line, which kernels are faster on.
+    /// The start of the first slot, aligned to a cache line for speed.
     start: usize,
     row: usize,
 }
@@ -297,7 +299,7 @@ impl<E: Copy + Default> Ring<E> {
         &mut self.memory[self.start + Self::slot(row) * self.row..][..self.row]
     }
 
-    /// The rows around `row`.
+    /// Returns the rows around `row`.
     fn window(&self, row: isize) -> Window<'_, E> {
         Window {
             slots: &self.memory[self.start..][..RING * self.row],
@@ -306,7 +308,7 @@ impl<E: Copy + Default> Ring<E> {
     }
 }
 
-/// Runs `chain` on a frame: its input from `rows`, its output through them into `planes`, each (H, W).
+/// Runs `chain` on a frame, reading input from `rows` and writing output through them to `planes`, each (H, W).
 pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
     chain: &C,
     rows: &R,
@@ -346,7 +348,7 @@ struct Frame<'a, C: Chain, R> {
     chain: &'a C,
     rows: &'a R,
     places: Places,
-    /// Rows and columns of places.
+    /// The number of rows of places.
     height: usize,
     width: usize,
     tiling: Tiling,
@@ -354,7 +356,7 @@ struct Frame<'a, C: Chain, R> {
 }
 
 impl<C: Chain, R> Frame<'_, C, R> {
-    /// Runs bands `from..to`, which `band` holds, dividing them among the pool's threads.
+    /// Runs bands `from..to`, which `band` contains, and divides them among the pool's threads.
     fn bands<const PLANES: usize>(&self, from: usize, to: usize, band: Band<'_, R::Value, PLANES>)
     where
         R: Rows<PLANES>,
@@ -405,7 +407,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
     {
         let chain = self.chain;
         let layers = chain.layers();
-        // The strip with the halo that its last layer reaches, one pixel a layer, within the frame.
+        // The strip with the halo that its last layer needs, one pixel per layer, within the frame.
         let start = left.saturating_sub(layers);
         let end = (right + layers).min(self.width);
         let geometry = Geometry::new(C::GROUP, end - start);
@@ -455,7 +457,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
                 if i == layers - 1 {
                     chain.concatenated_row(source, out, geometry);
                 }
-                // The next layer reads one pixel past the row: at the frame's edge that is padding.
+                // The next layer reads one pixel past the row, which is padding at the frame's edge.
                 let past = geometry.start() + geometry.width * geometry.group;
                 for group in out.chunks_exact_mut(geometry.stride()) {
                     group[past..past + geometry.group].fill(chain.zero(i));

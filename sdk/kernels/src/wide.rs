@@ -1,12 +1,12 @@
-//! Plain loops in the widest vectors that the processor has.
+//! Runs plain loops in the widest vectors of the processor.
 #![allow(unsafe_code)]
 
-/// Computes an expression, compiled once for each instruction set with wider vectors than the target is known to have:
-/// what is inlined into it is vectorised so. Sums and products keep their order and are not fused: the bits are the
-/// same.
+/// Computes an expression, compiled once for each instruction set with wider vectors than the target guarantees. Code
+/// that is inlined into it is vectorised accordingly. Sums and products keep their order and are not fused, so the
+/// result is bit-identical.
 ///
-/// A macro, so that each instruction set has a copy of its own: one closure that several call would be compiled once,
-/// for none of them. So whatever the expression calls must be inlined too.
+/// It is a macro, so that each instruction set gets its own copy: a closure with several callers would be compiled
+/// once, for none of them. Everything that the expression calls must therefore be inlined too.
 #[macro_export]
 macro_rules! wide {
     ($work:expr) => {
@@ -20,7 +20,7 @@ macro_rules! wide {
     };
 }
 
-/// Whether [`in_avx512`] can be called.
+/// Checks whether [`in_avx512`] can be called.
 #[inline]
 pub fn has_avx512() -> bool {
     #[cfg(target_arch = "x86_64")]
@@ -32,7 +32,7 @@ pub fn has_avx512() -> bool {
     false
 }
 
-/// Whether [`in_avx2`] can be called.
+/// Checks whether [`in_avx2`] can be called.
 #[inline]
 pub fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
@@ -41,10 +41,10 @@ pub fn has_avx2() -> bool {
     false
 }
 
-/// Calls `work`, inlined, with the instructions of AVX-512; for [`wide`](crate::wide).
+/// Calls `work`, inlined, with AVX-512 instructions. For [`wide`](crate::wide).
 ///
 /// # Panics
-/// Where [`has_avx512`] says no.
+/// Panics if [`has_avx512`] returns false.
 #[inline]
 pub fn in_avx512<R>(work: impl FnOnce() -> R) -> R {
     assert!(has_avx512(), "a processor with AVX-512");
@@ -55,10 +55,10 @@ pub fn in_avx512<R>(work: impl FnOnce() -> R) -> R {
     work()
 }
 
-/// Calls `work`, inlined, with the instructions of AVX2; for [`wide`](crate::wide).
+/// Calls `work`, inlined, with AVX2 instructions. For [`wide`](crate::wide).
 ///
 /// # Panics
-/// Where [`has_avx2`] says no.
+/// Panics if [`has_avx2`] returns false.
 #[inline]
 pub fn in_avx2<R>(work: impl FnOnce() -> R) -> R {
     assert!(has_avx2(), "a processor with AVX2");

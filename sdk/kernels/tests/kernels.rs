@@ -1,4 +1,4 @@
-//! Every instruction set of this processor against a chain computed plainly, frame-wide, from the definition.
+//! Compares every instruction set of this processor with a plain frame-wide computation of the chain's definition.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../../tests/skip.rs"]
@@ -6,10 +6,10 @@ mod skip;
 
 use phasefront_kernels::*;
 
-/// With whole blocks of pixels, of which no kernel may step out: 128 and 192.
+/// The frame sizes. The widths 128 and 192 are whole blocks of pixels, which no kernel may exceed.
 const SIZES: [(usize, usize); 7] = [(1, 1), (7, 5), (1, 128), (2, 192), (1, 300), (23, 67), (40, 131)];
 
-/// A small linear congruential generator: the tests need no more, and build for every target.
+/// A small linear congruential generator, which suffices for the tests and builds for every target.
 struct Random(u64);
 
 impl Random {
@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-/// `(H, W)` planes; reading outside yields `outside`.
+/// `(H, W)` planes. Reading outside returns `outside`.
 struct Planes<T> {
     data: Vec<T>,
     size: (usize, usize),
@@ -51,7 +51,7 @@ impl<T: Copy> Planes<T> {
     }
 }
 
-/// The nine taps of every channel at (y, x), in the order of a filter's weights.
+/// Returns the nine taps of every channel at (y, x), in the order of a filter's weights.
 fn taps<T: Copy>(planes: &Planes<T>, y: usize, x: usize) -> Vec<T> {
     (0..9 * planes.channels())
         .map(|k| {
@@ -127,7 +127,7 @@ impl Int8Case {
         Int8Chain::new(&self.layers, self.input, self.concatenated, self.rounded_twice, isa)
     }
 
-    /// The chain from its definition, plane by plane.
+    /// Computes the chain from its definition, plane by plane.
     fn expected(&self, input: &[f32], size: (usize, usize)) -> Vec<f32> {
         let (h, w) = size;
         let quantise =
@@ -214,7 +214,7 @@ fn int8_is_the_definition_to_the_bit_on_every_instruction_set_and_tiling() {
         for seed in [2 * k as u64, 2 * k as u64 + 1] {
             let case = Int8Case::random(inputs, filters, count, seed);
             for size in SIZES {
-                // The plain chain is slow: the larger frames are for the first shapes.
+                // The plain chain is slow, so the larger frames are only for the first shapes.
                 if size.0 > 10 && (k > 1 || seed % 2 == 1) {
                     continue;
                 }
@@ -344,7 +344,7 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
     }
 }
 
-/// Blocks of pixels end in a row in as many ways as there are widths.
+/// Checks all widths, because blocks of pixels end differently in each.
 #[test]
 fn rows_of_every_width_agree_on_every_instruction_set() {
     let (case, layers) = (Int8Case::random(4, 8, 3, 2), f32_layers(4, 8, 3, 5));
@@ -378,7 +378,7 @@ fn rows_of_every_width_agree_on_every_instruction_set() {
     }
 }
 
-/// `values` (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉), the pixels of a square of two by two one after another.
+/// Converts `values` (C, H, W) to (4·C, ⌈H/2⌉, ⌈W/2⌉), with the pixels of a square of two by two one after another.
 fn squares(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
     let pixels = [(0, 0), (0, 1), (1, 0), (1, 1)];
     let planes = pixels
@@ -395,7 +395,7 @@ fn squares(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
         .collect()
 }
 
-/// The inverse of [`squares`].
+/// Computes the inverse of [`squares`].
 fn pixels(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
     let columns = width.div_ceil(2);
     let area = height.div_ceil(2) * columns;
@@ -457,8 +457,8 @@ fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
     }
 }
 
-/// What `fuzz/miri` runs, an interpreter some ten thousand times as slow: there the fastest instruction set that it
-/// knows.
+/// The test that `fuzz/miri` runs with the fastest instruction set that miri supports. miri is some ten thousand times
+/// slower.
 #[test]
 fn small_chains_agree_on_every_instruction_set() {
     let size = (2, 3);
@@ -517,7 +517,7 @@ fn extreme_values_saturate_alike() {
     }
 }
 
-/// In a pool of one thread; WebAssembly has no other.
+/// Runs `work` in a pool of one thread. WebAssembly has no other.
 fn on_one_thread(work: impl FnOnce() + Send) {
     match cfg!(target_family = "wasm") {
         true => work(),
@@ -596,7 +596,7 @@ fn chains_of_few_filters_leave_amx_alone() {
     }
 }
 
-/// No other test here has run their kernels.
+/// Reports the missing instruction sets, whose kernels no other test here has run.
 #[test]
 fn instruction_sets_that_this_processor_lacks_are_noted() {
     let of_architecture: &[Isa] = if cfg!(target_arch = "x86_64") {

@@ -1,23 +1,24 @@
-//! Compiled programs, kept from run to run: sealed on their way out, and taken back only as they were.
+//! Compiled programs that are stored between runs, with a seal that is checked before a driver receives them.
 //!
-//! Drivers trust these bytes, and a file in a cache directory may be cut short, changed on its disk, or of the driver
-//! before an update. So what is handed to a driver is whole, and its own. The seal finds damage and is no signature:
-//! programs are to be kept where only the app itself writes.
+//! Drivers trust these bytes. A file in a cache directory may be truncated, damaged on disk or from an older driver, so
+//! only complete programs of the same GPU and driver are used. The seal detects damage and is not a signature: programs
+//! should be stored where only the app itself writes.
 #![allow(unsafe_code)]
 
 use std::hash::{DefaultHasher, Hasher};
 
-/// What sealed programs begin with; the version stands at its end.
+/// The first bytes of sealed programs. The last character is the version.
 const MAGIC: [u8; 16] = *b"phasefront gpu 1";
-/// The magic, the digest of the GPU and its driver, the digest of the programs.
+/// The length of the header: the magic, the digest of the GPU and its driver, and the digest of the programs.
 const HEADER: usize = MAGIC.len() + 16;
 
-/// What a driver gave, with who gave it.
+/// Prepends a header that identifies the GPU, the driver and the programs.
 pub(super) fn seal(programs: &[u8], info: &wgpu::AdapterInfo) -> Vec<u8> {
     [&header(programs, info)[..], programs].concat()
 }
 
-/// A cache of a driver's own for `device`, with what was sealed on an earlier run; or without it, and why.
+/// Creates a pipeline cache for `device` from programs that were sealed on an earlier run. If they are rejected,
+/// returns an empty cache and the reason.
 pub(super) fn open(
     device: &wgpu::Device,
     info: &wgpu::AdapterInfo,
@@ -28,8 +29,8 @@ pub(super) fn open(
         Some(Err(why)) => (None, Some(why)),
         None => (None, None),
     };
-    // SAFETY: these are bytes that `PipelineCache::get_data` gave for this very GPU and driver, whole: `unseal` takes
-    // nothing else. wgpu checks its own header in them, and falls back to an empty cache.
+    // SAFETY: `unseal` accepts only complete data that `PipelineCache::get_data` returned for the same GPU and driver.
+    // wgpu checks its own header in the data and falls back to an empty cache.
     let cache = unsafe {
         device.create_pipeline_cache(&wgpu::PipelineCacheDescriptor {
             label: None,
@@ -40,7 +41,7 @@ pub(super) fn open(
     (cache, refused)
 }
 
-/// The programs in what [`seal`] made for the same GPU and driver, or why they are not.
+/// Returns the programs that [`seal`] sealed for the same GPU and driver, or why they are rejected.
 fn unseal<'a>(sealed: &'a [u8], info: &wgpu::AdapterInfo) -> Result<&'a [u8], &'static str> {
     let Some((given, programs)) = sealed.split_at_checked(HEADER) else {
         return Err("they end within their header");
@@ -63,7 +64,7 @@ fn header(programs: &[u8], info: &wgpu::AdapterInfo) -> [u8; HEADER] {
         maker.write_usize(text.len());
         maker.write(text.as_bytes());
     }
-    // Another release of Rust may hash otherwise: then programs are compiled once more.
+    // Another Rust release may hash differently. The programs are then compiled again.
     let mut whole = DefaultHasher::new();
     whole.write_usize(programs.len());
     whole.write(programs);
@@ -81,13 +82,13 @@ mod tests {
     use super::super::{Device, DeviceOptions};
     use super::*;
 
-    /// A driver in software with what was kept; it lets programs be kept.
+    /// Opens a software driver with stored programs. Software drivers support storing them.
     fn device(programs: Option<Vec<u8>>) -> Device {
         let options = DeviceOptions { programs, ..software() };
         opened(Device::open(&options))
     }
 
-    /// Runs a program that writes a seven.
+    /// Runs a program that writes the number 7.
     fn seven(device: &Device) -> Vec<u8> {
         let source = "
             @group(0) @binding(0) var<storage, read_write> result: array<u32>;

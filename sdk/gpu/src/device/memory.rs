@@ -1,17 +1,17 @@
-//! Memory of a GPU, and its way back.
+//! GPU memory and its transfer to the CPU.
 
 use super::{Device, one_line};
 use crate::{GpuError, Result};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-/// Constants of a program and where they lie.
+/// Constants of a program and their address space.
 pub(crate) struct Constants {
     pub(crate) buffer: wgpu::Buffer,
     uniform: bool,
 }
 
 impl Constants {
-    /// The address space as WGSL calls it.
+    /// Returns the address space in WGSL.
     pub(crate) fn space(&self) -> &'static str {
         match self.uniform {
             true => "uniform",
@@ -21,7 +21,7 @@ impl Constants {
 }
 
 impl Device {
-    /// Memory of `bytes`, zeros, for programs and copies.
+    /// Allocates a zeroed buffer of `bytes` for programs and copies.
     pub(crate) fn buffer(&self, what: &str, bytes: usize) -> Result<wgpu::Buffer> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let most = self
@@ -38,14 +38,14 @@ impl Device {
         }
         Ok(self.inner.create_buffer(&wgpu::BufferDescriptor {
             label: Some(what),
-            // Bindings hold a whole value at least.
+            // A binding holds at least one whole value.
             size: (bytes.max(16) as u64).next_multiple_of(16),
             usage,
             mapped_at_creation: false,
         }))
     }
 
-    /// Memory that the CPU reads.
+    /// Creates a buffer that the CPU can read.
     pub(crate) fn readable(&self, what: &str, bytes: usize) -> wgpu::Buffer {
         self.inner.create_buffer(&wgpu::BufferDescriptor {
             label: Some(what),
@@ -55,7 +55,7 @@ impl Device {
         })
     }
 
-    /// Constants: in uniform memory where they fit, which every GPU has the fastest way to.
+    /// Creates constants, in uniform memory if they fit, because every GPU reads it fastest.
     pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
         let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
         if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
@@ -73,14 +73,15 @@ impl Device {
         Ok(Constants { buffer, uniform })
     }
 
-    /// Constants that threads look up each at another place.
+    /// Creates constants that each thread reads at a different index.
     pub(crate) fn table(&self, what: &str, contents: &[u8]) -> Result<Constants> {
         let buffer = self.buffer(what, contents.len())?;
         self.queue.write_buffer(&buffer, 0, contents);
         Ok(Constants { buffer, uniform: false })
     }
 
-    /// Copies `bytes` to `at` of `to`, which is a multiple of 4. Copies take whole words, so what is missing is 0.
+    /// Copies `bytes` to the offset `at` of `to`, a multiple of 4. Copies are in whole words; the last word is padded
+    /// with zeros.
     pub(crate) fn write(&self, to: &wgpu::Buffer, at: usize, bytes: &[u8]) {
         let (words, rest) = bytes.split_at(bytes.len() / 4 * 4);
         self.queue.write_buffer(to, at as u64, words);
@@ -91,7 +92,7 @@ impl Device {
         }
     }
 
-    /// Reads `buffer` back, once what was submitted is done: for tests and for looking at what is between stages.
+    /// Reads `buffer` back after the submitted work is done. For tests and for inspecting data between stages.
     pub(crate) fn read(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
         let target = self.readable("read back", bytes);
         let mut encoder = self.inner.create_command_encoder(&Default::default());
@@ -107,11 +108,11 @@ impl Device {
     pub(crate) fn map(&self, buffer: &wgpu::Buffer, submission: &wgpu::SubmissionIndex) -> Result<()> {
         let (send, receive) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            // The receiver waits below, or has given up.
+            // The receiver waits below or has given up.
             let _ = send.send(mapped);
         });
         self.wait(submission)?;
-        // Another thread that polls the device may be the one that says so.
+        // Another thread that polls the device may run the callback.
         match receive.recv_timeout(self.patience) {
             Ok(Ok(())) => Ok(()),
             Ok(Err(why)) => Err(GpuError::Lost(one_line(why))),
@@ -120,7 +121,7 @@ impl Device {
     }
 }
 
-/// Copies a mapped buffer's first bytes.
+/// Copies the first bytes of a mapped buffer.
 pub(crate) fn copy_mapped(buffer: &wgpu::Buffer, into: &mut [u8]) -> Result<()> {
     let view = buffer
         .get_mapped_range(..)

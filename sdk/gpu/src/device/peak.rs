@@ -1,24 +1,24 @@
-//! What a device can do at its best, measured: the yardstick of the benchmark.
+//! Measures the peak performance of a device, the reference of the benchmark.
 
 use crate::Result;
 use crate::device::{Device, Dispatch};
 use crate::numbers::Numbers;
 use std::time::Instant;
 
-/// Bytes that are copied.
+/// The number of bytes to copy.
 const COPIED: usize = 1 << 26;
-/// What a thread copies: so many words of 16 bytes.
+/// The number of 16-byte words that each thread copies.
 const COPIES_EACH: usize = 16;
-/// Rounds of eight chains of four multiply-adds, and workgroups of 256 threads.
+/// The numbers of rounds, each of eight chains of four multiply-adds, and of workgroups of 256 threads.
 const ROUNDS: usize = 1024;
 const GROUPS: usize = 4096;
 
-/// The best of a device.
+/// The peak performance of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Multiply-adds a second in the numbers of the network, from registers alone.
+    /// The multiply-adds per second in the number format of the network, with all operands in registers.
     pub mac_per_s: f64,
-    /// Bytes read and written a second by a copy that no cache holds.
+    /// The bytes read and written per second by a copy that exceeds every cache.
     pub bytes_per_s: f64,
 }
 
@@ -31,7 +31,7 @@ pub(crate) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
         let copy = device
             .program("a copy", header.clone() + include_str!("peak.wgsl"), "copy")
             .on(device, &arguments, [words, 1, 1])?;
-        // A lane holds four numbers, or words of four.
+        // A lane holds four numbers, or four words of four numbers.
         let (lane, per_step) = match numbers {
             Numbers::F32 => (
                 "fn lane(v: vec4u) -> vec4f { return vec4f(v) * 1e-9; }
@@ -65,7 +65,7 @@ pub(crate) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
         };
         let header = format!("{enable}const ROUNDS: u32 = {ROUNDS}u;\n{header}{lane}");
         let source = header + include_str!("peak.wgsl") + include_str!("peak_arithmetic.wgsl");
-        // A driver in software does in one workgroup what a GPU does in thousands.
+        // A software driver gets a few workgroups instead of thousands, because it is slow.
         let groups = if device.is_software() { 4 } else { GROUPS };
         let compute = device
             .program("arithmetic", source, "compute")
@@ -78,7 +78,7 @@ pub(crate) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
     })
 }
 
-/// The shortest time of one dispatch, among several submissions of several.
+/// Returns the shortest time of one dispatch. Each of several submissions runs several dispatches.
 fn seconds(device: &Device, step: &Dispatch) -> Result<f64> {
     const TOGETHER: usize = 4;
     let mut best = f64::INFINITY;

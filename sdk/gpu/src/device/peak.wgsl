@@ -1,5 +1,5 @@
-// What a device can do at its best: multiply-adds from registers alone, and memory copied once. The header that peak.rs
-// writes before this text gives the constants in capitals, and for the arithmetic `lane`, `bits` and `more`.
+// Measures peak performance: multiply-adds on registers only, and a copy of memory. The header from peak.rs defines the
+// constants in capitals and, for the arithmetic, `lane`, `bits` and `more`.
 
 @group(0) @binding(0) var<storage, read> source: array<vec4u>;
 @group(0) @binding(1) var<storage, read_write> result: array<vec4u>;

@@ -1,4 +1,4 @@
-// Chains of multiply-adds that do not wait for each other. Goes behind peak.wgsl.
+// Independent chains of multiply-adds. Appended to peak.wgsl.
 
 @compute @workgroup_size(256)
 fn compute(@builtin(global_invocation_id) at: vec3u) {

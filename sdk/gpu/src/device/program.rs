@@ -1,4 +1,4 @@
-//! Programs: compiled once, bound to their arguments, run.
+//! Programs: compilation, binding of arguments and dispatch.
 #![allow(unsafe_code)]
 
 use super::{Device, lock};
@@ -9,7 +9,7 @@ use crate::{GpuError, Result};
 pub(crate) struct Program(wgpu::ComputePipeline);
 
 impl Program {
-    /// The program on its arguments, in the order of their bindings, for a grid of so many workgroups.
+    /// Binds `arguments` to the program for a grid of workgroups. Each argument has its binding number.
     pub(crate) fn on(
         &self,
         device: &Device,
@@ -42,7 +42,7 @@ impl Program {
     }
 }
 
-/// A program with its arguments, ready to run as often as wanted.
+/// A program with its arguments, which can run repeatedly.
 pub(crate) struct Dispatch {
     pipeline: wgpu::ComputePipeline,
     arguments: wgpu::BindGroup,
@@ -59,7 +59,7 @@ impl Dispatch {
 }
 
 impl Device {
-    /// Compiles `source`, the text of a program of this crate, unless that was done before.
+    /// Compiles `source`, a program of this crate, or returns the program compiled earlier from the same source.
     pub(crate) fn program(&self, what: &str, source: String, entry: &'static str) -> Program {
         let key = (entry, source);
         if let Some(known) = lock(&self.compiled).get(&key) {
@@ -75,8 +75,8 @@ impl Device {
             label: Some(what),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         };
-        // SAFETY: only this crate's own sources come here. Their loops have constant bounds, and every index is held
-        // to the size of what it indexes where it is computed; the tests run each one on frames of odd sizes.
+        // SAFETY: only sources of this crate are compiled. Their loops have constant bounds, and each index is clamped
+        // to its array where it is computed. The tests run every program on frames of odd sizes.
         let module = unsafe {
             self.inner
                 .create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
@@ -96,7 +96,7 @@ impl Device {
         Program(pipeline)
     }
 
-    /// Has `forged` run wherever `source` is to run: a driver that compiles wrongly.
+    /// Makes `forged` run instead of `source`, to simulate a driver that compiles wrongly.
     #[cfg(test)]
     pub(crate) fn forge(&self, entry: &'static str, source: &str, forged: &str) {
         let program = self.compile("forged", forged, entry);

@@ -1,4 +1,4 @@
-//! What the tests of stages share.
+//! Functions shared by the tests of the stages.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../../../tests/driver.rs"]
@@ -12,7 +12,7 @@ pub(crate) use driver::opened;
 use num_complex::Complex32;
 use std::sync::{Arc, OnceLock};
 
-/// The device of all tests: a GPU, or a driver in software.
+/// Returns the device of all tests: a GPU or a software driver.
 pub(crate) fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Result<Arc<Device>>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
@@ -46,7 +46,7 @@ pub(crate) fn run(device: &Device, work: impl Fn(&mut wgpu::ComputePass<'_>)) {
     device.check().unwrap();
 }
 
-/// Three planes of a smooth field with noise.
+/// Creates three planes of a smooth field with noise.
 pub(crate) fn field(size: usize) -> Vec<Complex32> {
     (0..3 * size)
         .map(|i| {
@@ -56,7 +56,7 @@ pub(crate) fn field(size: usize) -> Vec<Complex32> {
         .collect()
 }
 
-/// The largest difference, of the largest amplitude.
+/// Returns the largest difference relative to the largest amplitude of `b`.
 pub(crate) fn apart(a: &[Complex32], b: &[Complex32]) -> f32 {
     assert_eq!(a.len(), b.len());
     let most = b.iter().map(|v| v.norm()).fold(0.0, f32::max);

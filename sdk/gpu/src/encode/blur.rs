@@ -1,4 +1,4 @@
-//! A Gaussian in two dispatches, for blurs too wide for the sweep of double phase.
+//! Applies a Gaussian in two dispatches, for blurs too wide for the double-phase dispatch.
 
 use super::COLUMNS;
 use crate::Result;
@@ -7,15 +7,15 @@ use crate::device::{Constants, Device, Dispatch};
 /// A Gaussian on fields of one size.
 pub(super) struct Blur<'a> {
     pub(super) device: &'a Device,
-    /// Width, height and plane.
+    /// The width, the height and the plane size.
     pub(super) frame: &'a Constants,
-    /// The centre tap and those to one side.
+    /// The centre tap and the taps on one side.
     pub(super) taps: &'a [f32],
     pub(super) size: (usize, usize),
 }
 
 impl Blur<'_> {
-    /// Along x, with the mean phase taken out where `turn` says it, then along y back into `field`.
+    /// Blurs along x, removing the mean phase if `turn` is given, and then along y back into `field`.
     pub(super) fn steps(&self, field: &wgpu::Buffer, turn: Option<&wgpu::Buffer>) -> Result<[Dispatch; 2]> {
         let (height, width) = self.size;
         let room = (self.device).buffer("the blurred field", 24 * height * width)?;

@@ -1,5 +1,5 @@
-// A Gaussian along rows or along columns, edges repeated: for those too wide for double_phase.wgsl to do by itself. The
-// header that blur.rs writes before this text gives HALF, TURN and ALONG, (1, 0) or (0, 1).
+// Applies a Gaussian along rows or columns with repeated edges, for blurs too wide for double_phase.wgsl. The header
+// from blur.rs defines HALF, TURN and ALONG, which is (1, 0) or (0, 1).
 
 struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
 

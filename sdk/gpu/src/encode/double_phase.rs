@@ -1,4 +1,4 @@
-//! Dark, double phase and the modulator's response: from a filtered field to levels, in one sweep.
+//! Converts a filtered field to levels in one dispatch: dark threshold, double phase and the modulator's response.
 
 use super::local::Local;
 use super::shared::Shared;
@@ -7,11 +7,11 @@ use crate::Result;
 use crate::device::{Device, Dispatch};
 use phasefront_core::encode::brightness::{Brightness, Past};
 
-/// Double phase of one field into several buffers.
+/// Encodes one field into several output buffers by double phase.
 pub(super) struct DoublePhase {
-    /// Finds the largest amplitude, where it is what full light stands for.
+    /// Finds the largest amplitude, if full brightness is defined by it.
     peak: Option<Dispatch>,
-    /// For each of the buffers, where nothing is corrected.
+    /// One dispatch for each output buffer if there is no correction.
     encode: Vec<Dispatch>,
     local: Option<Local>,
 }
@@ -45,21 +45,21 @@ impl DoublePhase {
         Ok(DoublePhase { peak, encode, local })
     }
 
-    /// Which frame the one follows that is submitted next.
+    /// Sets the previous frame of the next submission.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         if let Some(local) = &self.local {
             local.set_past(device, past);
         }
     }
 
-    /// To be called before the field is filtered.
+    /// Saves the field for a correction. Must be called before the field is filtered.
     pub(super) fn keep(&self, pass: &mut wgpu::ComputePass<'_>) {
         if let Some(local) = &self.local {
             local.keep(pass);
         }
     }
 
-    /// Encodes into the buffers of that index.
+    /// Encodes into the output buffers with that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         if let Some(peak) = &self.peak {
             peak.run(pass);

@@ -1,25 +1,24 @@
-// From the field at the modulator to levels: dark, blur, light, double phase, response. `peak` finds the largest
-// amplitude that `encode` then scales by. The header that double_phase.rs writes before this text gives the constants
-// in capitals.
+// Converts the field at the modulator to levels: dark threshold, blur, light, double phase, response. `peak` finds the
+// largest amplitude, by which `encode` scales. The header from double_phase.rs defines the constants in capitals.
 
 struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
-// The centre tap of the blur and those to one side; the fixed scale.
+// The centre tap of the blur and the taps on one side, and the fixed scale.
 struct Settings { taps: vec3f, scale: f32 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> settings: Settings;
 @group(0) @binding(2) var<storage, read> field: array<vec2f>;
 @group(0) @binding(3) var<storage, read> turn: array<vec2f>;
-// The largest squared amplitude, its bits: those of numbers from 0 on are in order.
+// The bits of the largest squared amplitude. The bits of nonnegative floats have the order of their values.
 @group(0) @binding(4) var<storage, read_write> largest: atomic<u32>;
 @group(0) @binding(5) var<storage, read> found: array<u32>;
 @group(0) @binding(6) var<storage, read_write> levels: array<u32>;
 @group(0) @binding(7) var shown: texture_storage_2d<rgba8unorm, write>;
-// With TABLE the level of each step; with PIXELS the curves of nodes, K + 1 knots each, then their turns; all else is
-// not read. See slm.rs and slm/per_pixel.rs.
+// With TABLE the level of each step. With PIXELS the curves of the nodes, K + 1 knots each, then their turns. Otherwise
+// unused. See response.rs and response/per_pixel.rs.
 @group(0) @binding(8) var<storage, read> response: array<u32>;
 
-// One over the amplitude of the lasers' light at the nodes, three planes; see illumination.rs.
+// The inverse amplitude of the laser light at the nodes, three planes. See illumination.rs.
 @group(0) @binding(9) var<storage, read> gains: array<f32>;
 
 const PI: f32 = 3.14159265358979;
@@ -27,7 +26,7 @@ const TAU: f32 = 6.28318530717959;
 
 var<workgroup> most: array<f32, 64>;
 
-// The node before pixel n of `count`, and how far it is to the next of `nodes`.
+// `before` returns the node before pixel n of `count`. `beyond` returns the fraction of the way to the next node.
 fn before(n: u32, count: u32, nodes: u32) -> u32 { return min(n * (nodes - 1u) / max(count - 1u, 1u), nodes - 2u); }
 
 fn beyond(n: u32, count: u32, nodes: u32) -> f32 {
@@ -35,7 +34,7 @@ fn beyond(n: u32, count: u32, nodes: u32) -> f32 {
     return f32(n * (nodes - 1u) - before(n, count, nodes) * steps) / f32(steps);
 }
 
-// What a pixel shall send over what it gets, the frame in the middle of the modulator.
+// Returns the factor that compensates a pixel's illumination. The frame is in the middle of the modulator.
 fn gain(colour: u32, x: u32, y: u32) -> f32 {
     let height = max(ALL_HEIGHT, u32(frame.height));
     let width = max(ALL_WIDTH, u32(frame.width));
@@ -55,19 +54,19 @@ fn turned(colour: u32, u: vec2f) -> vec2f {
     return vec2f(u.x * v.x - u.y * v.y, u.x * v.y + u.y * v.x);
 }
 
-// The amplitude that full light stands for.
+// Returns the amplitude of full brightness.
 fn full_light() -> f32 {
     if (FIXED) { return settings.scale; }
     return sqrt(bitcast<f32>(found[0]));
 }
 
-// 1 over an amplitude; 0 in darkness.
+// Returns 1 over an amplitude, or 0 for amplitude 0.
 fn over(amplitude: f32) -> f32 { return select(0.0, 1.0 / amplitude, amplitude > 0.0); }
 
-// 1 over the amplitude below which values are drawn to the real axis; 0 where none is.
+// Returns 1 over the amplitude below which values are pulled to the real axis, or 0 without a dark threshold.
 fn per_dark(scale: f32) -> f32 { return over(DARK * scale); }
 
-// The field at a pixel, drawn to the real axis where it is dark; see encode/dark.rs.
+// Returns the field at a pixel, pulled to the real axis if it is dark. See encode/dark_threshold.rs.
 fn source(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
     var u = field[colour * frame.plane + u32(y * frame.width + x)];
     if (per_dark > 0.0) {
@@ -79,7 +78,7 @@ fn source(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
     return u;
 }
 
-// A colour's value at a pixel: blurred, turned where nothing before did it, and divided by the light.
+// Returns a colour's value at a pixel: blurred, turned if that was not done before, and divided by the light.
 fn value(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
     var sum = vec2f(0);
     if (HALF == 0) {
@@ -99,7 +98,7 @@ fn value(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
     return sum;
 }
 
-// Of numbers in [0, 1], to 1e-6; see double_phase.rs. Drivers promise 5e-4.
+// Computes the arc cosine for numbers in [0, 1] to 1e-6. See double_phase.rs. Drivers guarantee only 5e-4.
 fn arc_cosine(a: f32) -> f32 {
     var p = -0.0012624911;
     p = p * a + 0.00667009;
@@ -135,7 +134,7 @@ fn node(colour: u32, i: u32, j: u32) -> u32 {
     return (colour * ROWS + min(i, ROWS - 1u)) * COLUMNS + min(j, COLUMNS - 1u);
 }
 
-// What nodes have at `from` + node·stride, between the four around a pixel: in y first, then in x.
+// Interpolates the nodes' values at `first` + node·stride between the four nodes around a pixel: in y, then in x.
 fn between(colour: u32, x: u32, y: u32, first: u32, stride: u32) -> f32 {
     let i = y / SPACING;
     let j = x / SPACING;
@@ -150,7 +149,7 @@ fn between(colour: u32, x: u32, y: u32, first: u32, stride: u32) -> f32 {
     return left + (right - left) * fx;
 }
 
-// The level of a phase at a pixel that has its own curve.
+// Returns the level of a phase at a pixel that has its own curve.
 fn pixel_level(phase: f32, colour: u32, x: u32, y: u32) -> u32 {
     let turns = 3u * ROWS * COLUMNS * (INTERVALS + 1u);
     let firstzero = phase >= between(colour, x, y, turns, 1u);
@@ -161,7 +160,7 @@ fn pixel_level(phase: f32, colour: u32, x: u32, y: u32) -> u32 {
     return u32(clamp(here + (next - here) * (t - f32(k)) + 0.5, 0.0, 255.0));
 }
 
-// The level of a phase from -3π/2 to 3π/2.
+// Returns the level of a phase from -3π/2 to 3π/2.
 fn level(angle: f32, colour: u32, x: i32, y: i32) -> u32 {
     let phase = select(angle, angle + TAU, angle < 0.0);
     if (PIXELS) { return pixel_level(select(phase, 0.0, phase >= TAU), colour, u32(x), u32(y)); }

@@ -1,4 +1,4 @@
-//! What comes before double phase: the aperture of BL-DPM, the blur of AA-DPM, the network of DDPM.
+//! The filters before double phase: the aperture of BL-DPM, the blur of AA-DPM, the network of DDPM.
 
 use super::EncoderJob;
 use super::blur::Blur;
@@ -14,7 +14,7 @@ use phasefront_core::encode::band_limit::BandLimit;
 use phasefront_core::encode::deep;
 use phasefront_core::method::network::Network;
 
-/// Taps to one side up to which the blur is done in the same sweep as double phase.
+/// The most taps on one side for which the blur is part of the double-phase dispatch.
 const FUSED_HALF: usize = 2;
 
 /// The filter of an encoding.
@@ -25,14 +25,14 @@ pub(super) enum Filter {
     Network(Box<Prefilter>),
 }
 
-/// A field on its way to double phase, and what the sweep there still has to do to it.
+/// A filtered field, and the operations that the double-phase dispatch still has to apply.
 pub(super) struct Filtered<'a> {
     pub(super) field: wgpu::Buffer,
-    /// What its colours are to be multiplied by.
+    /// The factors that its colours are still multiplied by.
     pub(super) turn: Option<&'a wgpu::Buffer>,
-    /// A blur: the centre tap and those to one side.
+    /// A blur to apply: the centre tap and the taps on one side.
     pub(super) taps: Vec<f32>,
-    /// Whether nothing is left of the field as it came, or it is not this one.
+    /// Whether the original field is overwritten or `field` is another buffer.
     pub(super) replaces: bool,
 }
 
@@ -103,9 +103,9 @@ impl Filter {
     }
 }
 
-/// DDPM's network on a field.
+/// The network of DDPM on a field.
 pub(super) struct Prefilter {
-    /// Where the network asks for it.
+    /// The blur before the network, if the network requires it.
     blur: Option<[Dispatch; 2]>,
     packer: Packer,
     chain: ChainPlan,

@@ -1,5 +1,5 @@
-//! Correction: one dispatch for the start, one for each local step, and steps at the midpoint behind them. The last
-//! writes levels. The twin of [`phasefront_core::encode::local`].
+//! Runs the correction: one dispatch to start, one for each local step, then midpoint steps. The last dispatch writes
+//! levels. The counterpart of [`phasefront_core::encode::local`].
 
 use super::midpoint::Midpoint;
 use super::shared::Shared;
@@ -9,21 +9,21 @@ use crate::device::{Device, Dispatch};
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::local::LocalFilter;
 
-/// Pixels along each side that a workgroup corrects.
+/// The side of the square of pixels that a workgroup corrects.
 const SIDE: usize = 16;
 
-/// The correction of one field, into several buffers.
+/// The correction of one field into several output buffers.
 pub(super) struct Local {
-    /// Where a filter leaves nothing of the field that is wanted.
+    /// Saves the wanted field if a filter overwrites it.
     keep: Option<Dispatch>,
-    /// The start, and all local steps but the last of all.
+    /// The start and all local steps before the last dispatch.
     begin: Vec<Dispatch>,
     last: Last,
 }
 
-/// What leaves levels.
+/// The dispatches that write levels.
 enum Last {
-    /// A local step, for each of the buffers.
+    /// A local step for each output buffer.
     Local(Vec<Dispatch>),
     Midpoint(Box<Midpoint>),
 }
@@ -37,7 +37,7 @@ impl Local {
     ) -> Result<Self> {
         let (height, width) = job.size;
         let bytes = 24 * height * width;
-        // A field that is kept is turned on the way, another where it is read.
+        // A saved field is turned when it is saved; otherwise the field is turned when it is read.
         let replaces = shared.filtered.replaces;
         let source = format!(
             "const KEEP_TURN: bool = {};\nconst GOAL_TURN: bool = {};\n{}{}",
@@ -101,21 +101,21 @@ impl Local {
         Ok(Local { keep, begin, last })
     }
 
-    /// Which frame the one follows that is submitted next.
+    /// Sets the previous frame of the next submission.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         if let Last::Midpoint(midpoint) = &self.last {
             midpoint.set_past(device, past);
         }
     }
 
-    /// To be called before the field is filtered.
+    /// Saves the wanted field. Must be called before the field is filtered.
     pub(super) fn keep(&self, pass: &mut wgpu::ComputePass<'_>) {
         if let Some(keep) = &self.keep {
             keep.run(pass);
         }
     }
 
-    /// Corrects into the buffers of that index.
+    /// Corrects into the output buffers with that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         self.begin.iter().for_each(|step| step.run(pass));
         match &self.last {

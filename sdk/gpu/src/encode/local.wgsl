@@ -1,12 +1,12 @@
-// Local correction, after double_phase.wgsl; see encode/local.rs. `begin` leaves d = g − L·e of double phase's phasors
-// e, `step_on` that of the next ones, and `finish` takes the last step and leaves levels. The header that local.rs
-// writes gives GOAL_TURN and KEEP_TURN.
+// Local correction, appended to double_phase.wgsl. See encode/local.rs. `begin` writes d = g − L·e for the phasors e of
+// double phase, `step_on` writes d for the next phasors, and `finish` takes the last step and writes levels. The header
+// from local.rs defines GOAL_TURN and KEEP_TURN.
 
 // g times the scale.
 @group(0) @binding(10) var<storage, read> wanted: array<vec2f>;
 @group(0) @binding(11) var<storage, read> previous: array<vec2f>;
 @group(0) @binding(12) var<storage, read_write> next: array<vec2f>;
-// B at (dy, dx), rows of dy.
+// B at (dy, dx), in rows of dy.
 @group(0) @binding(13) var<uniform> taps: array<vec4f, 4>;
 
 const REACH: i32 = 3;
@@ -45,14 +45,14 @@ fn begin(@builtin(global_invocation_id) at: vec3u) {
     next[here] = goal(at.z, x, y, inverse) - light(at.z, x, y) * e;
 }
 
-// The pixel of `count` that stands for `at`: mirrored about the first and the last.
+// Returns the pixel index of `at`, mirrored about the first and the last of `count` pixels.
 fn mirrored(at: i32, count: i32) -> i32 {
     let period = 2 * max(count - 1, 1);
     let turn = ((at % period) + period) % period;
     return min(min(turn, period - turn), count - 1);
 }
 
-// What a workgroup reads around its pixels.
+// Loads a workgroup's pixels and their surroundings.
 fn load(colour: u32, group: vec3u, thread: u32) {
     workgroupBarrier();
     let corner = vec2i(group.xy * SIDE) - REACH;
@@ -64,7 +64,7 @@ fn load(colour: u32, group: vec3u, thread: u32) {
     workgroupBarrier();
 }
 
-// z = g − d + B∗d.
+// Returns z = g − d + B∗d.
 fn drawn(g: vec2f, at: vec2u) -> vec2f {
     let centre = i32((at.y + 3u) * TILE + at.x + 3u);
     var z = g - tile[centre];
@@ -113,7 +113,7 @@ fn finish(
     if (x < frame.width && y < frame.height) { put(x, y, rgb); }
 }
 
-// The field as it is wanted, before a filter that leaves nothing of it.
+// Saves the wanted field before a filter overwrites it.
 @compute @workgroup_size(64)
 fn keep(@builtin(global_invocation_id) at: vec3u) {
     if (i32(at.x) >= frame.width) { return; }

@@ -1,13 +1,13 @@
-//! The constant phase of a network's field, found on the GPU. The twin of
+//! Finds the mean phase of a network's field on the GPU. The counterpart of
 //! [`phasefront_core::pipeline::display_plan::remove_mean_phase`].
 
 use crate::Result;
 use crate::device::{Device, Dispatch};
 
-/// The mean phase of a field, from the sums of the workgroups that made it.
+/// Finds the mean phase of a field from the sums of the workgroups that computed it.
 pub(crate) struct MeanPhase {
     step: Dispatch,
-    /// Three complex f32: what each colour is to be multiplied by.
+    /// Three complex f32, the factors that remove the mean phase of each colour.
     pub(crate) turn: wgpu::Buffer,
 }
 
@@ -41,7 +41,7 @@ mod tests {
     #[test]
     fn the_mean_phase_is_that_of_the_cpu() {
         let device = device();
-        // Sums of parts, as the last layer leaves them.
+        // Sums of parts, as the last layer writes them.
         for parts in [1, 7, 1000] {
             let mut sums = field(parts);
             let partial: Vec<Complex32> = (0..3 * parts).map(|i| sums[i % 3 * parts + i / 3]).collect();
@@ -59,7 +59,7 @@ mod tests {
             assert!(apart(&turn, &expected) < 1e-4, "{turn:?} {expected:?}");
             remove_mean_phase(&mut sums, 3);
         }
-        // Darkness has no phase and is left alone.
+        // A dark field has no phase and is left unchanged.
         let buffer = upload(&device, &[Complex32::ZERO; 3]);
         let mean = device.guarded(|| MeanPhase::new(&device, &buffer, 1)).unwrap();
         run(&device, |pass| mean.run(pass));

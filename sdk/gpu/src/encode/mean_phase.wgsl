@@ -1,4 +1,4 @@
-// The mean phase of each colour, from the sums of workgroups: what turns it to 0. One workgroup for all.
+// Computes the factors that remove the mean phase of each colour, from the sums of all workgroups, in one workgroup.
 
 @group(0) @binding(0) var<uniform> parts: vec4u;
 @group(0) @binding(1) var<storage, read> partial: array<vec2f>;
@@ -19,7 +19,7 @@ fn find(@builtin(local_invocation_index) thread: u32) {
             if (thread < step) { sums[thread] += sums[thread + step]; }
         }
         if (thread == 0u) {
-            // Scaled first, so that its square fits.
+            // Scale first, so that the square does not overflow.
             let most = max(abs(sums[0].x), abs(sums[0].y));
             let v = sums[0] / max(most, 1e-30);
             turn[c] = select(vec2f(1, 0), vec2f(v.x, -v.y) / sqrt(dot(v, v)), most > 1e-30);

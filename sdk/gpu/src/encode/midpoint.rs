@@ -1,4 +1,4 @@
-//! Steps at the midpoint: two convolutions a step, each with a dispatch behind it. The twin of
+//! Runs steps at the midpoint. Each step is two convolutions, each followed by a dispatch. The counterpart of
 //! [`phasefront_core::encode::midpoint`].
 
 use super::shared::Shared;
@@ -10,23 +10,23 @@ use num_complex::Complex32;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::midpoint::{GAIN, MidpointSteps, STILL, WAVE};
 
-/// The steps of one field, into several buffers.
+/// The midpoint steps of one field into several output buffers.
 pub(super) struct Midpoint {
     steps: usize,
     bound: Constants,
     depart: Dispatch,
-    /// To the midpoint: the wanted and the displayed wave, through the aperture.
+    /// Propagates to the midpoint: the wanted field, then the displayed wave through the aperture.
     aim: Convolution,
     back: Convolution,
     ask: Dispatch,
     forth: Convolution,
     follow: Dispatch,
-    /// For each of the buffers.
+    /// One dispatch for each output buffer.
     arrive: Vec<Dispatch>,
 }
 
 impl Midpoint {
-    /// After what `source` makes: it leaves g − L·e in `missing`, of the g in `wanted`.
+    /// Plans the steps after the program `source`, which leaves g − L·e in `missing`, where g is the field in `wanted`.
     pub(super) fn new(
         device: &Device,
         job: &EncoderJob<'_>,
@@ -112,13 +112,13 @@ impl Midpoint {
         })
     }
 
-    /// Which frame the one follows that is submitted next.
+    /// Sets the previous frame of the next submission.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         let bound = past.map_or(-1.0, |past| (STILL * past.scale).powi(2));
         (device.queue).write_buffer(&self.bound.buffer, 0, bytemuck::cast_slice(&[bound; 4]));
     }
 
-    /// Corrects into the buffers of that index.
+    /// Corrects into the output buffers with that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         self.depart.run(pass);
         self.aim.run(pass);
@@ -197,7 +197,7 @@ mod tests {
             let twin = DisplayPlan::new(size, &target, &options).unwrap();
             let mut scratch = twin.scratch();
             let past = Past { scale: 1.2, share: 1.0 };
-            // A frame by itself, and one that follows: of it a part stands still.
+            // A single frame, and a frame that follows another and is partly static.
             for past in [None, Some(past)] {
                 if past.is_some() {
                     values
@@ -217,7 +217,7 @@ mod tests {
                     level.wrapping_sub(other).min(other.wrapping_sub(*level))
                 });
                 let apart: Vec<u8> = apart.collect();
-                // Another level where rounding says so, and more only where little was left of a value.
+                // Rounding may change a level by one. Larger differences occur only where a value is almost zero.
                 let beside = apart.iter().filter(|d| **d > 0).count();
                 let beyond = apart.iter().filter(|d| **d > 1).count();
                 assert!(

@@ -1,22 +1,22 @@
-// Steps at the midpoint, after local.wgsl; see encode/midpoint.rs. `depart` takes what double phase or local steps
-// leave, or where a pixel stands still what the frame before ended with; `ask` and `follow` are a step's two halves,
-// each behind its way through the aperture, and `arrive` writes levels. The header that midpoint.rs writes gives WAVE
-// and GAIN.
+// Steps at the midpoint, appended to local.wgsl. See encode/midpoint.rs. `depart` starts from the result of double
+// phase or local steps, or, at static pixels, from the previous frame's final phasors. `ask` and `follow` are the two
+// halves of a step, each after a propagation through the aperture. `arrive` writes levels. The header from midpoint.rs
+// defines WAVE and GAIN.
 
 // T, the wanted field over the scale: at the modulator, then at the midpoint.
 @group(0) @binding(14) var<storage, read_write> aim: array<vec2f>;
 // L·e, then u, r and Kᴴ·r.
 @group(0) @binding(15) var<storage, read_write> missing: array<vec2f>;
-// L·e; between frames that of the one before.
+// L·e. Between frames it holds the previous frame's values.
 @group(0) @binding(16) var<storage, read_write> phasors: array<vec2f>;
-// The wanted field of the frame before at the modulator.
+// The previous frame's wanted field at the modulator.
 @group(0) @binding(17) var<storage, read_write> kept: array<vec2f>;
-// The square of the most that a pixel changes which stands still; below 0 where there is no frame before.
+// The square of the largest change of a static pixel. It is negative if there is no previous frame.
 @group(0) @binding(18) var<uniform> bound: vec4f;
 
 fn place(at: vec3u) -> u32 { return at.z * frame.plane + at.y * u32(frame.width) + at.x; }
 
-// `missing` holds g − L·e.
+// On entry `missing` holds g − L·e.
 @compute @workgroup_size(64)
 fn depart(@builtin(global_invocation_id) at: vec3u) {
     if (i32(at.x) >= frame.width) { return; }
@@ -41,7 +41,7 @@ fn ask(@builtin(global_invocation_id) at: vec3u) {
 
 @compute @workgroup_size(64)
 fn follow(@builtin(global_invocation_id) at: vec3u) {
-    // In darkness there is nothing to correct.
+    // A dark frame needs no correction.
     if (i32(at.x) >= frame.width || full_light() <= 0.0) { return; }
     let z = phasors[place(at)] + GAIN * missing[place(at)];
     let e = z * (light(at.z, i32(at.x), i32(at.y)) / sqrt(max(dot(z, z), 1.17549435e-38)));

@@ -1,4 +1,4 @@
-//! What the programs of double phase, local and midpoint correction share: settings, the lasers' light, the response.
+//! Resources shared by the programs of double phase, local and midpoint correction: settings, laser light, response.
 
 use super::filter::Filtered;
 use super::{EncoderJob, LevelsBuffers};
@@ -7,11 +7,11 @@ use crate::device::{Constants, Device, Dispatch, Program};
 use phasefront_core::display::response::{Response, per_pixel};
 use phasefront_core::encode::brightness::Brightness;
 
-/// What the programs of double phase and of local correction share.
+/// The resources that the programs of double phase and of local correction share.
 pub(super) struct Shared<'a> {
     pub(super) frame: &'a Constants,
     pub(super) filtered: &'a Filtered<'a>,
-    /// What the scale is read from, and for [`Brightness::FrameMax`] first written to.
+    /// The buffer that the scale is read from. For [`Brightness::FrameMax`] the same frame writes it first.
     pub(super) largest: &'a wgpu::Buffer,
     pub(super) source: String,
     settings: Constants,
@@ -48,14 +48,14 @@ impl<'a> Shared<'a> {
         })
     }
 
-    /// The arguments at these bindings, of 0 to 3, 5, 8 and 9.
+    /// Returns the arguments for these bindings, among 0 to 3, 5, 8 and 9.
     pub(super) fn arguments(&self, bindings: &[u32]) -> Vec<(u32, wgpu::BindingResource<'_>)> {
         let of = |binding: &u32| {
             let buffer = match binding {
                 0 => &self.frame.buffer,
                 1 => &self.settings.buffer,
                 2 => &self.filtered.field,
-                // Something, where nothing is turned.
+                // Bind any buffer if nothing is turned.
                 3 => self.filtered.turn.unwrap_or(&self.response.buffer),
                 5 => self.largest,
                 8 => &self.response.buffer,
@@ -66,7 +66,7 @@ impl<'a> Shared<'a> {
         bindings.iter().map(of).collect()
     }
 
-    /// A program that writes levels, for each of `buffers`, on these arguments and those of the levels.
+    /// Binds a program that writes levels to these arguments and the levels, for each of `buffers`.
     pub(super) fn levels_program(
         &self,
         device: &Device,
@@ -86,11 +86,11 @@ impl<'a> Shared<'a> {
     }
 }
 
-/// A response as the program reads it.
+/// A response in the layout of the program.
 struct Curves {
-    /// Levels of a full turn.
+    /// The number of levels of a full turn.
     steps: u32,
-    /// One value that is not read where levels are linear.
+    /// The table of the response. For linear levels it holds one unused value.
     table: Vec<u32>,
     pixels: bool,
     nodes: (usize, usize),
@@ -125,7 +125,7 @@ impl Curves {
     }
 }
 
-/// What is constant in the program.
+/// Returns the constants of the program.
 fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> String {
     let (lit, modulator) = match &job.target.illumination {
         Some(light) => (light.nodes(), job.target.modulator()),

@@ -1,23 +1,23 @@
-//! A camera's images on their way to the GPU, as they lie in memory.
+//! Uploads camera images to the GPU in their memory layout.
 
 use crate::Result;
 use crate::device::{Constants, Device};
 use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, Plane, yuv_constants};
 
-/// How a camera's images are read.
+/// The plan for reading a camera's images.
 pub(super) struct Camera {
     plan: ColourPlan,
-    /// Where the pixels of the image lie that was sent last, and its colours.
+    /// The pixel layout and the colour conversion of the latest uploaded image.
     pub(super) constants: Constants,
-    /// The weights of what each pixel is made of.
+    /// The weights of the samples of each pixel.
     pub(super) taps: Constants,
-    /// Where each plane begins in the colour buffer, and what there is room for.
+    /// The offset and the capacity of each plane in the colour buffer, in bytes.
     places: Vec<(usize, usize)>,
 }
 
 impl Camera {
-    /// Images of a `sensor` (height, width), how many bytes they may have, and what is constant in a program that reads
-    /// them.
+    /// Plans images of a `sensor` (height, width). Also returns their largest size in bytes and the constants of a
+    /// program that reads them.
     pub(super) fn new(
         device: &Device,
         plan: ColourPlan,
@@ -29,7 +29,7 @@ impl Camera {
         let mut bytes = 0;
         for (_, pixel_bytes, share) in format.layout() {
             let (rows, columns) = (height.div_ceil(*share), width.div_ceil(*share));
-            // Cameras pad rows, and Android's chroma planes have every second byte.
+            // Cameras pad rows, and each sample of Android's chroma planes takes two bytes.
             let room = rows * (columns * pixel_bytes.max(&2) + 256).next_multiple_of(256);
             places.push((bytes, room));
             bytes += room;
@@ -58,7 +58,7 @@ impl Camera {
         self.plan.fits(image, orientation)
     }
 
-    /// Sends an image on its way to the colour buffer.
+    /// Uploads an image to the colour buffer.
     pub(super) fn upload(&self, device: &Device, to: &wgpu::Buffer, image: &ColourImage<'_>) -> Result<()> {
         let format = image.format();
         let (height, width) = image.shape();
@@ -99,7 +99,7 @@ impl Camera {
     }
 }
 
-/// The constants that say where the taps of each axis lie in a table, and the table.
+/// Returns the table of taps and the WGSL constants with the offsets of each axis in it.
 fn taps(plan: &ColourPlan) -> (String, Vec<u32>) {
     let (mut constants, mut table) = (String::new(), Vec::new());
     for (name, axis) in ["X", "Y", "OTHER_X", "OTHER_Y"].into_iter().zip(plan.axes()) {
@@ -118,7 +118,7 @@ fn taps(plan: &ColourPlan) -> (String, Vec<u32>) {
     (constants, table)
 }
 
-/// A plane's pixels without gaps: for strides beyond what cameras have.
+/// Copies a plane's pixels without gaps, for strides larger than cameras use.
 fn tightened(plane: &Plane<'_>, rows: usize, columns: usize, pixel_bytes: usize) -> Vec<u8> {
     let pixel = |i: usize| {
         let at = i / columns * plane.row_stride + i % columns * plane.pixel_stride;

@@ -1,11 +1,11 @@
-// Colour from a camera's image, turned upright, cropped, resized and converted: the twin of frame/convert.rs, whose
-// taps come as a table: for each of four axes (x and y of the first channel, x and y of the others) the first sample of
-// each pixel, then its weights.
+// Reads colour from a camera image and turns it upright, crops, resizes and converts it: the counterpart of
+// frame/convert.rs. The taps are a table for four axes (x and y of the first channel, x and y of the others): the first
+// sample of each pixel, then its weights.
 
 struct Camera {
-    // Of each channel the byte of the upright picture's first sample, and the steps to the right and down.
+    // For each channel: the byte of the first sample of the upright image, and the steps to the right and down.
     channel: array<vec4i, 3>,
-    // Black, luma's factor, grey, chroma's factor; and the matrix: red of V, green of U, green of V, blue of U.
+    // Black, the luma factor, grey and the chroma factor; then the matrix: red of V, green of U, green of V, blue of U.
     levels: vec4f,
     matrix: vec4f,
 }
@@ -16,7 +16,7 @@ struct Camera {
 
 fn byte(at: u32) -> f32 { return f32((colour[at / 4u] >> (8u * (at % 4u))) & 255u); }
 
-// A channel's mean under the taps of a pixel.
+// Returns a channel's weighted mean under the taps of a pixel.
 fn sample(channel: u32, x: u32, y: u32) -> f32 {
     let lies = camera.channel[channel];
     let other = channel > 0u;

@@ -1,5 +1,5 @@
-// Channels from a complex field: the real parts of its colours, then the imaginary ones; of a split one both in two
-// parts. Goes behind pack.wgsl.
+// Channels from a complex field: the real parts of the colours, then the imaginary parts. With SPLIT, both in two
+// parts. Appended to pack.wgsl.
 
 @group(0) @binding(1) var<storage, read> colour: array<vec2f>;
 

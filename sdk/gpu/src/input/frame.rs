@@ -1,68 +1,68 @@
-//! A captured frame: borrowed, in the formats of cameras or as planes.
+//! A borrowed captured frame, in camera formats or as planes.
 
 use ndarray::{Array2, Array3};
 use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, RgbdFrame};
 
-/// How colour comes.
+/// The format of colour images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Colour {
-    /// Three planes of f32 in \[0, 1] of the frame's size: an [`RgbdFrame`]'s.
+    /// Three planes of f32 in \[0, 1] of the frame's size, as in an [`RgbdFrame`].
     Planar,
-    /// Images of a camera, which are turned upright, cropped and resized to the frame.
+    /// Camera images, which are turned upright, cropped and resized to the frame.
     Camera {
-        /// How they lie in memory. Strides may differ from image to image.
+        /// The memory layout. Strides may differ between images.
         format: ColourFormat,
-        /// Rows of the sensor.
+        /// The rows of the sensor.
         height: usize,
-        /// Columns of the sensor.
+        /// The columns of the sensor.
         width: usize,
-        /// How they become upright.
+        /// The orientation that makes the images upright.
         orientation: Orientation,
     },
 }
 
-/// How normalized depth comes: one plane of the frame's size, 0 nearest, 1 farthest, without holes.
+/// The format of normalized depth: one plane of the frame's size, from 0 (nearest) to 1 (farthest), without holes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Depth {
     /// f32 in \[0, 1].
     F32,
-    /// 65535 is 1.
+    /// u16, where 65535 represents 1.
     U16,
 }
 
-/// Colour of a frame, as planned by [`Colour`].
+/// The colour of a frame in the planned [`Colour`] format.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum ColourData<'a> {
     /// (3, H, W).
     Planar(&'a [f32]),
-    /// A camera's image.
+    /// A camera image.
     Camera(ColourImage<'a>),
 }
 
-/// Depth of a frame, (H, W), as planned by [`Depth`].
+/// The depth of a frame, (H, W), in the planned [`Depth`] format.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum DepthData<'a> {
     /// f32 in \[0, 1].
     F32(&'a [f32]),
-    /// 65535 is 1.
+    /// u16, where 65535 represents 1.
     U16(&'a [u16]),
 }
 
-/// A frame, borrowed.
+/// A borrowed frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'a> {
-    /// Its colour.
+    /// The colour.
     pub colour: ColourData<'a>,
-    /// Its depth.
+    /// The depth.
     pub depth: DepthData<'a>,
 }
 
 impl<'a> Frame<'a> {
-    /// A planar frame.
+    /// Borrows a planar frame.
     pub fn of(frame: &'a RgbdFrame) -> Self {
         Frame {
             colour: ColourData::Planar(frame.rgb().to_slice().expect("contiguous")),
@@ -70,11 +70,11 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The same frame on the CPU, (`height`, `width`): the twin of the input stage. `orientation` is that of a
-    /// camera's image.
+    /// Converts the frame to (`height`, `width`) on the CPU, as the input stage does. `orientation` applies to a camera
+    /// image.
     ///
     /// # Errors
-    /// [`phasefront_core::runtime::error::Error::Frame`] for data of another size, or values that no frame has.
+    /// Returns [`phasefront_core::runtime::error::Error::Frame`] if the data has another size or invalid values.
     pub fn read(
         &self,
         orientation: Orientation,

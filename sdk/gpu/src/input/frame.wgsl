@@ -1,17 +1,16 @@
-// Channels from colour and depth, each minus the MIDDLE of what the form holds, depth
-// stretched about it, and of a second group the place in the
-// frame. Goes behind pack.wgsl and planar.wgsl or camera.wgsl, which know what `colour` holds.
+// Channels from colour and depth, each minus MIDDLE, with depth stretched about it, and in a second group the position
+// in the frame. Appended to pack.wgsl and to planar.wgsl or camera.wgsl, which read `colour`.
 
 @group(0) @binding(2) var<storage, read> depth: array<u32>;
 
-// The f32 that is nearest to w/65535, which repeats the bits of w behind the point: drivers' divisions are not exact,
-// and a sweep asks for the plane that a pixel belongs to.
+// Returns the f32 nearest to w/65535, whose binary fraction repeats the bits of w. Drivers' divisions are not exact,
+// and the sweep needs the exact plane of each pixel.
 fn normalized(w: u32) -> f32 {
     if (w == 0u) { return 0.0; }
     let bits = (w << 16u) | w;
     let zeros = countLeadingZeros(bits);
     let leading = (bits << zeros) | (w >> (16u - zeros));
-    // A carry out of the mantissa is the exponent's.
+    // A carry out of the mantissa increments the exponent.
     let rounded = (leading >> 8u) + ((leading >> 7u) & 1u);
     return bitcast<f32>(((125u - zeros) << 23u) + rounded);
 }

@@ -1,7 +1,6 @@
-// The input of a chain in 8-bit whole numbers, minus 128, as the first layer and as the last one round it. Goes behind
-// pack.wgsl.
+// Stores the input of an int8 chain minus 128, in the roundings of the first and the last layer. Appended to pack.wgsl.
 
-// The smallest real number that rounds to each u8 value or above, for the first layer and for the last one.
+// The smallest real number that rounds to each u8 value or above, for the first and for the last layer.
 struct Steps { first: array<f32, 256>, last: array<f32, 256> }
 
 @group(0) @binding(4) var<storage, read_write> last: array<u32>;

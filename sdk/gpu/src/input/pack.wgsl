@@ -1,7 +1,7 @@
-// Converts a captured frame to what the chain reads: groups of four channels in the chain's numbers. The header that
-// input.rs writes before this text gives `Value` and the constants in capitals; behind it stand `channels`, which knows
-// where values come from, and `store`, which knows the numbers. Where the chain's layers take squares of two by two
-// pixels as one, SIDE is 2, and the groups of a square's pixels lie behind one another.
+// Converts a captured frame to the input of the chain: groups of four channels in the chain's number format. The header
+// from input.rs defines `Value` and the constants in capitals. input.rs appends `channels`, which reads the source, and
+// `store`, which writes the number format. If the chain's layers treat squares of two by two pixels as one, SIDE is 2,
+// and the groups of a square's pixels follow one another.
 
 struct Frame { width: u32, height: u32, plane: u32, unused: u32 }
 
@@ -15,7 +15,7 @@ fn pack(@builtin(global_invocation_id) at: vec3u) {
     if (at.x >= columns) { return; }
     let place = at.y * columns + at.x;
     for (var pixel = 0u; pixel < SIDE * SIDE; pixel++) {
-        // Of an odd side the last row or column is repeated.
+        // For an odd side the last row or column is repeated.
         let x = min(SIDE * at.x + pixel % SIDE, frame.width - 1u);
         let y = min(SIDE * at.y + pixel / SIDE, frame.height - 1u);
         for (var group = 0u; group < GROUPS; group++) {

@@ -1,4 +1,4 @@
-// Colour from three planes.
+// Reads colour from three planes.
 
 @group(0) @binding(1) var<storage, read> colour: array<f32>;
 

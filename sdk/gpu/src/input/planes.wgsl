@@ -1,4 +1,4 @@
-// Channels from the network's input planes as they are. Goes behind pack.wgsl.
+// Channels from the network's unmodified input planes. Appended to pack.wgsl.
 
 @group(0) @binding(1) var<storage, read> colour: array<f32>;
 

@@ -1,11 +1,11 @@
-//! The rounding of a chain's int8 input as comparisons.
+//! Implements the rounding of a chain's int8 input with comparisons.
 
 use crate::device::{Constants, Device};
 use crate::{GpuError, Result};
 use phasefront_core::method::network::chain::{Chain, Quantisation};
 
-/// The smallest real numbers that round to each u8 value or above, as the first layer and as the last one round their
-/// input: comparisons are exact on every GPU, divisions are not.
+/// Computes the smallest real numbers that round to each u8 value or above, for the first layer's rounding of the input
+/// and for the last layer's. Comparisons are exact on every GPU; divisions are not.
 pub(super) fn steps(device: &Device, chain: &Chain) -> Result<Constants> {
     let rounding = |i: usize| {
         let layer = &chain.layers[i];
@@ -25,10 +25,10 @@ pub(super) fn steps(device: &Device, chain: &Chain) -> Result<Constants> {
     device.table("roundings", bytemuck::cast_slice(&values))
 }
 
-/// For each k of 0 … 255 the smallest number that `rounded`, which never falls, takes to k or above; the largest where
-/// there is none.
+/// For each k of 0 … 255 returns the smallest number that the nondecreasing function `rounded` maps to k or above, or
+/// the largest number if there is none.
 fn thresholds(rounded: impl Fn(f32) -> u8) -> Vec<f32> {
-    // The order of floats as that of integers.
+    // Map floats to integers of the same order.
     let float = |key: i32| f32::from_bits(if key < 0 { !key as u32 | 1 << 31 } else { key as u32 });
     let key = |real: f32| {
         let bits = real.to_bits();

@@ -1,7 +1,7 @@
-// Channels of a seeded network: colour and depth, each minus a half, depth stretched, and the sweep's field u as ½(Re u
-// − ½) and ½ Im u of the three colours; see seeded.rs. Goes behind pack.wgsl.
+// Channels of a seeded network: colour and depth, each minus a half, with depth stretched, and the sweep's field u as
+// ½(Re u − ½) and ½ Im u of the three colours. See seeded.rs. Appended to pack.wgsl.
 
-// Red, green, blue, depth.
+// Red, green, blue and depth.
 @group(0) @binding(1) var<storage, read> surfaces: array<vec4f>;
 @group(0) @binding(2) var<storage, read> seed: array<vec2f>;
 

@@ -1,4 +1,4 @@
-//! Where the input stage reads, and how its program does.
+//! The sources of the input stage and their parts of its program.
 
 use super::camera::Camera;
 use super::frame::{Colour, ColourData, Depth, DepthData, Frame};
@@ -7,33 +7,33 @@ use crate::device::Device;
 use phasefront_core::frame::ColourPlan;
 use phasefront_core::method::network::InputKind;
 
-/// Where a [`super::Packer`] reads.
+/// The source that a [`super::Packer`] reads.
 #[derive(Clone, Copy)]
 pub(crate) enum Source<'a> {
-    /// The network's input planes themselves, f32, of any number, in its own buffer.
+    /// Any number of f32 planes, the network's input, in the packer's own buffer.
     Planes,
-    /// A complex field on the GPU, and how a pre-filter takes it.
+    /// A complex field on the GPU, and the input format of the pre-filter.
     Field(&'a wgpu::Buffer, InputKind),
-    /// A frame's surfaces on the GPU, and the sweep's field of it.
+    /// A frame's surfaces and the sweep's field of that frame, both on the GPU.
     Seeded(&'a wgpu::Buffer, &'a wgpu::Buffer),
-    /// A frame, in its own buffers.
+    /// A frame, in the packer's own buffers.
     Frame(Colour, Depth),
 }
 
-/// How a [`Source`] is read.
+/// The buffers and the program text for a [`Source`].
 pub(super) struct Reader {
-    /// What is constant in the program.
+    /// The constants of the program.
     pub(super) header: String,
-    /// The program's part that knows where values come from.
+    /// The part of the program that reads values from the source.
     pub(super) text: String,
-    /// Planes, a field, surfaces, or colour.
+    /// The planes, the field, the surfaces or the colour.
     pub(super) first: wgpu::Buffer,
-    /// A sweep's field, or depth.
+    /// The sweep's field or the depth.
     pub(super) second: Option<wgpu::Buffer>,
     pub(super) frames: Option<Frames>,
 }
 
-/// What frames come as, where they do.
+/// The formats and buffers of frames.
 pub(super) struct Frames {
     pub(super) formats: (Colour, Depth),
     pub(super) camera: Option<Camera>,
@@ -43,7 +43,7 @@ pub(super) struct Frames {
 }
 
 impl Reader {
-    /// For pixels of so many `channels`.
+    /// Creates a reader of pixels with this number of `channels`.
     pub(super) fn new(device: &Device, source: Source<'_>, channels: usize, size: (usize, usize)) -> Result<Self> {
         let reader = |text: &str, first| Reader {
             header: String::new(),

@@ -1,6 +1,6 @@
-//! The convolution chain on the GPU: one dispatch a layer, or one for two layers and the skip around them where that
-//! is faster on this device. Its twins are [`phasefront_core::method::network::reference`] and the kernels' int8
-//! module.
+//! Runs the convolution chain on the GPU with one dispatch per layer, or one per two layers and the skip around them if
+//! that is faster on the device. Its counterparts are [`phasefront_core::method::network::reference`] and the int8
+//! module of the kernels.
 
 use crate::device::{Constants, Device, Dispatch};
 use crate::input::{ChainInput, Form, Packer, Source};
@@ -11,43 +11,43 @@ use phasefront_core::method::network::{Head, InputKind, Network};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Filters that a thread computes at a time.
+/// The number of filters that a thread computes at a time.
 const BLOCK: usize = 8;
-/// Pixels of a workgroup of `layer` and `last`, columns and rows.
+/// The columns and rows of a workgroup of `layer` and `last`, in pixels.
 const TILE: (usize, usize) = (32, 8);
-/// Pixels a side that a workgroup of `pair` computes of its first layer and of its second.
+/// The side, in pixels, of the first layer's tile in a workgroup of `pair`. The second layer's is [`PAIR_INNER`].
 const PAIR_TILE: usize = 16;
 const PAIR_INNER: usize = 14;
-/// Sums up to this are exact in f32, in which they are multiplied.
+/// The bound up to which sums are exact in f32, in which they are multiplied.
 const LARGEST_SUM: i64 = 1 << 24;
 
-/// How many layers a dispatch computes. The result is the same to the bit.
+/// The number of layers per dispatch. The result is bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fusion {
-    /// Whichever of the two is faster when the plan is made; one on drivers in software.
+    /// The faster of the two, measured when the plan is made. One layer on software drivers.
     #[default]
     Measured,
-    /// One.
+    /// One layer.
     Layers,
-    /// Two and the skip around them, what is between them in workgroup memory.
+    /// Two layers and the skip around them, with the intermediate values in workgroup memory.
     Pairs,
 }
 
-/// How a chain is computed.
+/// The options for computing a chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ChainOptions {
-    /// The numbers of an f32 chain; an int8 chain has its own.
+    /// The number format of an f32 chain. An int8 chain has its own format.
     pub float: Float,
-    /// How many layers a dispatch computes.
+    /// The number of layers per dispatch.
     pub fusion: Fusion,
 }
 
-/// What the last layer writes.
+/// The output of the last layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum End {
     /// The six planes.
     Planes,
-    /// The complex field that they stand for, and its sums by workgroup.
+    /// The complex field that the planes represent, and its sum in each workgroup.
     Field(Head, InputKind),
 }
 
@@ -55,39 +55,39 @@ pub(crate) enum End {
 pub(crate) struct ChainPlan {
     steps: Vec<Dispatch>,
     pub(crate) fusion: Fusion,
-    /// (6, H, W) f32 of [`End::Planes`].
+    /// (6, H, W) f32, the output of [`End::Planes`].
     pub(crate) planes: wgpu::Buffer,
-    /// (3, H, W) complex f32 of [`End::Field`].
+    /// (3, H, W) complex f32, the output of [`End::Field`].
     pub(crate) field: wgpu::Buffer,
-    /// Sums of the field: three complex f32 for each of `parts` workgroups.
+    /// The sums of the field: three complex f32 for each of `parts` workgroups.
     pub(crate) partial: wgpu::Buffer,
     pub(crate) parts: usize,
-    /// What the dispatches read and write, each value once.
+    /// The bytes that the dispatches read and write, counting each value once.
     pub(crate) bytes: usize,
 }
 
-/// What all steps of a chain share while they are made.
+/// The state that all steps of a chain share while they are planned.
 struct Maker<'a> {
     device: &'a Device,
     numbers: Numbers,
-    /// Rows and columns of the layers' own pixels.
+    /// The rows and columns of the layers' pixels.
     size: (usize, usize),
     frame: Constants,
 }
 
-/// A layer's weights in the order in which programs read them, as bytes.
+/// A layer's weights as bytes, in the order in which programs read them.
 struct Packed {
     bytes: Vec<u8>,
     groups: usize,
     beside: usize,
     outputs: usize,
-    /// Of an int8 layer.
+    /// The tables of an int8 layer.
     requantise: Option<Tables>,
-    /// The word of four activations that stand for 0.
+    /// The word of four activations that represent 0.
     zero: u32,
 }
 
-/// What follows an int8 layer's sums; see chain_int8.wgsl.
+/// The tables that an int8 layer applies to its sums. See chain_int8.wgsl.
 struct Tables {
     skip: Vec<f32>,
     relu: Option<Vec<f32>>,
@@ -95,7 +95,7 @@ struct Tables {
 }
 
 impl ChainPlan {
-    /// Plans `chain` for frames of `size` (height, width) from `input`, fused as asked or as is measured to be faster.
+    /// Plans `chain` for frames of `size` (height, width) from `input`, with the given or the measured fusion.
     pub(crate) fn new(
         device: &Device,
         chain: &Chain,
@@ -164,8 +164,8 @@ impl ChainPlan {
             _ => (make(Fusion::Layers)?, Fusion::Layers),
         };
         let input = chain.inputs.div_ceil(GROUP) * pixels * numbers.value_bytes();
-        // Features in and out of each hidden layer and into the last one; skips are read once more where layers are
-        // not fused; the input twice; the end once.
+        // The features are written and read once by each hidden layer, and read by the last layer. Skips are read once
+        // more if layers are not fused. The input is read twice and the output written once.
         let hidden = plan.dispatches() - 1;
         let skips = (1..packed.len()).filter(|&i| Chain::has_skip(i)).count();
         let again = if plan.fusion == Fusion::Pairs { 0 } else { skips };
@@ -177,13 +177,13 @@ impl ChainPlan {
         self.steps.iter().for_each(|step| step.run(pass));
     }
 
-    /// Dispatches a frame.
+    /// Returns the number of dispatches per frame.
     pub(crate) fn dispatches(&self) -> usize {
         self.steps.len()
     }
 }
 
-/// The shortest of three runs, after one that is not counted.
+/// Returns the shortest time of three runs after a warm-up run.
 pub(crate) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
     let run = || {
         let mut encoder = device.inner.create_command_encoder(&Default::default());
@@ -202,14 +202,14 @@ pub(crate) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
     Ok(best)
 }
 
-/// A chain's layers and what they read and write.
+/// A chain's layers and their buffers.
 struct Layers<'a> {
     chain: &'a Chain,
     packed: &'a [Packed],
     input: &'a ChainInput,
-    /// What hidden layers write, in turn.
+    /// The buffers that hidden layers write alternately.
     features: &'a [wgpu::Buffer; 2],
-    /// With what the last layer writes.
+    /// The plan, with the buffers that the last layer writes.
     plan: &'a ChainPlan,
     end: End,
 }
@@ -224,7 +224,7 @@ impl Maker<'_> {
         } = *all;
         let last = packed.len() - 1;
         let mut steps = vec![self.layer(&packed[0], &input.first, &features[0], false)?];
-        // Where the current layer's input lies.
+        // The index of the buffer that holds the current layer's input.
         let mut at = 0;
         let mut i = 1;
         while i < last {
@@ -316,7 +316,7 @@ impl Maker<'_> {
         ]
     }
 
-    /// Bytes of an `Eight`.
+    /// Returns the bytes of an `Eight`.
     fn eight_bytes(&self) -> usize {
         match self.numbers {
             Numbers::F16 => 16,
@@ -324,7 +324,7 @@ impl Maker<'_> {
         }
     }
 
-    /// The program's text up to its entry.
+    /// Returns the program's text up to its entry point.
     fn source(&self, layer: &Packed, weights: &Constants, skip: bool, more: &str) -> String {
         let real = match self.numbers {
             Numbers::F16 => "enable f16;\nalias Real4 = vec4<f16>;\n",
@@ -363,7 +363,7 @@ impl Maker<'_> {
         header + numbers + include_str!("chain.wgsl")
     }
 
-    /// The tables of an int8 layer, in the order that chain_int8.wgsl gives.
+    /// Creates the tables of an int8 layer in the order of chain_int8.wgsl.
     fn tables(&self, layer: &Packed) -> Result<Option<Constants>> {
         let Some(tables) = &layer.requantise else {
             return Ok(None);
@@ -383,7 +383,7 @@ impl Maker<'_> {
     }
 }
 
-/// Groups of a layer's features and of what is concatenated with them.
+/// Returns a layer's feature channels, their groups, and the groups concatenated with them.
 fn groups(chain: &Chain, i: usize, layer: &Layer) -> (usize, usize, usize) {
     let last = i + 1 == chain.layers.len();
     let beside = if last { chain.layers[0].inputs } else { 0 };
@@ -391,8 +391,8 @@ fn groups(chain: &Chain, i: usize, layer: &Layer) -> (usize, usize, usize) {
     (features, features.div_ceil(GROUP), beside.div_ceil(GROUP))
 }
 
-/// Values of a layer's outputs; in the last layer of a halved chain those of each pixel of a square in a block of their
-/// own.
+/// Returns the values of a layer's outputs. In the last layer of a halved chain, each pixel of a square gets its own
+/// block.
 fn by_pixel<T: Copy + Default>(chain: &Chain, i: usize, values: &[T]) -> Vec<T> {
     if !chain.halved || i + 1 < chain.layers.len() {
         return values.to_vec();
@@ -405,7 +405,7 @@ fn by_pixel<T: Copy + Default>(chain: &Chain, i: usize, values: &[T]) -> Vec<T> 
         .collect()
 }
 
-/// The channel of a layer's input that lies at place `k` of a group, if there is one.
+/// Returns the channel of a layer's input at position `k` of a group, if there is one.
 fn channel(features: usize, groups: usize, inputs: usize, group: usize, k: usize) -> Option<usize> {
     match group.checked_sub(groups) {
         None => Some(group * GROUP + k).filter(|&c| c < features),
@@ -478,7 +478,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
                     "sums of layer {i} exceed 24 bits, which f32 holds; the CPU is right"
                 )));
             }
-            // Activations come minus 128.
+            // Activations are stored minus 128.
             bias.push((plain + 128 * total) as i32);
         }
         let mut words: Vec<u32> = bias.iter().map(|&b| b as u32).collect();
@@ -503,7 +503,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
         }
         let after = |factor: f32| -> Vec<f32> { (0..256).map(|v| v as f32 * factor).collect() };
         let skip = layer.requantise.skip;
-        // The features of the last layer's input may be rounded again, and have its zero point.
+        // The features of the last layer's input may be rounded again and have its zero point.
         let next = (i + 1 == last).then(|| {
             let zero = whole.layers[last].zero_point;
             let rounded = |q: u8| match layer.requantise.rescale {
@@ -528,7 +528,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
     Ok(all)
 }
 
-/// A network on the GPU for one frame size: the twin of [`phasefront_core::method::network::NetworkPlan`].
+/// A network on the GPU for one frame size: the counterpart of [`phasefront_core::method::network::NetworkPlan`].
 pub struct GpuNetworkPlan {
     device: Arc<Device>,
     size: (usize, usize),
@@ -542,7 +542,8 @@ impl GpuNetworkPlan {
     /// Prepares `network` for frames of `height` × `width` pixels.
     ///
     /// # Errors
-    /// [`GpuError::Refused`] for numbers or a size that `device` does not have, [`GpuError::OutOfMemory`].
+    /// Returns [`GpuError::Refused`] if `device` does not support the number format or the size, or
+    /// [`GpuError::OutOfMemory`].
     pub fn new(
         device: &Arc<Device>,
         network: &Network,
@@ -569,7 +570,7 @@ impl GpuNetworkPlan {
         })
     }
 
-    /// What it computes in and by how many dispatches.
+    /// Describes the number format, the device and the number of dispatches.
     pub fn describe(&self) -> String {
         format!(
             "{} on {}, {} dispatches",
@@ -579,11 +580,11 @@ impl GpuNetworkPlan {
         )
     }
 
-    /// Runs the network on one frame: `input` planar (C, H, W) as
-    /// [`phasefront_core::method::network::NetworkPlan::run`] takes it, `output` (6, H, W).
+    /// Runs the network on one frame. `input` is planar (C, H, W), as in
+    /// [`phasefront_core::method::network::NetworkPlan::run`], and `output` is (6, H, W).
     ///
     /// # Errors
-    /// A wrong length; [`GpuError::Lost`].
+    /// Returns an error if a length is wrong, or [`GpuError::Lost`].
     pub fn run(&self, input: &[f32], output: &mut [f32]) -> Result<()> {
         let area = self.size.0 * self.size.1;
         if input.len() != self.inputs * area || output.len() != 6 * area {

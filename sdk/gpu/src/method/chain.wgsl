@@ -1,11 +1,12 @@
-// A chain of 3x3 convolutions: the walk. chain_float.wgsl or chain_int8.wgsl, which stand before, know the numbers.
+// The loops of a chain of 3x3 convolutions. chain_float.wgsl or chain_int8.wgsl, before this text, define the number
+// format.
 //
-// Planes lie in groups of four channels: `[group][pixel]`, a `Value` each. A thread computes four pixels of a column
-// for eight filters at a time: neighbouring threads read neighbouring pixels, a value read serves up to three of its
-// pixels, and the weights, the same for all threads, come from uniform memory where they fit. They lie in the order in
-// which they are read: biases, then `[eight filters][column of taps][group][row of taps]`.
+// Planes are stored in groups of four channels, `[group][pixel]`, each a `Value`. A thread computes four pixels of a
+// column for eight filters at a time: neighbouring threads read neighbouring pixels, a value serves up to three of the
+// thread's pixels, and the weights, the same for all threads, are in uniform memory if they fit. They are stored in
+// reading order: biases, then `[eight filters][column of taps][group][row of taps]`.
 
-// Columns, rows and places of what layers compute: pixels, or squares of two by two. Then the frame's own pixels.
+// The layers' columns, rows and their product, in pixels or squares of two by two; then the frame's own pixels.
 struct Frame { width: i32, height: i32, plane: u32, tiles: u32, columns: i32, rows: i32, unused: vec2u }
 struct Totals {
     a0: vec4f, a1: vec4f, a2: vec4f, a3: vec4f, b0: vec4f, b1: vec4f, b2: vec4f, b3: vec4f,
@@ -18,7 +19,7 @@ struct Totals {
 
 fn in_frame(x: i32, y: i32) -> bool { return x >= 0 && x < frame.width && y >= 0 && y < frame.height; }
 
-// A group's value at a pixel: what stands for 0 outside of the frame.
+// Returns a group's value at a pixel, or the value that represents 0 outside the frame.
 fn value_at(group: u32, x: i32, y: i32) -> Value {
     let inside = in_frame(x, y);
     let pixel = u32(select(0, y * frame.width + x, inside));
@@ -28,7 +29,7 @@ fn value_at(group: u32, x: i32, y: i32) -> Value {
     return select(zero(), features[group * frame.plane + pixel], inside);
 }
 
-// The sums of filters 8 block … 8 block + 7 at the pixels (x, y … y + 3).
+// Returns the sums of filters 8 block … 8 block + 7 at the pixels (x, y … y + 3).
 fn sums(block: u32, x: i32, y: i32) -> Totals {
     var w = begun(block);
     for (var kx = 0u; kx < 3u; kx++) {

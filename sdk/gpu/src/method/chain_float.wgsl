@@ -1,15 +1,15 @@
-// The numbers of a chain in floating point. The header that chain.rs writes before this text gives `Real`, `Real4`,
-// HALF, the other constants in capitals and the declaration of `weights`. chain.wgsl follows.
+// The number format of a floating-point chain. The header from chain.rs defines `Real`, `Real4`, HALF, the other
+// constants in capitals and `weights`. chain.wgsl follows.
 //
-// In f16 the products of one column of taps are summed in f16, and the columns in f32; in f32 there is one sum.
+// In f16 the products of one column of taps are summed in f16 and the columns in f32. In f32 there is one sum.
 
 alias Value = Real4;
-// A tap's weights for eight filters, one such a channel.
+// A tap's weights for eight filters, one word for each channel.
 const WORDS: u32 = 4u;
-// What stands before a layer's weights: its biases.
+// The words before a layer's weights: its biases.
 const HEADER: u32 = BLOCKS;
 
-// Sums of eight filters (a: 0 to 3, b: 4 to 7) for four pixels, and in f16 the totals that they are added to.
+// The sums of eight filters (a: 0 to 3, b: 4 to 7) for four pixels, and in f16 the totals that they are added to.
 struct Work {
     a0: Real4, a1: Real4, a2: Real4, a3: Real4, b0: Real4, b1: Real4, b2: Real4, b3: Real4, total: Totals,
 }
@@ -89,10 +89,10 @@ fn ended(w: Work, at: u32) -> Totals {
     );
 }
 
-// What the next layer reads of a layer's sums, without a skip and with one.
+// Convert a layer's sums to the next layer's input, without a skip and with one.
 fn activation(v: vec4f) -> Value { return Real4(max(v, vec4f(0))); }
 fn residual(v: vec4f, skip: Value) -> Value { return Real4(max(v, vec4f(0)) + vec4f(skip)); }
 fn following(v: Value) -> Value { return v; }
 
-// The network's input, which its correction is added to.
+// Returns the network's input, to which its correction is added.
 fn base(at: u32) -> vec4f { return vec4f(beside[at]); }

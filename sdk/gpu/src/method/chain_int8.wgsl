@@ -1,20 +1,19 @@
-// The numbers of a chain in 8-bit whole numbers: the bits of `phasefront-kernels`' int8 module. The header that
-// chain.rs writes before this text gives the constants in capitals and the declaration of `weights`. chain.wgsl
-// follows.
+// The number format of an int8 chain, bit-identical to the int8 module of `phasefront-kernels`. The header from
+// chain.rs defines the constants in capitals and `weights`. chain.wgsl follows.
 //
-// A word holds four activations minus 128, so that they are signed as the weights are; the biases give it back. What
-// follows the sums is one multiplication, an addition and roundings, each product of the latter from a table: so no
-// driver can fuse two operations into one of other bits.
+// A word holds four activations minus 128, so that they are signed like the weights. The biases compensate for this.
+// The sums are followed by one multiplication, an addition and roundings. The products of the roundings come from
+// tables, so that no driver can fuse two operations and change the result.
 
 alias Value = u32;
 // A tap's weights for eight filters, four channels in each word.
 const WORDS: u32 = 1u;
-// What stands before a layer's weights: its biases, then the bits of its multipliers.
+// The words before a layer's weights: its biases, then the bits of its multipliers.
 const HEADER: u32 = 2u * BLOCKS;
 const SIGN: u32 = 0x80808080u;
 
 struct Work { a0: vec4i, a1: vec4i, a2: vec4i, a3: vec4i, b0: vec4i, b1: vec4i, b2: vec4i, b3: vec4i }
-// Of each u8 value: the skip's share, the rounded ReLU's share, and the value as the next layer reads it.
+// For each u8 value: the skip's share, the rounded ReLU's share, and the value as the next layer reads it.
 struct Tables { skip: array<f32, 256>, relu: array<f32, 256>, next: array<u32, 256> }
 
 @group(0) @binding(8) var<storage, read> tables: Tables;
@@ -65,7 +64,7 @@ fn packed(q: vec4u) -> u32 { return (q.x | (q.y << 8u) | (q.z << 16u) | (q.w << 
 
 fn saturated(v: vec4f) -> vec4u { return vec4u(round(clamp(v, vec4f(0), vec4f(255)))); }
 
-// What the next layer reads of a layer's scaled sums, without a skip and with one.
+// Convert a layer's scaled sums to the next layer's input, without a skip and with one.
 fn activation(v: vec4f) -> Value { return packed(saturated(v)); }
 
 fn residual(v: vec4f, skip: Value) -> Value {
@@ -81,7 +80,7 @@ fn residual(v: vec4f, skip: Value) -> Value {
     return packed(saturated(a + share));
 }
 
-// The second rounding of what the concatenation reads.
+// Applies the second rounding before the concatenation.
 fn following(v: Value) -> Value {
     if (!NEXT) { return v; }
     let q = v ^ SIGN;
@@ -90,5 +89,5 @@ fn following(v: Value) -> Value {
     ));
 }
 
-// The network's input, which its correction is added to.
+// Returns the network's input, to which its correction is added.
 fn base(at: u32) -> vec4f { return image[at]; }

@@ -1,8 +1,8 @@
-// The last layer and what becomes of its six planes: the planes themselves, or the complex field that they stand for,
-// with each workgroup's sum of it for the mean phase. Goes behind chain.wgsl or chain_int8.wgsl, whose `sums` gives
-// the planes as t.a… (0 to 3) and t.b… (4 and 5). HEAD: 0 planes, 1 amplitude and phase, 2 correction of the image,
-// 3 correction of a field, 4 correction of a seed. Where layers compute squares, SIDE is 2, and each of a square's
-// pixels has a block of filters, and groups of the input, of its own.
+// The last layer, which writes its six planes or the complex field that they represent, with each workgroup's sum of
+// the field for the mean phase. Appended to chain.wgsl, whose `sums` returns the planes as t.a… (0 to 3) and t.b… (4
+// and 5). HEAD: 0 planes, 1 amplitude and phase, 2 correction of the image, 3 correction of a field, 4 correction of a
+// seed, 5 correction of a field in two parts. If layers compute squares, SIDE is 2, and each of a square's pixels has
+// its own block of filters and its own groups of the input.
 
 @group(0) @binding(5) var<storage, read_write> planes: array<f32>;
 @group(0) @binding(6) var<storage, read_write> field: array<vec2f>;
@@ -12,12 +12,12 @@ const THREADS: u32 = 64u;
 
 var<workgroup> shared_sums: array<vec2f, 3u * THREADS>;
 
-// tanh to 3e-7: drivers promise less. 1 − 2/(e^2x + 1), beyond ±10 it is ±1.
+// Computes tanh to 3e-7, which drivers do not guarantee, as 1 − 2/(e^2x + 1). Beyond ±10 it is ±1.
 fn tanh4(x: vec4f) -> vec4f {
     return 1.0 - 2.0 / (exp2(clamp(x, vec4f(-10), vec4f(10)) * 2.885390081777927) + 1.0);
 }
 
-// (cos πt, sin πt) to 2e-7, which drivers do not promise either; see head.rs.
+// Computes (cos πt, sin πt) to 2e-7, which drivers do not guarantee either. See head.rs.
 fn direction(t: f32) -> vec2f {
     let k = round(2.0 * t);
     let r = t - 0.5 * k;
@@ -31,7 +31,7 @@ fn direction(t: f32) -> vec2f {
     return select(v, -v, (quarter & 2) == 2);
 }
 
-// `pixel` of the square at (place_x, place_y).
+// Writes `pixel` of the square at (place_x, place_y).
 fn finish(thread: u32, pixel: i32, place_x: i32, place_y: i32, low: vec4f, high: vec4f) {
     if (place_x >= frame.width || place_y >= frame.height) { return; }
     let x = SIDE * place_x + pixel % SIDE;
@@ -70,19 +70,19 @@ fn finish(thread: u32, pixel: i32, place_x: i32, place_y: i32, low: vec4f, high:
         var re = first;
         var im = second;
         if (HEAD == 2u) {
-            // Colours come in minus a half.
+            // The input holds colours minus a half.
             re += base(input).xyz + 0.5;
         } else if (HEAD == 3u) {
             re += base(input).xyz;
             im += vec3f(base(input).w, base(frame.plane + input).xy);
         } else if (HEAD == 5u) {
-            // A field in two parts.
+            // The field is in two parts.
             let second = base(frame.plane + input);
             let third = base(2u * frame.plane + input);
             re += base(input).xyz + vec3f(second.zw, third.x) / REMAINDER_GAIN;
             im += vec3f(base(input).w, second.xy) + third.yzw / REMAINDER_GAIN;
         } else {
-            // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
+            // The input holds a seed u as ½(Re u − ½) and ½ Im u, after RGB-D.
             let seed = base(frame.plane + input);
             re += 2.0 * seed.xyz + 0.5;
             im += 2.0 * vec3f(seed.w, base(2u * frame.plane + input).xy);

@@ -1,10 +1,10 @@
-// A hidden layer by itself. Goes behind chain.wgsl.
+// A single hidden layer. Appended to chain.wgsl.
 
 fn put(group: u32, x: i32, y: i32, v: vec4f) {
     if (y < frame.height && group < GROUPS_OUT) {
         let at = group * frame.plane + u32(y * frame.width + x);
         if (SKIP) {
-            // The skip's value lies where the result goes, and only this thread touches it.
+            // The skip's value is at the result's position, and only this thread accesses it.
             result[at] = following(residual(v, result[at]));
         } else {
             result[at] = following(activation(v));

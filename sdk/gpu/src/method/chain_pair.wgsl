@@ -1,8 +1,8 @@
-// Two hidden layers and the skip around them in one dispatch: what is between them stays in workgroup memory. A tile of
-// 16x16 pixels of the first layer gives 14x14 of the second; the rim is computed again by the neighbouring tiles. Goes
-// behind chain.wgsl; the second layer's weights lie behind the first's.
+// Two hidden layers and the skip around them in one dispatch. Intermediate values stay in workgroup memory. A tile of
+// 16x16 pixels of the first layer gives 14x14 of the second; the neighbouring tiles compute the rim again. Appended to
+// chain.wgsl. The second layer's weights follow the first's.
 
-// EACH: where the second layer's weights begin.
+// EACH is the offset of the second layer's weights.
 const TILE: i32 = 16;
 const INNER: i32 = 14;
 
@@ -19,7 +19,7 @@ fn kept(group: u32, column: i32, row: i32) -> Value {
     return between[(i32(group) * TILE + min(row, TILE - 1)) * TILE + min(column, TILE - 1)];
 }
 
-// As `sums`, of the second layer, for the tile's pixels (x, y … y + 3), whose taps begin there.
+// Returns `sums` of the second layer for the tile's pixels (x, y … y + 3). The taps begin at (x, y).
 fn inner_sums(block: u32, x: i32, y: i32) -> Totals {
     var w = begun(EACH + block);
     for (var kx = 0u; kx < 3u; kx++) {

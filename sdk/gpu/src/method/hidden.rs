@@ -1,24 +1,24 @@
-//! Hidden surfaces on the GPU: the twin of [`phasefront_core::method::sweep::hidden`], to the bit.
+//! Finds hidden surfaces on the GPU: the bit-identical counterpart of [`phasefront_core::method::sweep::hidden`].
 
 use crate::Result;
 use crate::device::{Device, Dispatch};
 use phasefront_core::method::sweep::hidden::JUMP;
 
-/// Pixels that a thread finds the sources of, in a line.
+/// The number of pixels in a line for which a thread finds the sources.
 const PART: usize = 64;
-/// Lines of a workgroup.
+/// The lines of a workgroup.
 const LINES: usize = 64;
 
-/// A search for one frame size: a dispatch for each side.
+/// A search for one frame size, with one dispatch for each side.
 pub(crate) struct Search {
     sides: [Dispatch; 4],
-    /// (2, H, W): the pixels that hidden layers continue, as [`phasefront_core::method::sweep::hidden::Hidden::find`]
-    /// gives them.
+    /// (2, H, W): the pixels that hidden layers continue, as in
+    /// [`phasefront_core::method::sweep::hidden::Hidden::find`].
     pub(crate) sources: wgpu::Buffer,
 }
 
 impl Search {
-    /// In the depth of `surfaces`, (H, W) of red, green, blue and depth, as far as `reach` pixels.
+    /// Plans a search in the depth of `surfaces`, (H, W) of red, green, blue and depth, up to `reach` pixels away.
     pub(crate) fn new(
         device: &Device,
         surfaces: &wgpu::Buffer,
@@ -28,7 +28,8 @@ impl Search {
         let area = height * width;
         let sources = device.buffer("hidden surfaces", 8 * area)?;
         let (h, w) = (height as i32, width as i32);
-        // How many lines there are, pixels of each, where the first begins, the steps from line to line and along it.
+        // The number of lines, the pixels of each, the start of the first, the strides from line to line and along a
+        // line.
         let side = |first: bool, lines: usize, length: usize, origin: i32, line: i32, step: i32| {
             let counts = [lines, length, area, width].map(|n| n as u32);
             let places = [origin, line, step, 0];
@@ -64,7 +65,7 @@ impl Search {
         self.sides.iter().for_each(|side| side.run(pass));
     }
 
-    /// Dispatches a frame.
+    /// Returns the number of dispatches per frame.
     pub(crate) fn dispatches(&self) -> usize {
         self.sides.len()
     }
@@ -77,7 +78,7 @@ mod tests {
     use crate::device::testing::{device, run};
     use phasefront_core::method::sweep::hidden::{Hidden, NOTHING, reference};
 
-    /// Depths with edges, some blurred, and with noise at every pixel.
+    /// Creates depths with edges, some of them blurred, and with noise at every pixel.
     fn depths((height, width): (usize, usize)) -> Vec<Vec<f32>> {
         let mut state = 1u32;
         let mut random = move || {
@@ -95,7 +96,7 @@ mod tests {
         vec![
             (0..height * width).map(edges).collect(),
             (0..height * width).map(|_| random()).collect(),
-            // Jumps just as large as one that counts.
+            // Jumps exactly at the threshold.
             (0..height * width).map(|i| 0.3 + JUMP * ((i * 7) % 5) as f32).collect(),
             vec![0.25; height * width],
         ]
@@ -119,7 +120,7 @@ mod tests {
                 let search = device
                     .guarded(|| Search::new(&device, &surfaces.buffer, size, reach))
                     .unwrap();
-                // Twice: what one frame leaves behind must not reach the next.
+                // Two runs, because the state that one frame leaves must not affect the next.
                 run(&device, |pass| {
                     search.run(pass);
                     search.run(pass);

@@ -1,28 +1,28 @@
-// The surfaces that a frame does not show, from one side of its pixels: the twin of sweep/hidden.rs, to the bit. A
-// thread walks a part of a line, away from that side, from so far before it that what it finds is what the whole line
-// would give. The header that hidden.rs writes before this text gives REACH, PART, JUMP and FIRST.
+// Finds the hidden surfaces of a frame from one side of its pixels: the bit-identical counterpart of sweep/hidden.rs. A
+// thread walks a part of a line away from that side. It starts far enough before the part to find the same sources as a
+// walk along the whole line. The header from hidden.rs defines REACH, PART, JUMP and FIRST.
 
 struct Walk {
-    // Lines, and pixels of each; pixels of the frame, and of its rows.
+    // The number of lines, the pixels of a line, of the frame and of its rows.
     lines: u32, length: u32, area: u32, width: u32,
-    // Where the first line begins, from line to line, and from pixel to pixel.
+    // The start of the first line, and the strides from line to line and from pixel to pixel.
     origin: i32, line: i32, step: i32, unused: i32,
 }
 
-// A source on one side of a pixel: its depth, and how far away it is.
+// A source on one side of a pixel: its depth and its distance.
 struct Source { depth: f32, distance: u32 }
 
-// The sources on one side of a pixel, and whether the next pixel there is a jump deeper.
+// The sources on one side of a pixel, and whether the next pixel there is deeper by more than a jump.
 struct Found { near: Source, far: Source, edge: bool }
 
 @group(0) @binding(0) var<uniform> walk: Walk;
-// Red, green, blue, depth.
+// Red, green, blue and depth.
 @group(0) @binding(1) var<storage, read> surfaces: array<vec4f>;
-// Of two hidden layers.
+// The sources of two hidden layers.
 @group(0) @binding(2) var<storage, read_write> sources: array<u32>;
 
 const NOTHING: u32 = 0xffffffffu;
-// Not deeper than anything.
+// A value that is not deeper than any depth.
 const NO_DEPTH: f32 = -1.0;
 
 fn none() -> Source { return Source(NO_DEPTH, 0u); }
@@ -31,13 +31,13 @@ fn aged(source: Source) -> Source {
     return Source(select(NO_DEPTH, source.depth, source.distance < REACH), source.distance + 1u);
 }
 
-// From the sources of the neighbour on that side, and the neighbour's own depth, to those of a pixel of `depth`.
+// Returns the sources of a pixel of `depth`, from the sources and the depth of its neighbour on that side.
 fn next(found: Found, neighbour: f32, depth: f32) -> Found {
     let near = aged(found.near);
     let far = aged(found.far);
     let least = depth + JUMP;
     var result = Found(none(), none(), neighbour > least);
-    // A neighbour at an edge itself is a pixel of a blurred one, of neither surface.
+    // A neighbour that is itself at an edge belongs to a blurred edge, not to a surface.
     if (neighbour > least && !found.edge) {
         result.near = Source(neighbour, 1u);
         if (near.depth > neighbour + JUMP) {
@@ -54,7 +54,7 @@ fn next(found: Found, neighbour: f32, depth: f32) -> Found {
     return result;
 }
 
-// What is known of a pixel's hidden layer by its source.
+// Returns the depth and the distance of a hidden layer's source.
 fn known(source: u32, pixel: u32) -> Source {
     if (source == NOTHING) { return Source(NO_DEPTH, NOTHING); }
     let place = vec2i(vec2u(source % walk.width, source / walk.width));
@@ -62,7 +62,7 @@ fn known(source: u32, pixel: u32) -> Source {
     return Source(surfaces[source].w, u32(away.x + away.y));
 }
 
-// Takes what a side has found into a pixel's hidden layers.
+// Adds the sources found on one side to a pixel's hidden layers.
 fn add(found: Found, pixel: u32) {
     var index = array<u32, 2>(sources[pixel], sources[walk.area + pixel]);
     var first = known(index[0], pixel);
@@ -97,7 +97,7 @@ fn search(@builtin(global_invocation_id) at: vec3u) {
     let origin = walk.origin + i32(at.x) * walk.line;
     var found = Found(none(), none(), false);
     var neighbour = 0.0;
-    // The first pixel has nothing behind it: it is the neighbour of the next.
+    // The first pixel has no predecessor: it serves only as the neighbour of the next.
     for (var i = 0u; i <= PART + REACH; i++) {
         let t = i32(at.y * PART + i) - i32(REACH) - 1;
         if (t < 0) { continue; }

@@ -1,9 +1,9 @@
-//! The plane sweep on the GPU, several planes a dispatch: the twin of [`phasefront_core::method::sweep`], whose filters
-//! it has.
+//! Runs the plane sweep on the GPU, several planes per dispatch: the counterpart of [`phasefront_core::method::sweep`],
+//! with the same filters.
 //!
-//! What it reads and writes stays on the device: red, green, blue and depth of each pixel in, the hologram's field out.
-//! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged
-//! steps, only the tiles are passed over here in which there is neither light nor a point yet.
+//! Input and output stay on the device: red, green, blue and depth of each pixel in, the hologram's field out. Every
+//! step runs separately on the whole frame and a black border. The CPU saves work with tiles and merged steps; this
+//! version only skips tiles that contain neither light nor points yet.
 
 use crate::device::{Device, Dispatch};
 use crate::method::chain::time;
@@ -12,41 +12,42 @@ use crate::{GpuError, Result};
 use phasefront_core::display::Display;
 use phasefront_core::method::sweep::{self, MARGIN, SweepPlan};
 
-/// Columns and rows of a tile with its halo: complex f32 that fit the workgroup memory of every GPU, 16 KiB.
+/// The columns and rows of a tile with its halo. Its complex f32 fit the workgroup memory of every GPU, 16 KiB.
 const TILE: (usize, usize) = (48, 40);
-/// Rows of a thread in sweep.wgsl.
+/// The rows of a thread in sweep.wgsl.
 const EACH: usize = 8;
-/// Pixels of a workgroup of the other programs.
+/// The columns of a workgroup of the other programs.
 const COLUMNS: usize = 64;
 const HOME_ROWS: usize = 4;
 
 /// A sweep for one frame size, ready to run.
 pub(crate) struct Sweeper {
-    /// None without hidden layers.
+    /// `None` without hidden layers.
     search: Option<Search>,
-    /// Which planes hold each pixel's points, then all planes.
+    /// The dispatch that finds the planes of each pixel's points, then the dispatches of all planes.
     steps: Vec<Dispatch>,
     home: [Dispatch; 2],
-    /// How many planes a dispatch does.
+    /// The number of planes per dispatch.
     pub(crate) together: usize,
-    /// Where the field stands, metres from the midpoint toward the viewer.
+    /// The field's position in metres from the midpoint toward the viewer.
     pub(crate) z_m: f64,
     /// (3, H, W) complex f32.
     pub(crate) field: wgpu::Buffer,
-    /// Sums of the field: three complex f32 for each of `parts` workgroups.
+    /// The sums of the field: three complex f32 for each of `parts` workgroups.
     pub(crate) partial: wgpu::Buffer,
     pub(crate) parts: usize,
-    /// What the dispatches read and write, each value once.
+    /// The bytes that the dispatches read and write, counting each value once.
     pub(crate) bytes: usize,
 }
 
 impl Sweeper {
-    /// The twin of `plan`, which is for `display`, of a frame's `surfaces`: (H, W) of red, green, blue and depth, f32.
+    /// Plans the sweep of `plan`, made for `display`, on a frame's `surfaces`: (H, W) of red, green, blue and depth,
+    /// f32.
     pub(crate) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
         Self::planned(device, plan, display, surfaces, !device.is_software())
     }
 
-    /// With as many planes a dispatch as are measured to be faster, or as there is room for.
+    /// Plans the sweep with the number of planes per dispatch that is measured to be faster, or the most that fit.
     fn planned(
         device: &Device,
         plan: &SweepPlan,
@@ -77,7 +78,7 @@ impl Sweeper {
             device,
             plan,
             surfaces,
-            // Without hidden layers nobody reads their sources.
+            // Without hidden layers the sources are not read.
             sources: search.as_ref().map_or(surfaces, |search| &search.sources),
             points: &device.buffer("points", 4 * area)?,
             border,
@@ -98,7 +99,7 @@ impl Sweeper {
         let partial = device.buffer("sums", 24 * tiles.0 * tiles.1)?;
         let home = maker.home([last, other, &field], &partial)?;
         let searched = match search {
-            // Each side reads depth; what it finds is written once.
+            // Each side reads depth. The sources are counted once.
             Some(_) => (4 * 16 + 8) * area,
             None => 0,
         };
@@ -124,13 +125,13 @@ impl Sweeper {
         way.for_each(|step| step.run(pass));
     }
 
-    /// Dispatches a frame.
+    /// Returns the number of dispatches per frame.
     pub(crate) fn dispatches(&self) -> usize {
         self.search.as_ref().map_or(0, Search::dispatches) + self.steps.len() + self.home.len()
     }
 }
 
-/// What the dispatches of a sweep share while they are made.
+/// The state that the dispatches of a sweep share while they are planned.
 struct Maker<'a> {
     device: &'a Device,
     plan: &'a SweepPlan,
@@ -151,7 +152,7 @@ impl Maker<'_> {
         )
     }
 
-    /// Which planes hold each pixel's points.
+    /// Plans the dispatch that finds the planes of each pixel's points.
     fn points(&self) -> Result<Dispatch> {
         let (height, width) = self.plan.shape();
         let frame = [width, height, height * width, 0].map(|n| n as u32);
@@ -167,8 +168,8 @@ impl Maker<'_> {
         program.on(self.device, &arguments, [width.div_ceil(COLUMNS), height, 1])
     }
 
-    /// The faster of one plane and `most` planes a dispatch, on a frame that is lit everywhere from its last plane on:
-    /// white rows there, one in each tile at least.
+    /// Returns the faster of one plane and `most` planes per dispatch. The test frame is lit everywhere from its last
+    /// plane on: it has white rows there, at least one in each tile.
     fn faster(&self, most: usize, fields: &[wgpu::Buffer; 2]) -> Result<(Vec<Dispatch>, usize)> {
         let (height, width) = self.plan.shape();
         let row = vec![[1.0f32; 4]; width];
@@ -183,8 +184,8 @@ impl Maker<'_> {
         })
     }
 
-    /// Each pixel's points, then all planes, so many `together`, from the first field to the second and back. The first
-    /// dispatch begins behind the last plane where they do not divide.
+    /// Plans the points of each pixel, then all planes, `together` per dispatch, alternating between the two fields. If
+    /// the count is not a multiple, the first dispatch starts behind the last plane.
     fn steps(&self, together: usize, fields: &[wgpu::Buffer; 2]) -> Result<Vec<Dispatch>> {
         let (device, sweep) = (self.device, self.plan.sweep());
         let radius = sweep.taps / 2;
@@ -227,8 +228,8 @@ impl Maker<'_> {
         std::iter::once(self.points()).chain(crossings).collect()
     }
 
-    /// The way home: rows from the first of `fields` to the second, columns from there to the third, whose sums go to
-    /// `partial`.
+    /// Plans the propagation to the hologram: rows from the first of `fields` to the second, columns from the second to
+    /// the third, with sums to `partial`.
     fn home(&self, fields: [&wgpu::Buffer; 3], partial: &wgpu::Buffer) -> Result<[Dispatch; 2]> {
         let device = self.device;
         let filters = self.plan.filters();
@@ -264,8 +265,8 @@ impl Maker<'_> {
 /// The longest radius of a step that leaves enough of a tile.
 const MOST_RADIUS: usize = TILE.1 / 4;
 
-/// The most planes of a dispatch: each costs a halo more, and saves that the field is read and written. As many as
-/// leave a quarter of the tile; None where one leaves less.
+/// Returns the most planes per dispatch. Each adds a halo and saves a read and a write of the field. At least a quarter
+/// of the tile must remain; returns `None` if one plane leaves less.
 fn most_together(radius: usize) -> Option<usize> {
     let left = |planes: usize| {
         let halo = 2 * radius * planes;
@@ -274,8 +275,9 @@ fn most_together(radius: usize) -> Option<usize> {
     (1..).take_while(|&planes| 4 * left(planes) >= TILE.0 * TILE.1).last()
 }
 
-/// Pixels of black around the frame. Light that has left it at plane k has come from no farther than it spreads from
-/// the last plane, and must come back on the way to plane 0 and from there to the hologram to matter.
+/// Returns the width in pixels of the black border around the frame. Light outside the frame at plane k can come only
+/// from as far as it spreads from the last plane, and matters only if it returns on the way to plane 0 and the
+/// hologram.
 fn border(plan: &SweepPlan, display: &Display) -> Result<usize> {
     let sweep = plan.sweep();
     let optics = sweep::optics(display, &sweep, plan.z_m())?;
@@ -288,8 +290,8 @@ fn border(plan: &SweepPlan, display: &Display) -> Result<usize> {
     Ok(widest.unwrap_or(0) + MARGIN)
 }
 
-/// Filters of three colours as programs read them, up to `radius`: four f32 a tap, what points carry in the first one's
-/// third.
+/// Packs the filters of three colours up to `radius` for the programs: four f32 per tap, with the carry of points in
+/// the third value of the first tap.
 fn packed<'a>(colours: impl Iterator<Item = (f32, &'a [[f32; 2]])>, radius: usize) -> Vec<u8> {
     let all: Vec<[f32; 4]> = colours
         .flat_map(|(carry, taps)| {
@@ -312,7 +314,7 @@ mod tests {
     use phasefront_core::frame::RgbdFrame;
     use phasefront_core::method::sweep::{Sweep, reference};
 
-    /// A small volume, so that the naive oracle has little black to carry around.
+    /// Returns a display with a small volume, so that the direct reference needs only a small border.
     fn small() -> Display {
         Display::from_toml("volume_depth_mm = 1.5").unwrap()
     }
@@ -327,7 +329,7 @@ mod tests {
         }
     }
 
-    /// Fine colour, and depth as `depth` gives it.
+    /// Creates a frame with fine colour detail and the depth that `depth` returns.
     fn frame((height, width): (usize, usize), depth: fn(usize, usize) -> f32) -> RgbdFrame {
         let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
             ((c * 5 + y * 3 + x * x + y * x) % 11) as f32 / 10.0
@@ -336,7 +338,7 @@ mod tests {
         RgbdFrame::new(rgb, depth).unwrap()
     }
 
-    /// Surfaces with sharp edges, one of them slanted, on the bounds between planes too.
+    /// Returns depths with sharp edges, one of them slanted, some exactly on the bounds between planes.
     fn scene(y: usize, x: usize) -> f32 {
         match (y / 13 + 2 * (x / 17)) % 5 {
             0 => 0.1,
@@ -347,7 +349,7 @@ mod tests {
         }
     }
 
-    /// Another depth at each pixel.
+    /// Returns a different depth for each pixel.
     fn noise(y: usize, x: usize) -> f32 {
         let mixed = (y as u32 * 7919 + x as u32 * 104_729).wrapping_mul(2_654_435_761);
         (mixed >> 8) as f32 / (1 << 24) as f32
@@ -366,7 +368,7 @@ mod tests {
             .guarded(|| Sweeper::planned(&device, plan, display, &surfaces, measured))
             .unwrap();
         (device.queue).write_buffer(&surfaces, 0, bytemuck::cast_slice(&values));
-        // Twice: what one frame leaves behind must not reach the next.
+        // Two runs, because the state that one frame leaves must not affect the next.
         run(&device, |pass| {
             sweeper.run(pass);
             sweeper.run(pass);
@@ -382,7 +384,7 @@ mod tests {
         field
     }
 
-    /// Against the definition.
+    /// Compares the sweep with its definition.
     #[test]
     fn the_sweep_is_its_oracle() {
         let depths: [fn(usize, usize) -> f32; 6] = [
@@ -437,7 +439,7 @@ mod tests {
         }
     }
 
-    /// Against the CPU, at the default volume and on other displays.
+    /// Compares the sweep with the CPU, at the default volume and on other displays.
     #[test]
     fn whole_frames_are_those_of_the_cpu() {
         let default = Display::default();

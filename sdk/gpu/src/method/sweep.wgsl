@@ -1,26 +1,26 @@
-// Several planes of the sweep, the farthest first, for one colour in one tile: the step from the plane behind along
-// rows and columns, then the plane's points, which replace the field where they are, then the light of those that lie
-// before or behind the plane. A tile comes with a halo into workgroup memory, and what is right of it shrinks by RADIUS
-// a step until its middle is left. The header that sweep.rs writes before this text gives the constants in capitals; a
-// thread has EACH rows of a column.
+// Sweeps several planes, the farthest first, for one colour in one tile. For each plane it applies the step from the
+// plane behind along rows and columns, then sets the plane's points, which replace the field, then adds the light of
+// points before or behind the plane. A tile is loaded with a halo into workgroup memory, and its valid part shrinks by
+// RADIUS per step until its middle remains. The header from sweep.rs defines the constants in capitals. A thread
+// computes EACH rows of a column.
 
 struct Frame {
     width: u32, height: u32,
-    // Black around the frame, for light that leaves it and comes back.
+    // The black border around the frame, for light that leaves it and returns.
     border: u32,
-    // The first plane that is done here; behind the last one there is no light.
+    // The first plane of this dispatch. Behind the last plane there is no light.
     first: u32,
 }
-// What a point gives to its neighbours (see Filters::carry), in the first value's z; the filter's centre, then the taps
-// at distances 1, 2 …, complex.
+// The filter's centre, then the taps at distances 1, 2 …, complex. The first value's z is the share that a point gives
+// to its neighbours (see Filters::carry).
 struct Colour { taps: array<vec4f, RADIUS + 1> }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> colours: array<Colour, 3>;
-// Red, green, blue, depth.
+// Red, green, blue and depth.
 @group(0) @binding(2) var<storage, read> surfaces: array<vec4f>;
 @group(0) @binding(3) var<storage, read> sources: array<u32>;
-// The planes of each pixel's points; see sweep_points.wgsl.
+// The planes of each pixel's points. See sweep_points.wgsl.
 @group(0) @binding(4) var<storage, read> points: array<u32>;
 @group(0) @binding(5) var<storage, read> behind: array<vec2f>;
 @group(0) @binding(6) var<storage, read_write> result: array<vec2f>;
@@ -29,13 +29,13 @@ const HALO: u32 = RADIUS * PLANES;
 const LIT: u32 = 0x80000000u;
 
 var<workgroup> tile: array<vec2f, COLUMNS * ROWS>;
-// A bit for each plane that has points here, and LIT where light comes from behind.
+// A bit for each plane that has points here, and LIT if light comes from behind.
 var<workgroup> marks: atomic<u32>;
 var<workgroup> marked: u32;
 
 fn times(a: vec2f, b: vec2f) -> vec2f { return vec2f(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 
-// The plane of a pixel's point of a layer, 0 what is seen.
+// Returns the plane of a pixel's point in a layer. Layer 0 is the visible surface.
 fn plane_of(word: u32, layer: u32) -> u32 {
     if (layer == 0u) { return word & 1023u; }
     return (word >> (11u * layer - 1u)) & 2047u;
@@ -51,14 +51,14 @@ fn cross_planes(
     let x = thread.x;
     let y = thread.y * EACH;
     let area = frame.width * frame.height;
-    // The field is the frame and its border; all of it lies right of and below 0 by HALO.
+    // The field is the frame and its border, offset to the right and down by HALO.
     let width = frame.width + 2u * frame.border;
     let height = frame.height + 2u * frame.border;
     let at_x = group.x * (COLUMNS - 2u * HALO) + x;
     let at_y = group.y * (ROWS - 2u * HALO) + y;
     let in_field_x = at_x >= HALO && at_x < width + HALO;
     let in_frame_x = at_x >= HALO + frame.border && at_x < HALO + frame.border + frame.width;
-    // The thread's first pixel; where it lies beside the frame, nobody asks for it.
+    // The index of the thread's first pixel, which is not used if it is outside the frame.
     let own = (at_y - HALO - frame.border) * frame.width + at_x - HALO - frame.border;
 
     if (index == 0u) { atomicStore(&marks, 0u); }
@@ -74,7 +74,7 @@ fn cross_planes(
         }
         if (any(v[i] != vec2f(0))) { own_marks |= LIT; }
         tile[(y + i) * COLUMNS + x] = v[i];
-        // Beside the frame, a plane that is not done here.
+        // Outside the frame, use a plane that is not in this dispatch.
         planes[i] = 0xfffffc00u | ((frame.first + 1u) & 1023u);
         if (in_frame_x && row >= HALO + frame.border && row < HALO + frame.border + frame.height) {
             planes[i] = points[own + i * frame.width];
@@ -89,10 +89,10 @@ fn cross_planes(
     if (index == 0u) { marked = atomicLoad(&marks); }
     let held = workgroupUniformLoad(&marked);
 
-    // Without light and points all stays dark.
+    // Without light and points the tile stays dark.
     if (held != 0u) {
         for (var step = 0u; step < PLANES; step++) {
-            // Along the row. What reads beyond the tile is not right any more.
+            // Along the row. Pixels whose taps extend beyond the tile become invalid.
             for (var i = 0u; i < EACH; i++) { v[i] = times(colours[colour].taps[0].xy, v[i]); }
             for (var j = 1u; j <= RADIUS; j++) {
                 let tap = colours[colour].taps[j].xy;
@@ -116,7 +116,7 @@ fn cross_planes(
                     v[i] += times(colours[colour].taps[j].xy, column[i + RADIUS - j] + column[i + RADIUS + j]);
                 }
             }
-            // The plane's points, what is seen last.
+            // The plane's points, with the visible surface last.
             let plane = frame.first - step;
             let middle = (f32(plane) + 0.5) / f32(COUNT);
             let here = (held & (1u << step)) != 0u;

@@ -1,9 +1,8 @@
-// From the nearest plane to where the hologram stands, in two dispatches: rows, which leave the border at their sides
-// behind, then columns. The latter also sum what becomes the mean phase. The header that sweep.rs writes before this
-// text gives RADIUS and DOWN.
+// Propagates from the nearest plane to the hologram in two dispatches: rows, which drop the border at their ends, then
+// columns, which also sum the field for the mean phase. The header from sweep.rs defines RADIUS and DOWN.
 
 struct Sizes {
-    // Of what is written, and of what is read.
+    // The width and height of the output, then those of the input.
     width: u32, height: u32, wide: u32, high: u32,
     border: u32, tiles: u32, unused_a: u32, unused_b: u32,
 }

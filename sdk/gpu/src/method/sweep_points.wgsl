@@ -1,17 +1,17 @@
-// The plane of each pixel's points, of what is seen and of two hidden layers, in a word: 10 bits, 11 and 11. The header
-// that sweep.rs writes before this text gives COUNT, the planes, and HIDDEN, the hidden layers.
+// Packs the planes of each pixel's points into a word: 10 bits for the visible surface and 11 for each of two hidden
+// layers. The header from sweep.rs defines COUNT, the number of planes, and HIDDEN, the number of hidden layers.
 
 @group(0) @binding(0) var<uniform> frame: vec4u;
-// Red, green, blue, depth.
+// Red, green, blue and depth.
 @group(0) @binding(1) var<storage, read> surfaces: array<vec4f>;
 @group(0) @binding(2) var<storage, read> sources: array<u32>;
 @group(0) @binding(3) var<storage, read_write> points: array<u32>;
 
 const NOTHING: u32 = 0xffffffffu;
-// Where nothing is hidden; there are at most 1024 planes.
+// The value without a hidden surface. There are at most 1024 planes.
 const NO_PLANE: u32 = 2047u;
 
-// ⌊depth·COUNT⌋ for depths in [0, 1], exactly, as f64 gives it: f32 would round up to the next plane.
+// Returns ⌊depth·COUNT⌋ for depths in [0, 1], exactly as f64 does. f32 would round up to the next plane.
 fn plane_of(depth: f32) -> u32 {
     let bits = bitcast<u32>(depth);
     let exponent = bits >> 23u;

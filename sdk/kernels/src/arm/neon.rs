@@ -1,5 +1,5 @@
-//! NEON: the f32 kernels, and what the int8 kernels of both dot-product files share. 4 pixels to a register, 8 filters
-//! and 12 pixels at a time. NEON is part of every ARM64 processor.
+//! The f32 kernels for NEON, and the code that the int8 kernels of both dot-product files share. They compute 8 filters
+//! and 12 pixels at a time, with 4 pixels per register. NEON is part of every ARM64 processor.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -15,10 +15,10 @@ pub(crate) const KERNELS: f32::Kernels = f32::Kernels {
     last_row,
 };
 
-/// Filters and registers of pixels computed together.
+/// The numbers of filters and of pixel registers computed together.
 pub(crate) const FILTERS: usize = 8;
 pub(crate) const BLOCKS: usize = 3;
-/// Pixels computed together.
+/// The number of pixels computed together.
 pub(crate) const SPAN: usize = 4 * BLOCKS;
 
 fn hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
@@ -32,7 +32,7 @@ fn hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out
                 for (b, sum) in sums.iter().enumerate() {
                     let at = o * geometry.stride() + geometry.start() + x + 4 * b;
                     let out = &mut out[at..at + 4];
-                    // SAFETY: NEON is there, and the slices hold four values.
+                    // SAFETY: NEON is available, and the slices hold four values.
                     unsafe {
                         let mut value = vmaxq_f32(*sum, vdupq_n_f32(0.0));
                         if let Some(skip) = skip {
@@ -57,15 +57,15 @@ fn last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS],
     });
 }
 
-/// Stores the registers that fall into the block.
+/// Stores the registers that are inside the block.
 pub(crate) fn store(values: &mut [f32], sums: [float32x4_t; BLOCKS]) {
     for (values, sum) in values.as_chunks_mut::<4>().0.iter_mut().zip(sums) {
-        // SAFETY: NEON is there, and four values are.
+        // SAFETY: NEON is available, and the slice holds four values.
         unsafe { vst1q_f32(values.as_mut_ptr(), sum) };
     }
 }
 
-/// The sums of `O` filters at [`SPAN`] pixels from `x`.
+/// Returns the sums of `O` filters at [`SPAN`] pixels from `x`.
 #[inline(always)]
 fn sums<const O: usize>(
     layer: &f32::Packed,
@@ -77,8 +77,8 @@ fn sums<const O: usize>(
     let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
     assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
     assert!(x + SPAN < geometry.padded + MARGIN);
-    // SAFETY: NEON is there; by the asserts rows with their margin reach past the block, and weights are as many as
-    // the loops take.
+    // SAFETY: NEON is available. By the asserts, rows with their margin extend past the block, and there are as many
+    // weights as the loops read.
     unsafe {
         let mut sums = [[vdupq_n_f32(0.0); BLOCKS]; O];
         for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
@@ -105,22 +105,23 @@ fn sums<const O: usize>(
     }
 }
 
-/// `[8 filters][ky][group][kx][filter]`, words of four weights.
+/// Packs words of four weights as `[8 filters][ky][group][kx][filter]`.
 pub(crate) fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.dot_words(&vec![FILTERS; taps.outputs().div_ceil(FILTERS)])
 }
 
-/// What follows the sums of some filters.
+/// The factors that are applied to the sums of some filters.
 pub(crate) struct Constants<'a> {
     pub(crate) multiplier: &'a [f32],
     pub(crate) skip: Option<SkipSum>,
     pub(crate) zero_point: u8,
 }
 
-/// Turns the sums of four filters at four pixels into values: 16 bytes at `out`, with the same bytes of the skip.
+/// Converts the sums of four filters at four pixels to 16 bytes at `out`. `skip` holds the skip's bytes at the same
+/// position.
 pub(crate) fn requantise(sums: [int32x4_t; GROUP], constants: &Constants<'_>, skip: Option<&[u8]>, out: &mut [u8]) {
     let (skip, out) = (skip.map(|skip| &skip[..16]), &mut out[..16]);
-    // SAFETY: NEON is there, and the slices hold 16 bytes.
+    // SAFETY: NEON is available, and the slices hold 16 bytes.
     unsafe {
         let values: [int32x4_t; GROUP] = std::array::from_fn(|k| {
             let v = vmulq_n_f32(vcvtq_f32_s32(sums[k]), constants.multiplier[k]);
@@ -140,14 +141,14 @@ pub(crate) fn requantise(sums: [int32x4_t; GROUP], constants: &Constants<'_>, sk
         let narrow = |v| vqmovun_s16(v);
         let ab = narrow(vcombine_s16(vqmovn_s32(values[0]), vqmovn_s32(values[1])));
         let cd = narrow(vcombine_s16(vqmovn_s32(values[2]), vqmovn_s32(values[3])));
-        // Four pixels of a, then of b, c and d; the table turns this 4×4 block.
+        // Four pixels of a, then of b, c and d. The table transposes this 4×4 block.
         const TURN: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
         let bytes = vqtbl1q_u8(vcombine_u8(ab, cd), vld1q_u8(TURN.as_ptr()));
         vst1q_u8(out.as_mut_ptr(), vqaddq_u8(bytes, vdupq_n_u8(constants.zero_point)));
     }
 }
 
-/// The parts of a layer that one call of a dot-product kernel needs, and the checks of what it reads.
+/// The parts of a layer that one call of a dot-product kernel needs, with bounds checks of its reads.
 pub(crate) struct Dots<'a> {
     pub(crate) weights: &'a [i32],
     pub(crate) bias: &'a [i32],
@@ -155,7 +156,7 @@ pub(crate) struct Dots<'a> {
 }
 
 impl<'a> Dots<'a> {
-    /// Eight filters from `first`; three rows from pixel `x`.
+    /// Checks and returns the parts for eight filters from `first` and three rows from pixel `x`.
     pub(crate) fn new(layer: &'a int8::Packed, first: usize, rows: &[&[u8]; 3], x: usize, geometry: Geometry) -> Self {
         let words = 9 * layer.groups;
         assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
@@ -168,10 +169,11 @@ impl<'a> Dots<'a> {
     }
 }
 
-/// The int8 kernels around one instruction set's `load` of 16 bytes of pixels and `dot::<LANE>(sum, pixels, weights)`.
+/// Defines the int8 kernels, given an instruction set's `load` of 16 bytes of pixels and `dot::<LANE>(sum, pixels,
+/// weights)`.
 macro_rules! int8_kernels {
     ($features:literal) => {
-        /// The sums of eight filters at [`SPAN`] pixels from `x`.
+        /// Returns the sums of eight filters at [`SPAN`] pixels from `x`.
         #[target_feature(enable = $features)]
         fn sums(
             layer: &Packed,
@@ -185,7 +187,7 @@ macro_rules! int8_kernels {
             for (sums, bias) in sums.iter_mut().zip(dots.bias) {
                 *sums = [vdupq_n_s32(*bias); BLOCKS];
             }
-            // SAFETY: `Dots` has checked what the loops read; the features are the function's.
+            // SAFETY: `Dots` has checked the loops' reads, and the function enables the features.
             unsafe {
                 let mut weight = dots.weights.as_ptr();
                 for row in rows {
@@ -218,7 +220,7 @@ macro_rules! int8_kernels {
             let rows = window.rows();
             for first in (0..layer.outputs).step_by(FILTERS) {
                 for x in (0..geometry.width).step_by(SPAN) {
-                    // SAFETY: `kernels` has found the feature.
+                    // SAFETY: `kernels` has detected the feature.
                     let sums = unsafe { sums(layer, first, &rows, x, geometry) };
                     for g in 0..FILTERS / GROUP {
                         let constants = Constants {
@@ -247,10 +249,10 @@ macro_rules! int8_kernels {
             let rows = window.rows();
             last_row_by_blocks(out, from, |x, values| {
                 for start in (0..BLOCK).step_by(SPAN) {
-                    // SAFETY: `kernels` has found the feature.
+                    // SAFETY: `kernels` has detected the feature.
                     let sums = unsafe { sums(layer, 0, &rows, x + start, geometry) };
                     for ((values, sums), multiplier) in values.iter_mut().zip(sums).zip(&layer.multiplier) {
-                        // SAFETY: NEON is there.
+                        // SAFETY: NEON is available.
                         let values_of = |sum| unsafe { vmulq_n_f32(vcvtq_f32_s32(sum), *multiplier) };
                         store(&mut values[start..], sums.map(values_of));
                     }

@@ -1,5 +1,5 @@
-//! int8 kernels for ARM64 with the mixed-sign dot product of i8mm: USDOT multiplies the activations as
-//! they are. Inline assembly: the intrinsics are not stable.
+//! The int8 kernels for ARM64 with the mixed-sign dot product of i8mm. USDOT multiplies the unmodified activations. The
+//! code uses inline assembly because the intrinsics are not stable.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -9,7 +9,7 @@ use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
 use std::arch::aarch64::*;
 use std::arch::asm;
 
-/// The kernels, where the processor has what they need.
+/// Returns the kernels if the processor supports them.
 pub(crate) fn kernels() -> Option<Kernels> {
     std::arch::is_aarch64_feature_detected!("i8mm").then_some(Kernels {
         pack,
@@ -23,23 +23,23 @@ pub(crate) fn kernels() -> Option<Kernels> {
 
 int8_kernels!("neon,i8mm");
 
-/// Sixteen bytes: four pixels of a group.
+/// Loads sixteen bytes: four pixels of a group.
 ///
 /// # Safety
-/// They lie at `pixels`.
+/// The bytes at `pixels` must be readable.
 #[inline]
 #[target_feature(enable = "neon,i8mm")]
 unsafe fn load(pixels: *const u8) -> uint8x16_t {
-    // SAFETY: as the function's own.
+    // SAFETY: the caller upholds this function's contract.
     unsafe { vld1q_u8(pixels) }
 }
 
-/// `sum + dot(pixels, weights[LANE])` for each of four pixels.
+/// Returns `sum + dot(pixels, weights[LANE])` for each of four pixels.
 #[inline]
 #[target_feature(enable = "neon,i8mm")]
 pub(crate) fn dot<const LANE: usize>(sum: int32x4_t, pixels: uint8x16_t, weights: int8x16_t) -> int32x4_t {
     let mut result = sum;
-    // SAFETY: registers alone; the feature is the function's.
+    // SAFETY: the assembly uses only registers, and the function enables the feature.
     unsafe {
         asm!("usdot {0:v}.4s, {1:v}.16b, {2:v}.4b[{lane}]",
             inout(vreg) result, in(vreg) pixels, in(vreg) weights, lane = const LANE,

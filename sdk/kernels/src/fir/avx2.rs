@@ -1,19 +1,19 @@
-//! AVX2 with FMA: 8 values to a register.
+//! The filter for AVX2 with FMA: 8 values per register.
 #![allow(unsafe_code)]
 
 use super::{Kernel, Lanes, Run, Taps};
 use std::arch::x86_64::*;
 
-/// The kernel, where the processor has what it needs.
+/// Returns the kernel if the processor supports it.
 pub(super) fn kernel() -> Option<Kernel> {
     (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(run as Kernel)
 }
 
 /// # Safety
-/// As [`super::filter`].
+/// The contract of [`super::filter`].
 #[target_feature(enable = "avx2,fma")]
 unsafe fn run(taps: &Taps, run: Run<'_>) {
-    // SAFETY: the caller's.
+    // SAFETY: the caller upholds this function's contract.
     unsafe { super::filter::<__m256, 2>(taps, run) }
 }
 

@@ -1,15 +1,15 @@
-//! NEON: 4 values to a register. It is part of every ARM64 processor.
+//! The filter for NEON: 4 values per register. NEON is part of every ARM64 processor.
 #![allow(unsafe_code)]
 
 use super::{Lanes, Run, Taps};
 use std::arch::aarch64::*;
 
-/// The kernel.
+/// Filters a run.
 ///
 /// # Safety
-/// As [`super::filter`].
+/// The contract of [`super::filter`].
 pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
-    // SAFETY: the caller's.
+    // SAFETY: the caller upholds this function's contract.
     unsafe { super::filter::<float32x4_t, 4>(taps, run) }
 }
 

@@ -1,7 +1,7 @@
-//! Plain Rust: the definition that the others are tested against.
+//! The filter in plain Rust: the definition that the others are tested against.
 //!
-//! Slow where the processor has no fused multiply-add, for then the language computes it in software; x86 processors
-//! without one are older than AVX2.
+//! It is slow if the processor has no fused multiply-add, because the language then computes it in software. x86
+//! processors without one are older than AVX2.
 #![allow(unsafe_code)]
 
 use super::{Lanes, Run, Taps};
@@ -9,9 +9,9 @@ use super::{Lanes, Run, Taps};
 const LANES: usize = 8;
 
 /// # Safety
-/// As [`super::filter`].
+/// The contract of [`super::filter`].
 pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
-    // SAFETY: the caller's.
+    // SAFETY: the caller upholds this function's contract.
     unsafe { super::filter::<[f32; LANES], 1>(taps, run) }
 }
 
@@ -25,13 +25,13 @@ impl Lanes for [f32; LANES] {
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds this function's contract.
         unsafe { from.cast::<Self>().read_unaligned() }
     }
 
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds this function's contract.
         unsafe { to.cast::<Self>().write_unaligned(self) }
     }
 

@@ -1,15 +1,15 @@
-//! WebAssembly's vectors: 4 values to a register. They have no fused multiply-add, so products are rounded by
-//! themselves: results differ from the other instruction sets' in their last bits.
+//! The filter for WebAssembly: 4 values per register. WebAssembly has no fused multiply-add, so products are rounded
+//! separately and results differ from the other instruction sets' in the last bits.
 
 use super::{Lanes, Run, Taps};
 use std::arch::wasm32::*;
 
-/// The kernel.
+/// Filters a run.
 ///
 /// # Safety
-/// As [`super::filter`].
+/// The contract of [`super::filter`].
 pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
-    // SAFETY: the caller's.
+    // SAFETY: the caller upholds this function's contract.
     unsafe { super::filter::<v128, 4>(taps, run) }
 }
 
@@ -23,13 +23,13 @@ impl Lanes for v128 {
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds this function's contract.
         unsafe { v128_load(from.cast()) }
     }
 
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds this function's contract.
         unsafe { v128_store(to.cast(), self) }
     }
 

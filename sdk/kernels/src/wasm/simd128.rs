@@ -1,7 +1,8 @@
-//! WebAssembly's 128-bit vectors: 4 filters at a time, 8 pixels of int8 or 12 of f32. Nothing is detected: a module
-//! with these instructions does not load where they are missing.
+//! Kernels for WebAssembly's 128-bit vectors: 4 filters at a time, 8 pixels of int8 or 12 of f32. There is no
+//! detection: a module with these instructions does not load where they are missing.
 //!
-//! Pixels are widened to 16 bits, the even and the odd channels of a group apart, and multiplied and summed in pairs.
+//! Pixels are widened to 16 bits, with the even and the odd channels of a group apart, and multiplied and summed in
+//! pairs.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -25,11 +26,11 @@ pub(crate) const F32: f32::Kernels = f32::Kernels {
     last_row: f32_last_row,
 };
 
-/// Registers of pixels computed together.
+/// The number of pixel registers computed together.
 const INT8_BLOCKS: usize = 2;
 const F32_BLOCKS: usize = 3;
 
-/// `[4 filters][ky][group][kx][filter][even, odd]`: words of two 16-bit weights.
+/// Packs words of two 16-bit weights as `[4 filters][ky][group][kx][filter][even, odd]`.
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.pair_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)])
 }
@@ -48,7 +49,7 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
             for b in 0..INT8_BLOCKS {
                 let at = g * geometry.stride() + geometry.start() + (x + 4 * b) * GROUP;
                 let four = std::array::from_fn(|k| sums[k][b]);
-                // SAFETY: 16 bytes at `at` lie in the group, whose blocks are whole.
+                // SAFETY: 16 bytes at `at` are inside the group, whose blocks are whole.
                 unsafe {
                     let value = match (layer.skip, skip) {
                         (Some(factors), Some(skip)) => {
@@ -63,7 +64,7 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
     }
 }
 
-/// The sums of the four filters of group `g` at `4·INT8_BLOCKS` pixels from `x`.
+/// Returns the sums of the four filters of group `g` at `4·INT8_BLOCKS` pixels from `x`.
 #[inline(always)]
 fn int8_sums(
     layer: &Packed,
@@ -81,7 +82,8 @@ fn int8_sums(
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[g * GROUP..]) {
         *sums = [i32x4_splat(*bias); INT8_BLOCKS];
     }
-    // SAFETY: the asserts above: rows reach one pixel past the block, weights are as many as the loops take.
+    // SAFETY: by the asserts above, rows extend one pixel past the block, and there are as many weights as the loops
+    // read.
     unsafe {
         let mut weight = weights.as_ptr();
         for row in rows {
@@ -109,7 +111,7 @@ fn int8_sums(
     sums
 }
 
-/// `sat(rint(v))` in 32 bits: a sum with 1.5·2²³ leaves no room for a fraction.
+/// Returns `sat(rint(v))` in 32 bits: adding 1.5·2²³ leaves no fraction bits.
 #[inline(always)]
 fn rounded(v: v128) -> v128 {
     let magic = f32x4_splat(12_582_912.0);
@@ -117,19 +119,19 @@ fn rounded(v: v128) -> v128 {
     i32x4_sub(f32x4_add(inside, magic), magic)
 }
 
-/// `sum · multiplier` of four filters.
+/// Returns `sum · multiplier` of four filters.
 #[inline(always)]
 fn scaled(sums: [v128; GROUP], multiplier: &[f32]) -> [v128; GROUP] {
     std::array::from_fn(|k| f32x4_mul(f32x4_convert_i32x4(sums[k]), f32x4_splat(multiplier[k])))
 }
 
-/// `sat(rint(sum · multiplier))` of four filters, as one register of groups.
+/// Returns `sat(rint(sum · multiplier))` of four filters as one register of groups.
 #[inline(always)]
 fn requantise(sums: [v128; GROUP], multiplier: &[f32]) -> v128 {
     pack_groups(scaled(sums, multiplier).map(rounded))
 }
 
-/// The same with the sum of a skip.
+/// Requantises the sums of four filters and adds a skip.
 #[inline(always)]
 fn requantise_sum(sums: [v128; GROUP], multiplier: &[f32], factors: SkipSum, skip: v128) -> v128 {
     let values = scaled(sums, multiplier);
@@ -147,7 +149,7 @@ fn requantise_sum(sums: [v128; GROUP], multiplier: &[f32], factors: SkipSum, ski
     }))
 }
 
-/// Four registers of one channel's 4 pixels, 0…255, to 4 groups of bytes.
+/// Packs four registers of one channel's 4 pixels, 0…255, into 4 groups of bytes.
 #[inline(always)]
 fn pack_groups([a, b, c, d]: [v128; GROUP]) -> v128 {
     let (ab, cd) = (v128_or(a, i32x4_shl(b, 8)), v128_or(c, i32x4_shl(d, 8)));
@@ -172,11 +174,11 @@ fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], 
     });
 }
 
-/// Stores the registers that fall into the block.
+/// Stores the registers that are inside the block.
 #[inline(always)]
 fn store<const BLOCKS: usize>(values: &mut [f32], sums: [v128; BLOCKS]) {
     for (values, sum) in values.as_chunks_mut::<4>().0.iter_mut().zip(sums) {
-        // SAFETY: four values.
+        // SAFETY: the slice holds four values.
         unsafe { v128_store(values.as_mut_ptr().cast(), sum) };
     }
 }
@@ -223,7 +225,7 @@ fn f32_last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPU
     });
 }
 
-/// The sums of `O` filters at `4·F32_BLOCKS` pixels from `x`.
+/// Returns the sums of `O` filters at `4·F32_BLOCKS` pixels from `x`.
 #[inline(always)]
 fn f32_sums<const O: usize>(
     layer: &f32::Packed,
@@ -239,7 +241,8 @@ fn f32_sums<const O: usize>(
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
         *sums = [f32x4_splat(*bias); F32_BLOCKS];
     }
-    // SAFETY: the asserts above: rows with their margin reach past the block, weights are as many as the loops take.
+    // SAFETY: by the asserts above, rows with their margin extend past the block, and there are as many weights as the
+    // loops read.
     unsafe {
         let mut weight = weights.as_ptr();
         for row in rows {

@@ -1,12 +1,12 @@
-//! int8 kernels for AMX: a tile instruction multiplies 16 filters by 16 pixels, 64 products each.
+//! The int8 kernels for AMX. A tile instruction multiplies 16 filters by 16 pixels, with 64 products each.
 //!
-//! The groups of four channels are the second operand's layout: a tile is 16 "lines" of 16 pixels, a line being one
-//! group at one tap. Lines of the three rows lie evenly spaced in memory whatever slot a row is in, so a tile of 16
-//! lines loads straight from the rows, once for each column tap, with the weights packed for each of the three turns
-//! of the ring. What is left of a column tap's lines over its tiles is gathered into a small panel. Sums are then
-//! requantised with AVX-512 while the tiles compute the next block.
+//! The groups of four channels have the layout of the second operand: a tile is 16 "lines" of 16 pixels, and a line is
+//! one group at one tap. Lines of the three rows are evenly spaced in memory whatever slot a row is in, so a tile of 16
+//! lines is loaded directly from the rows, once for each column tap, with the weights packed for each of the three
+//! rotations of the ring. The lines of a column tap that do not fill a tile are gathered into a small panel. Sums are
+//! then requantised with AVX-512 while the tiles compute the next block.
 //!
-//! The tile instructions are inline assembly: their intrinsics are not stable.
+//! The code uses inline assembly because the intrinsics of the tile instructions are not stable.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -19,16 +19,16 @@ use std::arch::x86_64::*;
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
-/// Lines of a tile, and pixels of a line.
+/// The lines of a tile, and the pixels of a line.
 pub(crate) const TILE: usize = 16;
-/// Filters computed together: a tile of 16 and one of 8.
+/// The number of filters computed together: a tile of 16 and one of 8.
 const FILTERS: usize = 24;
-/// Words of weights for one step: 16 words for each filter.
+/// The words of weights for one step: 16 words for each filter.
 const STEP_WORDS: usize = FILTERS * TILE;
-/// Most lines that a panel gathers: those left over three column taps, in whole tiles.
+/// The most lines that a panel gathers: those left over from three column taps, in whole tiles.
 const PANEL: usize = 48;
 
-/// The kernels, where the processor and the system have what they need.
+/// Returns the kernels if the processor and the system support them.
 pub(crate) fn kernels() -> Option<Kernels> {
     available().then_some(Kernels {
         pack,
@@ -40,7 +40,7 @@ pub(crate) fn kernels() -> Option<Kernels> {
     })
 }
 
-/// Whether the processor has AMX int8 and the system lets this process use it.
+/// Checks whether the processor has AMX int8 and the system lets this process use it.
 pub(crate) fn available() -> bool {
     static AVAILABLE: OnceLock<bool> = OnceLock::new();
     *AVAILABLE.get_or_init(|| avx512_vnni::available() && has_tiles() && permitted())
@@ -51,23 +51,23 @@ fn has_tiles() -> bool {
     if __cpuid(0).eax < 7 || __cpuid_count(7, 0).edx >> 24 & 3 != 3 {
         return false;
     }
-    // Tile configuration and data: bits 17 and 18 of XCR0. AVX-512, found before, implies XGETBV.
+    // Tile configuration and data are bits 17 and 18 of XCR0. AVX-512, detected before, implies XGETBV.
     let (low, _high): (u32, u32);
-    // SAFETY: XGETBV of register 0 reads; OSXSAVE is implied by AVX-512 in use.
+    // SAFETY: XGETBV of register 0 only reads. AVX-512 in use implies OSXSAVE.
     unsafe {
         asm!("xgetbv", in("ecx") 0, out("eax") low, out("edx") _high, options(nomem, nostack));
     }
     low >> 17 & 3 == 3
 }
 
-/// Asks Linux for the tile data state; elsewhere AMX is left alone.
+/// Asks Linux for permission to use the tile data state. On other systems AMX is not used.
 #[cfg(target_os = "linux")]
 fn permitted() -> bool {
     const ARCH_PRCTL: i64 = 158;
     const ARCH_REQ_XCOMP_PERM: i64 = 0x1023;
     const TILE_DATA: i64 = 18;
     let mut result = ARCH_PRCTL;
-    // SAFETY: the system call reads its two numbers and touches no memory of ours.
+    // SAFETY: the system call reads its two numbers and accesses no memory of this process.
     unsafe {
         asm!("syscall", inlateout("rax") result, in("rdi") ARCH_REQ_XCOMP_PERM, in("rsi") TILE_DATA,
             lateout("rcx") _, lateout("r11") _, options(nostack));
@@ -80,13 +80,13 @@ fn permitted() -> bool {
     false
 }
 
-/// How the lines of a layer's 3·`groups` groups and three column taps fall into tiles.
+/// The division of the lines of a layer's 3·`groups` groups and three column taps into tiles.
 struct Steps {
-    /// Whole tiles loaded straight from the rows, for each column tap.
+    /// The number of whole tiles loaded directly from the rows, for each column tap.
     direct: usize,
-    /// Lines of each column tap that the panel gathers.
+    /// The number of lines of each column tap that the panel gathers.
     left: usize,
-    /// Tiles of the panel.
+    /// The number of tiles of the panel.
     panels: usize,
 }
 
@@ -105,7 +105,7 @@ impl Steps {
         3 * self.direct + self.panels
     }
 
-    /// The (line, column tap) of each line of each step, in order; `None` where a panel's tile is not full.
+    /// Returns the (line, column tap) of each line of each step, in order, or `None` where a panel's tile is not full.
     fn lines(&self) -> Vec<Option<(usize, usize)>> {
         let direct = (0..3).flat_map(|kx| (0..self.direct * TILE).map(move |line| Some((line, kx))));
         let first = self.direct * TILE;
@@ -116,8 +116,8 @@ impl Steps {
     }
 }
 
-/// `[24 filters][turn][step][filter][line]`, words of four weights; filters beyond the layer's have weight 0. For 16
-/// filters or fewer in a group the second, or the first, tile is never used.
+/// Packs words of four weights as `[24 filters][turn][step][filter][line]`. Filters beyond the layer's have weight 0. A
+/// group of 16 filters never uses the second tile, and a group of 8 never uses the first.
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
     let groups = taps.groups();
     let lines = Steps::new(groups).lines();
@@ -141,7 +141,8 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
     words
 }
 
-/// The tiles' shapes: 0 and 1 sums of 16 filters, 2 and 3 of 8; 4 and 5 their weights; 6 and 7 pixels.
+/// The shapes of the tiles: 0 and 1 are sums of 16 filters, 2 and 3 of 8; 4 and 5 are their weights; 6 and 7 are
+/// pixels.
 #[repr(C, align(64))]
 pub(crate) struct TileConfig {
     palette: u8,
@@ -163,15 +164,15 @@ pub(crate) static CONFIG: TileConfig = TileConfig {
 #[repr(C, align(64))]
 struct Sums([[[i32; TILE]; FILTERS]; 2]);
 
-/// Lines gathered for the tiles that are not loaded straight, for two lines of pixels.
+/// The lines gathered for the tiles that are not loaded directly, for two lines of pixels.
 #[repr(C, align(64))]
 struct Panel([[[u8; TILE * GROUP]; PANEL]; 2]);
 
-/// A layer's biases as a tile of first sums.
+/// A layer's biases as a tile of initial sums.
 #[repr(C, align(64))]
 struct Biases([[i32; TILE]; FILTERS]);
 
-/// What a row needs beside the rows: kept by each thread, as clearing it would take longer than some rows.
+/// The working memory for a row. Each thread keeps its own, because clearing it would take longer than some rows.
 struct Work {
     biases: Biases,
     panels: [Panel; 2],
@@ -188,7 +189,7 @@ thread_local! {
     };
 }
 
-/// Runs `done(x, sums)` for every 32 pixels of `from..to`, with the sums of filters `first..first + 24`.
+/// Calls `done(x, sums)` for every 32 pixels of `from..to`, with the sums of filters `first..first + 24`.
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 fn each_block(
     layer: &Packed,
@@ -226,13 +227,13 @@ fn each_block_in(
     let filters = (layer.outputs.next_multiple_of(8) - first).min(FILTERS);
     let wide = filters >= 16;
     let narrow = !filters.is_multiple_of(16);
-    // A tile can not be loaded from stores still on their way, so panels are gathered a block ahead and sums wait a
-    // block before they are turned into values.
+    // A tile cannot be loaded from stores that are still pending, so panels are gathered one block ahead and sums are
+    // converted to values one block later.
     let blocks = (to - from).div_ceil(2 * TILE);
     let block_x = |block: usize| from + block * 2 * TILE;
-    // SAFETY: `kernels` has found the processor and the system willing. Every line read starts one pixel before the
-    // block at the earliest and ends 17 after at the latest, within a group's margins. Weights and biases have the
-    // tiles' shapes. Tiles are this thread's own between configuration and release, and `done` knows nothing of them.
+    // SAFETY: `kernels` has checked the processor and the system. Every line read starts at most one pixel before the
+    // block and ends at most 17 after it, within a group's margins. Weights and biases have the shapes of the tiles.
+    // The tiles belong to this thread between configuration and release, and `done` does not use them.
     unsafe {
         let pixels = window.slots.as_ptr().add(geometry.start() - GROUP);
         let gather = |panel: &mut Panel, block: usize| {
@@ -280,14 +281,14 @@ fn each_block_in(
     }
 }
 
-/// Loads the biases as the first sums.
+/// Loads the biases as the initial sums.
 ///
 /// # Safety
-/// Tiles are configured.
+/// The tiles must be configured.
 #[inline(always)]
 unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
     let (first, second) = (biases.0.as_ptr(), biases.0[if wide { TILE } else { 0 }..].as_ptr());
-    // SAFETY: 16 and 8 lines of 64 bytes lie there.
+    // SAFETY: the biases hold 16 and 8 lines of 64 bytes.
     unsafe {
         if wide {
             asm!("tileloadd tmm0, [{b} + {s}]", "tileloadd tmm1, [{b} + {s}]",
@@ -303,10 +304,11 @@ unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
 /// Adds one tile of lines, for two lines of pixels, times its weights.
 ///
 /// # Safety
-/// Tiles are configured; 24 lines of 64 bytes lie at `weights`, 16 lines `stride` bytes apart at each of `lines`.
+/// The tiles must be configured. `weights` must point to 24 lines of 64 bytes, and each of `lines` to 16 lines that are
+/// `stride` bytes apart.
 #[inline(always)]
 unsafe fn step(weights: *const i32, lines: [*const u8; 2], stride: usize, wide: bool, narrow: bool) {
-    // SAFETY: as the function's own.
+    // SAFETY: the caller upholds this function's contract.
     unsafe {
         asm!("tileloadd tmm6, [{a} + {s}]", "tileloadd tmm7, [{b} + {s}]",
             a = in(reg) lines[0], b = in(reg) lines[1], s = in(reg) stride, options(nostack, readonly));
@@ -325,12 +327,12 @@ unsafe fn step(weights: *const i32, lines: [*const u8; 2], stride: usize, wide: 
 /// Stores the sums.
 ///
 /// # Safety
-/// Tiles are configured.
+/// The tiles must be configured.
 #[inline(always)]
 unsafe fn finish(sums: &mut Sums, wide: bool, narrow: bool) {
     let [first, second] = &mut sums.0;
     let after = if wide { TILE } else { 0 };
-    // SAFETY: the lines of the tiles' shapes lie there.
+    // SAFETY: `sums` holds the lines of the tiles' shapes.
     unsafe {
         if wide {
             asm!("tilestored [{a} + {s}], tmm0", "tilestored [{b} + {s}], tmm1",
@@ -347,7 +349,7 @@ unsafe fn finish(sums: &mut Sums, wide: bool, narrow: bool) {
 
 fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     for first in (0..layer.outputs).step_by(FILTERS) {
-        // SAFETY: `kernels` has found the features.
+        // SAFETY: `kernels` has detected the features.
         unsafe { hidden_filters(layer, first, window, skip, out, geometry) };
     }
 }
@@ -376,7 +378,7 @@ fn hidden_filters(
 }
 
 fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-    // SAFETY: `kernels` has found the features.
+    // SAFETY: `kernels` has detected the features.
     unsafe { last_filters(layer, window, out, from, geometry) }
 }
 
@@ -399,7 +401,7 @@ fn last_filters(
             }
             for ((out, sums), multiplier) in out.iter_mut().zip(sums).zip(multiplier) {
                 let mut values = [0.0; TILE];
-                // SAFETY: the features are this function's; 16 sums and 16 values.
+                // SAFETY: this function enables the features, and there are 16 sums and 16 values.
                 unsafe {
                     let sums = _mm512_cvtepi32_ps(_mm512_load_si512(sums.as_ptr().cast()));
                     let scaled = _mm512_mul_ps(sums, _mm512_set1_ps(*multiplier));

@@ -1,7 +1,7 @@
-//! int8 and f32 kernels for AVX2: 8 pixels to a register, 4 filters at a time.
+//! The int8 and f32 kernels for AVX2: 8 pixels per register, 4 filters at a time.
 //!
-//! The byte multiply of AVX2 saturates its 16-bit sums, so int8 products are made from 16-bit halves: a group's even
-//! and odd channels, each pair multiplied and added exactly in 32 bits.
+//! The byte multiply of AVX2 saturates its 16-bit sums, so int8 products are computed from 16-bit halves: a group's
+//! even and odd channels, each pair multiplied and added exactly in 32 bits.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -11,7 +11,7 @@ use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_b
 use std::arch::x86_64::*;
 use std::hint::black_box;
 
-/// The int8 kernels, where the processor has what they need.
+/// Returns the int8 kernels if the processor supports them.
 pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
     available().then_some(int8::Kernels {
         pack,
@@ -23,7 +23,7 @@ pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
     })
 }
 
-/// The f32 kernels, where the processor has what they need.
+/// Returns the f32 kernels if the processor supports them.
 pub(crate) fn f32_kernels() -> Option<f32::Kernels> {
     let size = |left: usize| left.min(GROUP);
     available().then_some(f32::Kernels {
@@ -37,18 +37,18 @@ fn available() -> bool {
     is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
 }
 
-/// Registers of pixels computed together.
+/// The number of pixel registers computed together.
 const INT8_BLOCKS: usize = 2;
 const F32_BLOCKS: usize = 3;
 
-/// `[4 filters][ky][group][kx][filter][even, odd]`: words of two 16-bit weights.
+/// Packs words of two 16-bit weights as `[4 filters][ky][group][kx][filter][even, odd]`.
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.pair_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)])
 }
 
 fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     let rows = window.rows();
-    // SAFETY: `int8_kernels` has found the features.
+    // SAFETY: `int8_kernels` has detected the features.
     unsafe { int8_filters(layer, &rows, skip, out, geometry) }
 }
 
@@ -66,7 +66,7 @@ fn int8_filters(layer: &Packed, rows: &[&[u8]; 3], skip: Option<&[u8]>, out: &mu
             for b in 0..INT8_BLOCKS {
                 let at = g * geometry.stride() + geometry.start() + (x + 8 * b) * GROUP;
                 let four = std::array::from_fn(|k| sums[k][b]);
-                // SAFETY: 32 bytes at `at` lie in the group, whose blocks are whole.
+                // SAFETY: 32 bytes at `at` are inside the group, whose blocks are whole.
                 unsafe {
                     let value = match (layer.skip, skip) {
                         (Some(factors), Some(skip)) => {
@@ -82,7 +82,7 @@ fn int8_filters(layer: &Packed, rows: &[&[u8]; 3], skip: Option<&[u8]>, out: &mu
     }
 }
 
-/// The sums of the four filters of group `g` at `8·INT8_BLOCKS` pixels from `x`.
+/// Returns the sums of the four filters of group `g` at `8·INT8_BLOCKS` pixels from `x`.
 #[inline]
 #[target_feature(enable = "avx2,fma")]
 fn int8_sums(
@@ -101,10 +101,11 @@ fn int8_sums(
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[g * GROUP..]) {
         *sums = [_mm256_set1_epi32(*bias); INT8_BLOCKS];
     }
-    // SAFETY: the asserts above: rows reach one pixel past the block, weights are as many as the loops take.
+    // SAFETY: by the asserts above, rows extend one pixel past the block, and there are as many weights as the loops
+    // read.
     unsafe {
         let mut weight = weights.as_ptr();
-        // Kept from unrolling, which would run out of registers.
+        // Prevent unrolling, which would run out of registers.
         let taps = black_box(3);
         for row in rows {
             let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
@@ -131,7 +132,7 @@ fn int8_sums(
     sums
 }
 
-/// `sat(rint(sum · multiplier))` of four filters, as one register of groups.
+/// Returns `sat(rint(sum · multiplier))` of four filters as one register of groups.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
@@ -143,7 +144,7 @@ fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
     }))
 }
 
-/// The same with the sum of a skip.
+/// Requantises the sums of four filters and adds a skip.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn requantise_sum(sums: [__m256i; GROUP], multiplier: &[f32], factors: SkipSum, skip: __m256i) -> __m256i {
@@ -165,11 +166,11 @@ fn requantise_sum(sums: [__m256i; GROUP], multiplier: &[f32], factors: SkipSum, 
     }))
 }
 
-/// Four registers of one channel's 8 pixels to 8 groups of bytes, saturating.
+/// Packs four registers of one channel's 8 pixels into 8 groups of bytes, saturating.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
-    // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d; the shuffle turns this 4×4 block.
+    // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d. The shuffle transposes this 4×4 block.
     let bytes = _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
     let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(0x0f0b_0703, 0x0e0a_0602, 0x0d09_0501, 0x0c08_0400));
     _mm256_shuffle_epi8(bytes, turn)
@@ -178,7 +179,7 @@ fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
 fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     let rows = window.rows();
     last_row_by_blocks(out, from, |x, values| {
-        // SAFETY: `int8_kernels` has found the features.
+        // SAFETY: `int8_kernels` has detected the features.
         unsafe { int8_last_block(layer, &rows, x, values, geometry) }
     });
 }
@@ -198,7 +199,7 @@ fn int8_last_block(
                 let multiplier = _mm256_set1_ps(layer.multiplier[o]);
                 for (values, sum) in values[o][start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
                     let value = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), multiplier);
-                    // SAFETY: 8 values.
+                    // SAFETY: the slice holds 8 values.
                     unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
                 }
             }
@@ -210,7 +211,7 @@ fn f32_hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>,
     for first in (0..layer.outputs).step_by(GROUP) {
         let range = first * geometry.stride()..(first + GROUP) * geometry.stride();
         let skip = skip.map(|skip| &skip[range.clone()]);
-        // SAFETY: `f32_kernels` has found the features.
+        // SAFETY: `f32_kernels` has detected the features.
         unsafe { f32_filters(layer, first, rows, skip, &mut out[range], geometry) }
     }
 }
@@ -227,14 +228,14 @@ fn f32_filters(
     assert!(out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len()));
     const SPAN: usize = 8 * F32_BLOCKS;
     for x in (0..geometry.width).step_by(SPAN) {
-        // The last of a row whose blocks are whole begins earlier, so that it ends in them.
+        // The last span of a row starts earlier if necessary, so that it ends within the whole blocks.
         let x = x.min(geometry.padded - SPAN);
         let sums = f32_sums::<GROUP>(layer, first, rows, x, geometry);
         for (o, sums) in sums.iter().enumerate() {
             for (b, sum) in sums.iter().enumerate() {
                 let at = o * geometry.stride() + geometry.start() + x + 8 * b;
                 let mut value = _mm256_max_ps(*sum, _mm256_setzero_ps());
-                // SAFETY: 8 pixels at `at` lie in the filter's row or the margin after it.
+                // SAFETY: 8 pixels at `at` are inside the filter's row or the margin after it.
                 unsafe {
                     if let Some(skip) = skip {
                         value = _mm256_add_ps(value, _mm256_loadu_ps(skip.as_ptr().add(at)));
@@ -246,7 +247,7 @@ fn f32_filters(
     }
 }
 
-/// The sums of `O` filters at `8·F32_BLOCKS` pixels from `x`.
+/// Returns the sums of `O` filters at `8·F32_BLOCKS` pixels from `x`.
 #[inline]
 #[target_feature(enable = "avx2,fma")]
 fn f32_sums<const O: usize>(
@@ -263,7 +264,8 @@ fn f32_sums<const O: usize>(
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
         *sums = [_mm256_set1_ps(*bias); F32_BLOCKS];
     }
-    // SAFETY: the asserts above: rows with their margin reach past the block, weights are as many as the loops take.
+    // SAFETY: by the asserts above, rows with their margin extend past the block, and there are as many weights as the
+    // loops read.
     unsafe {
         let mut weight = weights.as_ptr();
         for row in rows {
@@ -288,7 +290,7 @@ fn f32_sums<const O: usize>(
 
 fn f32_last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     last_row_by_blocks(out, from, |x, values| {
-        // SAFETY: `f32_kernels` has found the features.
+        // SAFETY: `f32_kernels` has detected the features.
         unsafe { f32_last_block(layer, rows, x, values, geometry) }
     });
 }
@@ -313,34 +315,34 @@ fn f32_last_block(
     }
 }
 
-/// Stores the registers that fall into the block.
+/// Stores the registers that are inside the block.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn store<const O: usize>(values: &mut [[f32; BLOCK]], start: usize, sums: [[__m256; F32_BLOCKS]; O]) {
     for (values, sums) in values.iter_mut().zip(sums) {
         for (values, sum) in values[start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
-            // SAFETY: 8 values.
+            // SAFETY: the slice holds 8 values.
             unsafe { _mm256_storeu_ps(values.as_mut_ptr(), sum) };
         }
     }
 }
 
-/// [`int8::quantise_row`], compiled for AVX2. The AVX-512 kernels take it too: they imply AVX2.
+/// Runs [`int8::quantise_row`], compiled for AVX2. The AVX-512 kernels use it too, because they imply AVX2.
 pub(crate) fn quantise_row(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
     #[target_feature(enable = "avx2")]
     fn compiled(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
         int8::quantise_row(source, rounding, out, geometry);
     }
-    // SAFETY: the constructors of the kernels have found AVX2, or AVX-512, which implies it.
+    // SAFETY: the constructors of the kernels have detected AVX2, or AVX-512, which implies it.
     unsafe { compiled(source, rounding, out, geometry) }
 }
 
-/// [`int8::rescale_row`], likewise.
+/// Runs [`int8::rescale_row`], compiled for AVX2.
 pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
     #[target_feature(enable = "avx2")]
     fn compiled(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
         int8::rescale_row(row, factor, zero_point, geometry);
     }
-    // SAFETY: as above.
+    // SAFETY: as in `quantise_row`.
     unsafe { compiled(row, factor, zero_point, geometry) }
 }

@@ -1,4 +1,4 @@
-//! f32 kernels for AVX-512: 16 pixels to a register, 24 filters at a time.
+//! The f32 kernels for AVX-512: 16 pixels per register, 24 filters at a time.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -6,7 +6,7 @@ use crate::f32::{Kernels, Packed};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
 use std::arch::x86_64::*;
 
-/// The kernels, where the processor has what they need.
+/// Returns the kernels if the processor supports them.
 pub(crate) fn kernels() -> Option<Kernels> {
     is_x86_feature_detected!("avx512f").then_some(Kernels {
         size,
@@ -31,7 +31,7 @@ fn hidden_row(layer: &Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mu
         let range = first * geometry.stride()..(first + size) * geometry.stride();
         let skip = skip.map(|skip| &skip[range.clone()]);
         let out = &mut out[range];
-        // SAFETY: `kernels` has found the feature.
+        // SAFETY: `kernels` has detected the feature.
         unsafe {
             match size {
                 24 => filters::<24, 1>(layer, first, rows, skip, out, geometry),
@@ -45,7 +45,7 @@ fn hidden_row(layer: &Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mu
 
 fn last_row(layer: &Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     last_row_by_blocks(out, from, |x, values| {
-        // SAFETY: `kernels` has found the feature.
+        // SAFETY: `kernels` has detected the feature.
         unsafe { last_block(layer, rows, x, values, geometry) }
     });
 }
@@ -67,7 +67,7 @@ fn filters<const O: usize, const B: usize>(
             for (b, sum) in sums.iter().enumerate() {
                 let at = o * geometry.stride() + geometry.start() + x + 16 * b;
                 let mut value = _mm512_max_ps(*sum, zero);
-                // SAFETY: 16 pixels at `at` lie in the filter's row, whose blocks are whole.
+                // SAFETY: 16 pixels at `at` are inside the filter's row, whose blocks are whole.
                 unsafe {
                     if let Some(skip) = skip {
                         value = _mm512_add_ps(value, _mm512_loadu_ps(skip.as_ptr().add(at)));
@@ -79,7 +79,7 @@ fn filters<const O: usize, const B: usize>(
     }
 }
 
-/// The sums of `O` filters at `16·B` pixels from `x`.
+/// Returns the sums of `O` filters at `16·B` pixels from `x`.
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn sums<const O: usize, const B: usize>(
@@ -96,7 +96,8 @@ fn sums<const O: usize, const B: usize>(
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
         *sums = [_mm512_set1_ps(*bias); B];
     }
-    // SAFETY: the asserts above: rows reach one pixel past the block, weights are as many as the loops take.
+    // SAFETY: by the asserts above, rows extend one pixel past the block, and there are as many weights as the loops
+    // read.
     unsafe {
         let mut weight = weights.as_ptr();
         for row in rows {
@@ -124,7 +125,7 @@ fn last_block(layer: &Packed, rows: &[&[f32]; 3], x: usize, values: &mut [[f32; 
     let sums = sums::<OUTPUTS, 4>(layer, 0, rows, x, geometry);
     for (sums, values) in sums.iter().zip(values) {
         for (sum, values) in sums.iter().zip(values.as_chunks_mut::<16>().0) {
-            // SAFETY: 16 values.
+            // SAFETY: the slice holds 16 values.
             unsafe { _mm512_storeu_ps(values.as_mut_ptr(), *sum) };
         }
     }

@@ -1,4 +1,4 @@
-//! int8 kernels for AVX-512 with VNNI: 16 pixels to a register, one multiply-accumulate instruction for 64 products.
+//! The int8 kernels for AVX-512 with VNNI: 16 pixels per register, one multiply-accumulate instruction for 64 products.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
@@ -7,7 +7,7 @@ use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
 use crate::x86::avx2::{quantise_row, rescale_row};
 use std::arch::x86_64::*;
 
-/// The kernels, where the processor has what they need.
+/// Returns the kernels if the processor supports them.
 pub(crate) fn kernels() -> Option<Kernels> {
     available().then_some(Kernels {
         pack,
@@ -37,8 +37,8 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
     let mut x = 0;
     while x < geometry.width {
         let left = geometry.width - x;
-        // SAFETY: `kernels` has found the features, the rows are checked, and they are padded to 64 pixels: `x` is a
-        // multiple of 64 until fewer are left, so that no step ends after the padding.
+        // SAFETY: `kernels` has detected the features, the rows are checked, and they are padded to 64 pixels: `x` is a
+        // multiple of 64 until fewer are left, so no step ends after the padding.
         unsafe {
             x += match left {
                 49.. => block::<4>(layer, &rows, x, skip, out, geometry),
@@ -52,7 +52,7 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
 fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     let rows = window.rows();
     last_row_by_blocks(out, from, |x, values| {
-        // SAFETY: `kernels` has found the features.
+        // SAFETY: `kernels` has detected the features.
         unsafe { last_block(layer, &rows, x, values, geometry) }
     });
 }
@@ -63,11 +63,11 @@ pub(crate) fn check_rows(rows: &[&[u8]; 3], groups: usize, geometry: Geometry) {
     assert!(geometry.group == GROUP && geometry.padded.is_multiple_of(BLOCK) && MARGIN >= 16);
 }
 
-/// All filters at `16·B` pixels, four at a time: while their sums are requantised, those of the next four run. Returns
-/// the pixels done.
+/// Computes all filters at `16·B` pixels, four at a time. The sums of four filters are requantised while those of the
+/// next four are computed. Returns the number of pixels computed.
 ///
 /// # Safety
-/// `rows` and `geometry` have passed [`check_rows`], and `x + 16·B` is within the padded row.
+/// `rows` and `geometry` must have passed [`check_rows`], and `x + 16·B` must be within the padded row.
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 unsafe fn block<const B: usize>(
     layer: &Packed,
@@ -81,7 +81,7 @@ unsafe fn block<const B: usize>(
     for (g, weights) in layer.weights.chunks_exact(words).enumerate() {
         let filter = g * GROUP;
         let bias = &layer.bias[filter..][..GROUP];
-        // SAFETY: as the function's own.
+        // SAFETY: the caller upholds this function's contract.
         let sums = unsafe { sums::<GROUP, B>(rows, layer.groups, weights, bias, x, geometry) };
         #[allow(clippy::needless_range_loop)]
         for b in 0..B {
@@ -92,11 +92,11 @@ unsafe fn block<const B: usize>(
     16 * B
 }
 
-/// The sums of `O` filters at `16·B` pixels from `x`.
+/// Returns the sums of `O` filters at `16·B` pixels from `x`.
 ///
 /// # Safety
-/// `rows` and `geometry` have passed [`check_rows`], `x + 16·B` is within the padded row, `weights` holds `9·O·groups`
-/// words and `bias` `O`.
+/// `rows` and `geometry` must have passed [`check_rows`], `x + 16·B` must be within the padded row, `weights` must hold
+/// `9·O·groups` words and `bias` `O`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 unsafe fn sums<const O: usize, const B: usize>(
@@ -111,7 +111,7 @@ unsafe fn sums<const O: usize, const B: usize>(
     for (sums, bias) in sums.iter_mut().zip(bias) {
         *sums = [_mm512_set1_epi32(*bias); B];
     }
-    // SAFETY: as the function's own.
+    // SAFETY: the caller upholds this function's contract.
     unsafe {
         let mut weight = weights.as_ptr();
         for row in rows {
@@ -139,7 +139,7 @@ unsafe fn sums<const O: usize, const B: usize>(
 fn last_block(layer: &Packed, rows: &[&[u8]; 3], x: usize, values: &mut [[f32; BLOCK]; OUTPUTS], geometry: Geometry) {
     check_rows(rows, layer.groups, geometry);
     assert!(layer.weights.len() == OUTPUTS * 9 * layer.groups && x + BLOCK <= geometry.padded);
-    // SAFETY: the asserts above.
+    // SAFETY: the asserts above hold.
     unsafe {
         let sums = sums::<OUTPUTS, 4>(rows, layer.groups, &layer.weights, &layer.bias[..OUTPUTS], x, geometry);
         for (o, (sums, values)) in sums.iter().zip(values).enumerate() {
@@ -152,8 +152,8 @@ fn last_block(layer: &Packed, rows: &[&[u8]; 3], x: usize, values: &mut [[f32; B
     }
 }
 
-/// From the sums of four filters at 16 pixels to their group in the next layer's input, `at` in its row `out`, as in
-/// that of the skip.
+/// Converts the sums of four filters at 16 pixels to their group in the next layer's input. The group is at `at` in the
+/// row `out` and in the skip's row.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 pub(crate) fn requantise(
@@ -168,7 +168,7 @@ pub(crate) fn requantise(
     let values = match (layer.skip, skip) {
         (Some(factors), Some(skip)) => {
             let skip = &skip[at..at + 16 * GROUP];
-            // SAFETY: a slice of 64 bytes.
+            // SAFETY: the slice holds 64 bytes.
             let skip = unsafe { _mm512_loadu_si512(skip.as_ptr().cast()) };
             with_skip(sums, multiplier, factors, skip)
         }
@@ -176,11 +176,11 @@ pub(crate) fn requantise(
     };
     let value = _mm512_adds_epu8(values, _mm512_set1_epi8(layer.zero_point as i8));
     let out = &mut out[at..at + 16 * GROUP];
-    // SAFETY: a slice of 64 bytes.
+    // SAFETY: the slice holds 64 bytes.
     unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), value) };
 }
 
-/// `sat(rint(sum · multiplier))` of four filters, as one register of groups.
+/// Returns `sat(rint(sum · multiplier))` of four filters as one register of groups.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 fn without_skip(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i {
@@ -193,7 +193,7 @@ fn without_skip(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i {
     pack_groups(values)
 }
 
-/// The same with the sum of a skip.
+/// Requantises the sums of four filters and adds a skip.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 fn with_skip(sums: [__m512i; GROUP], multiplier: &[f32], factors: SkipSum, skip: __m512i) -> __m512i {
@@ -220,11 +220,11 @@ fn with_skip(sums: [__m512i; GROUP], multiplier: &[f32], factors: SkipSum, skip:
     pack_groups(values)
 }
 
-/// Four registers of one channel's 16 pixels to 16 groups of bytes, saturating.
+/// Packs four registers of one channel's 16 pixels into 16 groups of bytes, saturating.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 fn pack_groups([a, b, c, d]: [__m512i; GROUP]) -> __m512i {
-    // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d; the shuffle turns this 4×4 block.
+    // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d. The shuffle transposes this 4×4 block.
     let bytes = _mm512_packus_epi16(_mm512_packs_epi32(a, b), _mm512_packs_epi32(c, d));
     let turn = _mm512_set4_epi32(0x0f0b_0703, 0x0e0a_0602, 0x0d09_0501, 0x0c08_0400);
     _mm512_shuffle_epi8(bytes, turn)
