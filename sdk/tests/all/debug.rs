@@ -17,8 +17,8 @@ use phasefront::{
 use std::fmt::Debug;
 
 /// Compiles only for types that implement `Debug`.
-fn prints<T: Debug + ?Sized>() -> usize {
-    1
+fn prints<T: Debug>() -> usize {
+    usize::from(!std::any::type_name::<T>().is_empty())
 }
 
 macro_rules! count {
