@@ -1,4 +1,4 @@
-"""The command: `python -m phasefront_training COMMAND`. Flags are defined here, once; the work is elsewhere."""
+"""The command `python -m phasefront_training COMMAND`. This module defines the flags; other modules do the work."""
 
 import argparse
 import copy
@@ -19,8 +19,8 @@ from .stage1 import Stage1
 from .stage2 import Identity, Stage2, prefilter_network
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
-BEGINNING_SCENES = 4  # that show which units never fire, and what a grown last layer is fitted to
-VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
+BEGINNING_SCENES = 4  # for finding units that never fire, and for fitting a grown last layer
+VALIDATION_SCENES = 8  # for the curve; `evaluate` uses all
 
 
 def parser():
@@ -223,7 +223,7 @@ def run_statistics(args):
 
 
 def passed_on(args):
-    """What stands behind --."""
+    """Returns the arguments after --."""
     return args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
 
 
@@ -242,7 +242,8 @@ def run_stage1(args):
 
 
 def begun(args, wanted, train):
-    """A fresh network, or the one of --init, told more and grown where the flags ask for it."""
+    """Returns a fresh network, or the network of --init, with more input channels and layers if the flags ask for
+    them."""
     if not args.init:
         return networks.Chain(wanted)
     network, display = checkpoint.load_network(args.init)
@@ -279,7 +280,7 @@ def run_stage2(args):
 
 
 def begun_prefilter(args, display):
-    """A fresh pre-filter, or the one of --init-prefilter, which must be for the same display."""
+    """Returns a fresh pre-filter, or the pre-filter of --init-prefilter, which must be for the same display."""
     if not args.init_prefilter:
         return prefilter_network(args.prefilter_layers, args.prefilter_filters)
     network, its_display = checkpoint.load_network(args.init_prefilter)
@@ -291,12 +292,12 @@ def begun_prefilter(args, display):
 
 
 def sampling(args):
-    """What a step takes, as the tasks name it."""
+    """Returns the sampling arguments of the tasks."""
     return {name: getattr(args, name) for name in ("batch", "crop", "planes", "sensor_depth", "seed")}
 
 
 def load(args, architecture):
-    """The training scenes, and a few for the curve's validation."""
+    """Returns the training scenes, and a few scenes for the curve's validation."""
     if args.pool:
         if args.seeds or architecture.input == "seeded":
             raise ValueError("a pool has no seeds; seeded networks train on --data with --seeds")
@@ -314,7 +315,7 @@ def load(args, architecture):
 
 
 def scenes_for(folder, folder_of_seeds, split, inputs, limit):
-    """Scenes with what networks of these inputs read."""
+    """Returns scenes with the data that networks with these inputs read."""
     if "seeded" in inputs and not folder_of_seeds:
         raise ValueError("a seeded network reads the sweep's fields: --seeds FOLDER")
     layers = {networks.Architecture(3, input=each).ldi_layers for each in inputs}
@@ -326,7 +327,7 @@ def scenes_for(folder, folder_of_seeds, split, inputs, limit):
 
 
 def resumed(args):
-    """The checkpoint to go on from, or None."""
+    """Returns the checkpoint to resume from, or None."""
     if not args.resume:
         if args.minutes is None and args.steps is None:
             raise ValueError("a training needs a budget: --minutes or --steps")
@@ -335,7 +336,7 @@ def resumed(args):
 
 
 def go(task, args, workers, resume, folder=None):
-    """Trains, and says where the result lies."""
+    """Trains and prints the path of the result."""
     folder = folder or args.output
     options = {k: v for k, v in vars(args).items() if k not in ("run", "command", "resume", "output")}
     loaders = args.loaders if args.loaders is not None else (8 if workers.device.type == "cuda" else 0)
@@ -351,7 +352,7 @@ def run_quantize(args):
     trainable = prepare.prepare(subject.chain, subject.examples)
 
     def settled(how):
-        """The rounded network, which is told how it came about and how good it is."""
+        """Returns the rounded network and prints its origin and quality."""
         network = copy.deepcopy(trainable).cpu()
         rounding.round_in_order(network, subject.examples)
         rounded = subject.figure(network)
@@ -368,13 +369,13 @@ def run_quantize(args):
 
 @dataclass(frozen=True)
 class Subject:
-    """What `quantize` works on."""
+    """The network that `quantize` converts."""
 
     chain: networks.Chain
     examples: list  # its inputs on the first scenes, (C, H, W)
-    figure: Callable  # of a network in its place: PSNR on the validation scenes, dB
-    training: Callable  # the task that trains a Quantized in its place, on workers
-    trained_for: dict  # as the file's metadata say
+    figure: Callable  # PSNR in dB on the validation scenes, of a network in its place
+    training: Callable  # the task that trains a Quantized network in its place, on workers
+    trained_for: dict  # arguments of the file's metadata
 
 
 def quantized_hologram(args):
@@ -410,7 +411,7 @@ def quantized_prefilter(args):
 
 
 def worth_training(args, loss_db):
-    """Whether to train through the rounding; it needs a budget then."""
+    """Checks whether to train with rounding, which needs a budget."""
     if args.never_train or not args.always_train and loss_db <= quantize.ALLOWED_LOSS_DB:
         return False
     if args.minutes is None and args.steps is None:
@@ -419,7 +420,7 @@ def worth_training(args, loss_db):
 
 
 def stage2_model(path, **options):
-    """The DeepDoublePhase of a stage 2 checkpoint."""
+    """Returns the DeepDoublePhase of a stage 2 checkpoint."""
     if Path(path).suffix == ".onnx" or "prefilter" not in (last := Checkpoint.load(path)).networks:
         raise ValueError(f"{path}: no checkpoint of stage 2")
     return DeepDoublePhase(last.network("hologram"), last.network("prefilter"), last.extra["offset_m"], last.display, **options)
@@ -455,7 +456,7 @@ def run_evaluate(args):
 
 
 def scenes_of(args, scenes):
-    """What figures were measured on."""
+    """Returns the description of the scenes of an evaluation."""
     manifest = data.Manifest.read(args.data)
     known = {k: manifest.table[k] for k in ("seed", "size", "planes", "display")}
     return {"split": args.split, "scenes": len(scenes), "like": manifest.like} | known
@@ -464,7 +465,7 @@ def scenes_of(args, scenes):
 def run_evaluate_encoding(args):
     model = stage2_model(args.checkpoint).to(args.device)
     if args.prefilter:
-        del model.prefilter  # a module, which the file is not
+        del model.prefilter  # a module attribute accepts only modules, and the file is not one
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
     scenes = scenes_for(args.data, args.seeds, args.split, {model.hologram.architecture.input}, args.scenes)
     depth = evaluate.SENSOR if args.sensor_depth else "clean"
@@ -486,7 +487,7 @@ def run_plot(args):
 
 
 def parse(arguments):
-    """Arguments; where a training is resumed, flags that are not given are those it was begun with."""
+    """Parses the arguments. A resumed training keeps the values of flags that are not given."""
     top = parser()
     args = top.parse_args(arguments)
     if not getattr(args, "resume", False):

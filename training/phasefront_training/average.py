@@ -1,7 +1,8 @@
-"""The running mean of a training's weights.
+"""The running mean of the weights in training.
 
-Weights at a high rate jump about the place that they would come to rest at as the rate falls; their mean over the last
-thousands of steps lies near it. So a training whose end is open can be judged, and used, at any time.
+At a high learning rate the weights fluctuate around the values that they converge to when the rate falls. Their mean
+over the last thousands of steps is close to these values, so a training without a fixed end can be evaluated and used
+at any time.
 """
 
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ import torch
 
 
 class Average:
-    """The mean over about the last `horizon` steps of the weights of `networks`, {name: module}."""
+    """The mean of the weights of `networks`, {name: module}, over about the last `horizon` steps."""
 
     def __init__(self, networks, horizon):
         self.networks, self.horizon = networks, horizon
@@ -19,7 +20,7 @@ class Average:
 
     @torch.no_grad()
     def add(self):
-        """Takes in the weights after a step; the first ones are a plain mean."""
+        """Adds the weights after a step. Over the first `horizon` steps the result is a plain mean."""
         self.taken += 1
         share = 1 / min(self.taken + 1, self.horizon)
         for name, network in self.networks.items():
@@ -29,7 +30,7 @@ class Average:
 
     @contextmanager
     def in_place(self):
-        """The networks have the means as their weights for the time of the block."""
+        """Gives the networks the mean weights for the duration of the block."""
         own = {name: _copied(network) for name, network in self.networks.items()}
         self._set(self.means)
         try:
@@ -42,11 +43,11 @@ class Average:
             network.load_state_dict(weights[name])
 
     def state_dict(self):
-        """What is needed to go on: the weights that are trained, beside the means, which the checkpoint's networks are."""
+        """Returns the trained weights, to resume from. The means are the networks of the checkpoint."""
         return {"taken": self.taken, "trained": {name: _copied(network) for name, network in self.networks.items()}}
 
     def load_state_dict(self, state):
-        """Goes on from networks that hold the means."""
+        """Resumes from networks that hold the means."""
         self.taken = state["taken"]
         self.means = {name: _copied(network) for name, network in self.networks.items()}
         self._set(state["trained"])

@@ -16,12 +16,12 @@ SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "sensor_depth", "dimm
 
 
 def sets(last):
-    """The description of each data set that the network was trained on."""
+    """Returns the description of each data set that the network was trained on."""
     return last.extra["data"].get("sets") or [last.extra["data"]]
 
 
 def names(name, last):
-    """The folder name of each data set: DATA, or DATA1 and DATA2; of a pool POOL."""
+    """Returns the folder name of each data set: DATA, or DATA1 and DATA2, or POOL for a pool."""
     if last.extra["data"].get("pool"):
         return ["POOL"]
     count = len(sets(last))
@@ -29,7 +29,7 @@ def names(name, last):
 
 
 def command(last, init):
-    """The command that reproduces the checkpoint `last`."""
+    """Returns the command that reproduces the checkpoint `last`."""
     architecture, _ = last.networks["hologram"]
     parts = ["python", "-m", "phasefront_training", last.kind, "--pool" if last.extra["data"].get("pool") else "--data", *names("DATA", last), "-o", "OUT"]
     if last.kind == "stage1":
@@ -53,7 +53,7 @@ def command(last, init):
 
 
 def like(known):
-    """Says of which kind scenes are, unless they are of objects."""
+    """Returns words for the kind of the scenes, or an empty string for objects."""
     return {"photographs": " like photographs", "varied": " of every kind"}.get(known.get("like"), "")
 
 
@@ -62,19 +62,19 @@ def counted(count, noun):
 
 
 def display_of(known, last):
-    """The display that scenes were made for. Old checkpoints do not record its volume."""
+    """Returns the display of the scenes. Old checkpoints do not record its volume."""
     mm = known.get("volume_depth_mm")
     return last.display if mm is None else replace(last.display, volume_depth_m=mm * 1e-3)
 
 
 def depth_of(known, last):
-    """Says how deep scenes are, if their volume is not that of the network's display."""
+    """Returns words for the depth of the scenes, if it differs from the volume of the network's display."""
     m = display_of(known, last).volume_depth_m
     return "" if math.isclose(m, last.display.volume_depth_m) else f", {m * 1e3:g} mm deep"
 
 
 def describe(name, last, figures):
-    """The card's text. figures: what `evaluate --json` or `evaluate-encoding --json` wrote, a list of them."""
+    """Returns the text of the card. figures: a list of results of `evaluate --json` or `evaluate-encoding --json`."""
     lines = [f"# {name}", ""]
     for part, (a, _) in last.networks.items():
         lines.append(
@@ -112,7 +112,7 @@ def describe(name, last, figures):
 
 
 def scenes_again(last):
-    """Lines with the commands that make the scenes that `last` was trained on."""
+    """Returns lines with the commands that make the training scenes of `last`."""
     data = last.extra["data"]
     if data.get("pool"):
         first = sets(last)[0]
@@ -132,7 +132,7 @@ def scenes_again(last):
 
 
 def write(path, last, figure_files):
-    """Writes the card `path` (NAME.md) for a checkpoint and files of figures."""
+    """Writes the card `path` (NAME.md) for a checkpoint and its files of figures."""
     figures = [json.loads(Path(file).read_text()) for file in figure_files]
     text = describe(Path(path).stem, last, figures)
     with replacing(path) as temporary:

@@ -1,6 +1,6 @@
-"""Checkpoints: everything needed to continue a training exactly, or to use its weights.
+"""Checkpoints, which hold everything needed to resume a training exactly or to use its weights.
 
-Samples and focal planes are functions of (seed, rank, step), so no generator's state has to be kept.
+Samples and focal planes are functions of (seed, rank, step), so a checkpoint holds no generator state.
 """
 
 from dataclasses import dataclass, field
@@ -13,18 +13,19 @@ from .networks import Architecture, Chain
 from .optics import Display
 
 FORMAT = "phasefront-checkpoint-1"
-RENAMED = {"degraded": "sensor_depth"}  # options that early checkpoints name otherwise
+RENAMED = {"degraded": "sensor_depth"}  # the names of options in early checkpoints
 
 
 class CheckpointError(Exception):
-    """A file that is no checkpoint, or one of another kind; the message says which and what was expected."""
+    """A file is not a checkpoint, or is a checkpoint of another kind. The message names the file and the expected
+    kind."""
 
 
 @dataclass
 class Checkpoint:
-    """kind: what was trained (stage1, stage2, qat). networks: {name: (architecture, weights)}.
+    """The state of a training. kind: stage1, stage2 or qat. networks: {name: (architecture, weights)}.
 
-    Where weights are averaged, those are the means, and `average` is what the training itself goes on from.
+    If the training averages its weights, `networks` holds the means, and `average` the state to resume from.
     """
 
     kind: str
@@ -59,7 +60,7 @@ class Checkpoint:
             table = torch.load(path, map_location="cpu", weights_only=True)
         except FileNotFoundError:
             raise CheckpointError(f"{path}: not there") from None
-        except Exception as error:  # torch raises many kinds for a damaged file
+        except Exception as error:  # torch raises many exceptions for a damaged file
             raise CheckpointError(f"{path}: no readable checkpoint ({str(error).splitlines()[0]})") from None
         if not isinstance(table, dict) or table.get("format") != FORMAT:
             raise CheckpointError(f"{path}: no checkpoint of this package (format {FORMAT})")
@@ -70,7 +71,7 @@ class Checkpoint:
         return cls(**table)
 
     def network(self, name="hologram"):
-        """One of the networks with its weights."""
+        """Returns a network with its weights."""
         architecture, weights = self.networks[name]
         network = Chain(architecture)
         network.load_state_dict(weights)
@@ -78,7 +79,7 @@ class Checkpoint:
 
 
 def load_network(path):
-    """(network, display) of a float32 .onnx of this package or a checkpoint."""
+    """Returns (network, display) of a checkpoint or of a float32 .onnx file of this package."""
     if Path(path).suffix == ".onnx":
         from .export import read_onnx
 

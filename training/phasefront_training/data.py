@@ -1,11 +1,11 @@
-"""Pairs of scene and hologram, as `phasefront-lab dataset` writes them, held in memory; and samples drawn from them.
+"""Pairs of scenes and holograms from `phasefront-lab dataset`, held in memory, and samples of them.
 
-A data set is a folder with `manifest.json` and one `pair_000123.npz` a scene:
+A data set is a folder with `manifest.json` and one `pair_000123.npz` for each scene:
 `rgb` uint8 (L, H, W, 4), front layer first, alpha 0 where the layer has no hit; `depth` uint16 (L, H, W),
 normalized depth times 65535; `hologram` complex64 (3, H, W), the midpoint hologram without the carrier.
 
-In memory a scene takes colour as uint8, depth and field as float16. The holograms are linear convolutions with
-black surroundings, so samples are crops, flips and transposes, never rolls.
+In memory, colour is uint8, and depth and field are float16. The holograms are linear convolutions with black
+surroundings, so samples are crops, flips and transposes, never rolls.
 """
 
 import copy
@@ -30,15 +30,15 @@ from .sensor_depth import simulate_sensor_depth
 FORMAT = "phasefront-dataset-1"
 _HEADER = threading.Lock()
 SPLITS = ("train", "validation", "test")
-LARGEST_GAIN = 4  # of dark samples, whose colours stand in few steps
+LARGEST_GAIN = 4  # of dark samples, whose colours have few levels
 
 
 class DataError(Exception):
-    """Something about a data set that keeps it from being used; the message says what and where."""
+    """A data set cannot be used. The message names the problem and its place."""
 
 
 def make(output, arguments, command="phasefront-lab"):
-    """Calls `phasefront-lab dataset` to make or complete a data set; raises DataError where it fails."""
+    """Calls `phasefront-lab dataset` to make or complete a data set. Raises DataError if it fails."""
     call = [command, "dataset", *arguments, "-o", str(output)]
     try:
         status = subprocess.run(call, check=False).returncode
@@ -50,7 +50,7 @@ def make(output, arguments, command="phasefront-lab"):
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a data set says of itself."""
+    """The manifest of a data set."""
 
     folder: Path
     table: dict
@@ -77,11 +77,11 @@ class Manifest:
 
     @property
     def like(self):
-        """What its scenes look like: objects or photographs."""
+        """The kind of the scenes, such as objects or photographs."""
         return self.table.get("look", {}).get("like", "objects")
 
     def indices(self, split):
-        """The scene numbers of a split."""
+        """Returns the scene numbers of a split."""
         if split not in self.table["splits"]:
             raise DataError(f"{self.folder}: no split '{split}' in the manifest")
         return range(*self.table["splits"][split])
@@ -91,10 +91,10 @@ class Manifest:
 
 
 def read_pair(path, ldi_layers):
-    """One pair as colour uint8 (3·L, H, W), depth float16 (L, H, W), field float16 (6, H, W).
+    """Reads a pair as colour uint8 (3·L, H, W), depth float16 (L, H, W) and field float16 (6, H, W).
 
     A pixel without a hit gets colour 0 and depth 1. The field is three real parts, then three imaginary parts.
-    Raises DataError where the file is damaged or holds fewer than `ldi_layers` layers.
+    Raises DataError if the file is damaged or holds fewer than `ldi_layers` layers.
     """
     try:
         rgba, depth, hologram = _read_arrays(path, ("rgb", "depth", "hologram"))
@@ -115,16 +115,16 @@ def read_pair(path, ldi_layers):
 
 
 class Scenes:
-    """A split in memory. Damaged files are named on stderr and left out.
+    """The scenes of a split in memory. Damaged files are reported on stderr and skipped.
 
-    With `seeds` (a seeds.Seeds), each scene also has variants of its depth and the sweep's field on each.
+    With `seeds` (a seeds.Seeds), each scene also has variants of its depth, each with the field of the plane sweep.
     """
 
     def __init__(self, manifest, split, ldi_layers=1, limit=None, device="cpu", seeds=None):
         self.display = manifest.display
         self.ldi_layers = ldi_layers
         self.damaged = []
-        self.sets = []  # what each of several joined data sets is
+        self.sets = []  # the facts of each of several joined data sets
         self.origin = {key: manifest.table[key] for key in ("seed", "planes")} | {"like": manifest.like}
         self.origin["volume_depth_mm"] = manifest.table["display"]["volume_depth_mm"]
         self.corrected = bool(manifest.table.get("aberration"))
@@ -147,7 +147,7 @@ class Scenes:
         if not parts:
             raise DataError(f"{manifest.folder}: no readable pair in the split '{split}'")
         self.colour, self.depth, self.target = (_gather(parts, k, device) for k in range(3))
-        self.stretches = torch.ones(len(self.numbers))  # of each scene's depths about the middle, to those of `display`
+        self.stretches = torch.ones(len(self.numbers))  # to the volume of `display`, about the middle
         self.seeded = seeds is not None
         self.refined = seeds.refined if seeds else 0
         if seeds:
@@ -158,9 +158,10 @@ class Scenes:
 
     @classmethod
     def joined(cls, parts):
-        """The scenes of several data sets as one, for the display of the deepest volume.
+        """Joins the scenes of several data sets, for the display with the deepest volume.
 
-        They must be of one size and, but for the volume, for one display: depths of a shallower volume are stretched.
+        All must have the same size and, except for the volume, the same display. Depths of a shallower volume are
+        stretched.
         """
         if len(parts) == 1:
             return parts[0]
@@ -192,28 +193,30 @@ class Scenes:
 
     @property
     def facts(self):
-        """What a checkpoint keeps about the data it was trained on."""
+        """The facts about the training data that a checkpoint keeps."""
         facts = {"scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers} | self.origin
         return facts | ({"sets": self.sets} if self.sets else {})
 
     def scene(self, i):
-        """Colour (3·L, H, W) in [0, 1], depth (L, H, W) normalized to its own set's volume and the true field (3, H, W) of scene i."""
+        """Returns scene i: colour (3·L, H, W) in [0, 1], depth (L, H, W) normalized to its own set's volume, and the
+        true field (3, H, W)."""
         target = self.target[i].float()
         return self.colour[i].float() / 255, self.depth[i].float(), torch.complex(target[:3], target[3:])
 
 
     def stretch(self, i):
-        """What depths of scene i are stretched by to those of the display."""
+        """Returns the factor that stretches the depths of scene i to the volume of the display."""
         return float(self.stretches[i])
 
     def variant(self, i, v):
-        """Depth (1, H, W), normalized to its own set's volume, and seed (6, H, W) of variant v of scene i; v = 0 is clean, the last `refined` are refined."""
+        """Returns depth (1, H, W), normalized to its own set's volume, and seed (6, H, W) of variant v of scene i. v =
+        0 is clean, and the last `refined` variants are refined."""
         return self.variant_depth[i, v][None].float(), self.variant_seed[i, v].float()
 
 
 def _read_arrays(path, names):
-    """Arrays of an .npz. Unpacking runs beside other threads; headers one at a time, for `ast`, which numpy parses
-    them by, fails in CPython 3.11 when two threads use it at once."""
+    """Reads arrays of an .npz. Unpacking runs in parallel with other threads. Headers are parsed under a lock, because
+    numpy parses them with `ast`, which fails in CPython 3.11 if two threads use it at once."""
     with zipfile.ZipFile(path) as archive:
         packed = [archive.read(f"{name}.npy") for name in names]
     with _HEADER:
@@ -228,7 +231,7 @@ def _try_read(path, ldi_layers):
 
 
 def _gather(parts, k, device):
-    """Stacks member k of all parts, releasing each as it goes, so that memory does not double."""
+    """Stacks member k of all parts and releases each part at once, so that memory use does not double."""
     whole = torch.empty((len(parts), *parts[0][k].shape), dtype=parts[0][k].dtype, device=device)
     for i, part in enumerate(parts):
         whole[i] = part[k].to(device)
@@ -237,10 +240,12 @@ def _gather(parts, k, device):
 
 
 def network_input(colour, depth, kind="rgbd", seed=None):
-    """The input of a network of this kind (networks.py): colour and depth of each layer in turn, each minus 0.5.
+    """Returns the input of a network of this kind (networks.py): colour and depth of each layer in turn, each minus
+    0.5.
 
-    For seeded networks the seed (..., 6, H, W) comes behind: half of (real part minus 0.5), half of the imaginary part,
-    so that all fit one range. For rgbdxy, of a whole frame (4, H, W), two more channels come behind, its `place`.
+    For seeded networks the seed (..., 6, H, W) follows: half of (real part minus 0.5), half of the imaginary part, so
+    that all channels have the same range. For rgbdxy, whose input is a whole frame (4, H, W), the two channels of
+    `place` follow.
     """
     colour = colour.unflatten(-3, (-1, 3))
     layers = torch.cat([colour, depth.unsqueeze(-3)], -3).flatten(-4, -3) - 0.5
@@ -252,18 +257,20 @@ def network_input(colour, depth, kind="rgbd", seed=None):
 
 
 def place(height, width):
-    """x and y (2, H, W) of the pixels of a frame, from -0.5 at the first pixel's outer edge to 0.5 at the last one's."""
+    """Returns x and y (2, H, W) of a frame's pixels, from -0.5 at the outer edge of the first to 0.5 at that of the
+    last."""
     x, y = ((torch.arange(n) + 0.5) / n - 0.5 for n in (width, height))
     return torch.stack([x.expand(height, width), y[:, None].expand(height, width)])
 
 
 def seed_of_input(x):
-    """The seed's real and imaginary parts (N, 3, H, W) in network inputs (N, 10, H, W)."""
+    """Returns the real and the imaginary part (N, 3, H, W) of the seed in network inputs (N, 10, H, W)."""
     return 2 * x[:, 4:7] + 0.5, 2 * x[:, 7:]
 
 
 def brightness_gains(colour, rng):
-    """A factor a colour (3, 1, 1) that keeps the colours (3·L, H, W) in [0, 1] and brings the brightest to any level."""
+    """Returns a factor for each colour (3, 1, 1) that keeps the colours (3·L, H, W) in [0, 1] and takes the brightest
+    to a random level."""
     level = np.exp(rng.uniform(np.log(0.25), 0)) * np.exp(rng.uniform(np.log(0.75), 0, 3))
     largest = min(1 / max(float(colour.max()), 1e-6), LARGEST_GAIN)
     return torch.tensor(largest * level, dtype=torch.float32, device=colour.device)[:, None, None]
@@ -271,10 +278,10 @@ def brightness_gains(colour, rng):
 
 @dataclass(frozen=True)
 class Batch:
-    """Samples for one step.
+    """The samples of one step.
 
-    input: (N, C, H, W) as the network takes it. target: complex (N, 3, H, W). depth: clean normalized depth of the
-    front layer (N, H, W). valid: (N, 1, H, W), 1 where the network's view is not cut by the crop.
+    input: the network's input (N, C, H, W). target: complex (N, 3, H, W). depth: clean normalized depth of the front
+    layer (N, H, W). valid: (N, 1, H, W), 1 where the crop does not cut the network's view.
     """
 
     input: torch.Tensor
@@ -284,12 +291,12 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches for networks of one `kind`; batch `step` of a seed is always the same, whatever was drawn before.
+    """Draws batches for networks of one `kind`. Batch `step` of a seed does not depend on earlier draws.
 
-    Samples of holograms that correct an aberration are
-    neither flipped nor transposed, as the aberration does not flip with the scene; nor are coordinates. A share `dimmed`
-    of the samples has the brightness of each colour changed: optics are linear, and colours do not meet, so the hologram
-    of a scene whose red is halved is the hologram with its red halved, exactly. (More contrast is no such change.)
+    Samples with coordinates, and samples of holograms that correct an aberration, are neither flipped nor transposed,
+    because the aberration does not flip with the scene. In a fraction `dimmed` of the samples the brightness of each
+    colour changes. Optics are linear and colours do not interact, so halving the red of a scene exactly halves the red
+    of its hologram. (This does not hold for a change of contrast.)
     """
 
     def __init__(self, scenes, batch, crop, margin, sensor_depth=0.0, seed=0, rank=0, kind="rgbd", dimmed=0.0):
@@ -316,7 +323,7 @@ class Sampler:
         scenes, (h, w), margin = self.scenes, self.crop, self.margin
         height, width = scenes.shape
         i = int(rng.integers(len(scenes)))
-        # Corners are drawn beyond the frame and clamped, so that the frame's borders are seen often enough.
+        # Draws corners beyond the frame and clamps them, so that samples include the frame's borders often enough.
         y = int(np.clip(rng.integers(-margin, height - h + margin + 1), 0, height - h))
         x = int(np.clip(rng.integers(-margin, width - w + margin + 1), 0, width - w))
         window = (..., slice(y, y + h), slice(x, x + w))
@@ -329,7 +336,7 @@ class Sampler:
             colour = colour * gains.repeat(scenes.ldi_layers, 1, 1)
             target = target * gains.repeat(2, 1, 1)
         valid = torch.zeros(1, h, w, device=depth.device)
-        # At the frame's border the network sees zeros in use as well; only cut sides are left out of the loss.
+        # At the frame's border the network also reads zeros in use. The loss leaves out only cut sides.
         valid[
             :,
             margin if y > 0 else 0 : h - margin if y + h < height else h,
@@ -343,7 +350,7 @@ class Sampler:
             field = scenes.variant_seed[i, v][window].float() * gains.repeat(2, 1, 1)
         else:
             measured = simulate_sensor_depth(colour, depth[0], rng)[None] if from_sensor else depth
-        # Measured in its own volume, whose depth the sensor's errors are a share of.
+        # The sensor's errors are a fraction of the scene's own volume, so the stretch follows the measurement.
         measured, depth = (stretched(each, scenes.stretch(i)) for each in (measured, depth))
         if self.place is None:
             seen = network_input(colour, measured, self.kind, field)

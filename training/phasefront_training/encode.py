@@ -1,4 +1,4 @@
-"""From a complex field to a phase-only hologram and to what it shows, differentiably: Eq. 6 to 11.
+"""Differentiable encoding of a complex field as a phase-only hologram, and its reconstruction: Eq. 6 to 11.
 
 Fields are complex64 (N, 3, H, W). Offsets are signed distances in metres from the midpoint hologram to the modulator's
 plane (positive: toward the viewer).
@@ -12,23 +12,23 @@ from torch.nn import functional as F
 from .networks import head_field, split
 from .optics import padded_shape, propagate, transfer
 
-LARGEST = 1 - 1e-6  # of the normalized amplitude, so that the slope of acos stays finite
+LARGEST = 1 - 1e-6  # bound of the normalized amplitude, so that the slope of acos stays finite
 BLUR_SIGMA = 0.7  # pixels, of AA-DPM
-DARK = 1e-3  # of the scale: below this amplitude the phase's gradient fades instead of growing without bound
+DARK = 1e-3  # fraction of the scale below which the gradient of the phase fades instead of growing without bound
 
 
 def channels(field):
-    """A field as the six real channels of a network: three real parts, three imaginary parts."""
+    """Returns a field as six real channels of a network: three real parts, then three imaginary parts."""
     return torch.cat([field.real, field.imag], 1)
 
 
 def scale_of(field):
-    """The largest amplitude over all colours of each image, (N, 1, 1, 1), plus 1e-6."""
+    """Returns the largest amplitude over all colours of each image, (N, 1, 1, 1), plus 1e-6."""
     return field.abs().amax((1, 2, 3), keepdim=True) + 1e-6
 
 
 def phase_of(field, scale):
-    """The phase in (−π, π], with a gradient that fades where the field is dark."""
+    """Returns the phase in (−π, π], with a gradient that fades where the field is dark."""
     phase = field.angle()
     power = field.detach().abs().square()
     weight = power / (power + (DARK * scale.detach()) ** 2)
@@ -36,7 +36,7 @@ def phase_of(field, scale):
 
 
 def double_phase(field, scale):
-    """Eq. 7: the phase map φ ± acos(|u|/scale), + where x + y is even; (N, 3, H, W), not wrapped."""
+    """Returns the phase map φ ± acos(|u|/scale), + where x + y is even (Eq. 7); (N, 3, H, W), not wrapped."""
     height, width = field.shape[-2:]
     y = torch.arange(height, device=field.device)[:, None]
     x = torch.arange(width, device=field.device)
@@ -45,17 +45,19 @@ def double_phase(field, scale):
 
 
 def aperture(height, width, radius=1.0, device="cpu"):
-    """Eq. 9: 1 inside the circle of `radius` times the Nyquist frequency, in the order of fft2; (height, width)."""
+    """Returns 1 inside the circle of `radius` times the Nyquist frequency, else 0 (Eq. 9); (height, width), in the
+    order of fft2."""
     y = torch.fft.fftfreq(height, 0.5, dtype=torch.float64, device=device)
     x = torch.fft.fftfreq(width, 0.5, dtype=torch.float64, device=device)
     return (y[:, None] ** 2 + x**2 <= radius**2).float()
 
 
 def reconstruct(phase, scale, offset_m, display, radius=1.0):
-    """Eq. 8 and 10: the midpoint hologram that a phase map at the offset shows behind the aperture.
+    """Returns the midpoint hologram that a phase map at the offset produces behind the aperture (Eq. 8 and 10).
 
-    A modulator of unit amplitude under light of amplitude `scale`; Eq. 7's 0.5 is left out, since the aperture's mean
-    of neighbours gives scale·cos(acos A) = the encoded amplitude without it. Black surroundings, cropped.
+    The modulator has unit amplitude, and its light has the amplitude `scale`. The factor 0.5 of Eq. 7 is left out,
+    because the aperture's mean of neighbours is scale·cos(acos A), the encoded amplitude, without it. The surroundings
+    are black, and the result is cropped.
     """
     height, width = phase.shape[-2:]
     shape = padded_shape(display, offset_m, height, width)
@@ -73,21 +75,23 @@ class DeepDoublePhase(torch.nn.Module):
         self.offset_m, self.display, self.bf16 = offset_m, display, bf16
 
     def seen_by_prefilter(self, midpoint):
-        """The pre-filter's input (N, 6, H, W): the field at the modulator's plane, blurred where it asks for that."""
+        """Returns the pre-filter's input (N, 6, H, W): the field at the modulator's plane, blurred if its kind
+        requires."""
         there = propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint
         kind = self.prefilter.architecture.input
         x = channels(there if kind == "field" else anti_alias(there))
         return split(x) if kind == "split-blurred-field" else x
 
     def filtered(self, midpoint):
-        """Eq. 6: the pre-encoding field at the modulator's plane; the carrier-free ASM has its phase correction."""
+        """Returns the pre-encoding field at the modulator's plane (Eq. 6). The carrier-free ASM includes the phase
+        correction."""
         x = self.seen_by_prefilter(midpoint).contiguous(memory_format=torch.channels_last)
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.bf16):
             output = self.prefilter(x)
         return head_field(self.prefilter.architecture, output, x)
 
     def forward(self, x):
-        """(pre-encoding field at the modulator, post-encoding midpoint hologram) of network inputs."""
+        """Returns (pre-encoding field at the modulator, post-encoding midpoint hologram) of network inputs."""
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.bf16):
             output = self.hologram(x)
         before = self.filtered(head_field(self.hologram.architecture, output, x))
@@ -96,9 +100,9 @@ class DeepDoublePhase(torch.nn.Module):
 
 
 def phase_regulariser(field):
-    """Eq. 11: standard deviation plus |mean| of the pre-encoding phase, a colour and image, then averaged.
+    """Returns the standard deviation plus |mean| of the pre-encoding phase, averaged over colours and images (Eq. 11).
 
-    The mean's sign is of no interest, so its modulus is taken.
+    The sign of the mean is irrelevant, so its modulus is used.
     """
     phase = phase_of(field, scale_of(field)).flatten(2)
     mean = phase.mean(-1, keepdim=True)
@@ -107,12 +111,12 @@ def phase_regulariser(field):
 
 
 def wraps(phase):
-    """The share of values of a phase map outside (−π, π]: each is a jump of 2π on the modulator."""
+    """Returns the fraction of values of a phase map outside (−π, π]. Each is a jump of 2π on the modulator."""
     return float(((phase > math.pi) | (phase <= -math.pi)).float().mean())
 
 
 def blur_kernel(sigma=BLUR_SIGMA, width=3):
-    """A Gaussian of σ pixels over `width` taps a side, its sum 1; AA-DPM's is 3x3."""
+    """Returns a Gaussian of σ pixels over `width` taps a side, with sum 1. AA-DPM uses 3x3."""
     places = torch.arange(width) - width // 2
     weights = torch.exp(-places.square() / (2 * sigma**2))
     weights = weights / weights.sum()
@@ -120,14 +124,15 @@ def blur_kernel(sigma=BLUR_SIGMA, width=3):
 
 
 def anti_alias(field, sigma=BLUR_SIGMA, width=3):
-    """AA-DPM's filter: real and imaginary parts blurred; edges are repeated."""
+    """Blurs the real and imaginary parts of a field (the filter of AA-DPM). Edges are repeated."""
     kernel = blur_kernel(sigma, width).to(field.device).expand(6, 1, width, width)
     blurred = F.conv2d(F.pad(channels(field), [width // 2] * 4, mode="replicate"), kernel, groups=6)
     return torch.complex(blurred[:, :3].contiguous(), blurred[:, 3:].contiguous())
 
 
 def band_limit(field, k=1.0):
-    """BL-DPM's filter (Sui et al. 2021): |tan(πfx)·tan(πfy)| ≤ k stays, f in cycles a pixel; the field is periodic."""
+    """Keeps the frequencies with |tan(πfx)·tan(πfy)| ≤ k, f in cycles per pixel (the filter of BL-DPM, Sui et al.
+    2021). The field is periodic."""
     height, width = field.shape[-2:]
     y, x = (torch.fft.fftfreq(n, dtype=torch.float64, device=field.device) for n in (height, width))
     stays = (math.pi * y).tan()[:, None] * (math.pi * x).tan()

@@ -1,9 +1,10 @@
-"""How good a network's holograms are on scenes not trained on.
+"""The quality of a network's holograms on scenes that it was not trained on.
 
-Amplitude PSNR and SSIM (peak 1) of the midpoint hologram, and the same as the mean over a focal stack of five planes
-inside the volume; means over scenes. Beside the network stand 'RGB as the field', the front layer's image with phase 0,
-and 'SM-LBM of what is visible', exact waves from the front layer alone. Depth is clean, or simulated sensor depth that
-the scene's number fixes, so that figures compare; or, where there are seeds on such depth, refined by the core.
+The figures are means over scenes of amplitude PSNR and SSIM (peak 1), of the midpoint hologram and of a focal stack of
+five planes inside the volume. Two baselines are 'RGB as the field', the front layer's image with phase 0, and 'SM-LBM
+of what is visible', exact waves from the front layer alone. Depth is clean, or simulated sensor depth that depends only
+on the scene's number, so that figures are comparable. If there are seeds on refined depth, depth refined by the core is
+evaluated too.
 """
 
 import json
@@ -23,19 +24,19 @@ from .optics import padded_shape, propagate, stretched, transfer
 from .sensor_depth import simulate_sensor_depth
 
 STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoint
-RANGE_TOLERANCE = 0.02  # over the range that was trained, as in the core
-COLOUR_TOLERANCE = 0.05  # of a colour's own range beside their mean, as in the core
+RANGE_TOLERANCE = 0.02  # beyond the trained range, as in the core
+COLOUR_TOLERANCE = 0.05  # of a colour's own range from the mean of the colours, as in the core
 SENSOR = "simulated sensor"  # a kind of depth
 FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
 
 
 def rgb_as_field(colour, depth, seed=None):
-    """The front layer's image as amplitude, with phase 0."""
+    """Returns the front layer's image as amplitude, with phase 0."""
     return torch.complex(colour[:3], torch.zeros_like(colour[:3]))
 
 
 def visible_layers(display, planes):
-    """colour, depth -> field by SM-LBM (Eq. 1 to 4) of the front layer: the lab's `sm_lbm`, by whole transforms."""
+    """Returns a predictor by SM-LBM (Eq. 1 to 4) of the front layer, like the lab's `sm_lbm`, with whole transforms."""
     z = display.z_m((torch.arange(planes, dtype=torch.float64) + 0.5) / planes)
 
     def predict(colour, depth, seed=None):
@@ -53,17 +54,17 @@ def visible_layers(display, planes):
 
 
 def _on(wave, distance_m, display):
-    """`wave` at distance_m further, circularly."""
+    """Propagates `wave` by distance_m, circularly."""
     return torch.fft.ifft2(torch.fft.fft2(wave) * transfer(display, distance_m, *wave.shape[-2:]))
 
 
 def seed_as_field(colour, depth, seed):
-    """What the sweep alone gives."""
+    """Returns the field of the plane sweep alone."""
     return torch.complex(seed[:3], seed[3:])
 
 
 def torch_predictor(network, autocast=False):
-    """colour, depth, seed -> field (3, H, W) by a network in memory."""
+    """Returns a predictor, colour, depth, seed -> field (3, H, W), by a network in memory."""
     device = next(network.parameters()).device
 
     def predict(colour, depth, seed=None):
@@ -77,20 +78,20 @@ def torch_predictor(network, autocast=False):
 
 
 def onnx_session(path, threads=None):
-    """An ONNX Runtime session on the CPU whose int8 sums are exact."""
+    """Returns an ONNX Runtime session on the CPU with exact int8 sums."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads or torch.get_num_threads()
-    # Where a CPU has AVX2 but not VNNI, sums of two products saturate at 16 bits without this.
+    # Without this, sums of two products saturate at 16 bits on CPUs that have AVX2 but not VNNI.
     options.add_session_config_entry("session.x64quantprecision", "1")
     return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 
 class OnnxNetwork:
-    """A network file on ONNX Runtime, float32 or int8; called like a Chain, computing on the CPU.
+    """A float32 or int8 network file on ONNX Runtime. It is called like a Chain and computes on the CPU.
 
-    Of `architecture` only what the input and the output mean is the file's.
+    In `architecture`, only the input and the head are read from the file.
     """
 
     def __init__(self, path, threads=None):
@@ -107,7 +108,7 @@ class OnnxNetwork:
 
 
 def onnx_predictor(path, threads=None):
-    """(predict, architecture's input and head) by ONNX Runtime, float32 or int8."""
+    """Returns (predict, architecture's input and head) of a float32 or int8 file, by ONNX Runtime."""
     network = OnnxNetwork(path, threads)
     meaning = network.architecture
 
@@ -119,7 +120,7 @@ def onnx_predictor(path, threads=None):
 
 
 def predictor(path, device="cpu"):
-    """(predict, architecture, display that it was trained for) of a checkpoint or an .onnx."""
+    """Returns (predict, architecture, display that it was trained for) of a checkpoint or an .onnx file."""
     if Path(path).suffix == ".onnx":
         from .export import read_display
 
@@ -129,9 +130,10 @@ def predictor(path, device="cpu"):
 
 
 def served(predict, trained, display):
-    """`predict` of a network for the display `trained` on frames for `display`, as sessions call it: depths stretched.
+    """Returns a predictor for frames of `display` by a network for the display `trained`, with stretched depths as in
+    sessions.
 
-    Raises ValueError where it cannot serve it.
+    Raises ValueError if the network does not suit the display.
     """
     if trained.corrected and display != trained:
         raise ValueError("the network corrects the optics of one display and serves no other")
@@ -145,7 +147,7 @@ def served(predict, trained, display):
 
 
 def compare(field, truth, display, full=True):
-    """{figure: value} of a field against the true one, both (3, H, W); `full` adds all that takes long."""
+    """Returns {figure: value} of a field against the true field, both (3, H, W). `full` adds the slow figures."""
     truth = truth.to(field.device)
     figures = {"amplitude_psnr": psnr(field.abs(), truth.abs())}
     if full:
@@ -160,19 +162,20 @@ def compare(field, truth, display, full=True):
 
 
 def sensor_generator(number, variant=0):
-    """The generator of a scene's simulated sensor depths; variant 0 is the one that scenes are judged on."""
+    """Returns the generator of a scene's simulated sensor depth. Evaluation uses variant 0."""
     return np.random.default_rng([7, number] if variant == 0 else [8, number, variant])
 
 
 def depths(scenes):
-    """The kinds of depth that scenes can be judged on."""
+    """Returns the kinds of depth that the scenes have."""
     if scenes.ldi_layers > 1:
         return ("clean",)
     return ("clean", SENSOR, "refined") if scenes.refined else ("clean", SENSOR)
 
 
 def scene_as_seen(scenes, i, kind):
-    """Colour, depth of one of the kinds of `depths` in the display's volume, seed (None where there is none) and truth of a scene."""
+    """Returns the colour, depth, seed (or None) and truth of a scene. The depth is of one of the kinds of `depths`, in
+    the display's volume."""
     colour, depth, truth = scenes.scene(i)
     seed = None
     if scenes.seeded:
@@ -183,7 +186,7 @@ def scene_as_seen(scenes, i, kind):
 
 
 def evaluate(predict, scenes, depth="clean", full=True, progress=False):
-    """{figure: mean, 'worst': …} of a predictor over scenes."""
+    """Returns {figure: mean, 'worst': …} of a predictor over scenes."""
     rows = []
     for i in tqdm(range(len(scenes)), disable=not (progress and sys.stderr.isatty())):
         colour, seen, seed, truth = scene_as_seen(scenes, i, depth)
@@ -192,7 +195,7 @@ def evaluate(predict, scenes, depth="clean", full=True, progress=False):
 
 
 def means_and_worst(rows, scenes):
-    """{figure: mean} of the scenes' rows of `compare`, and the least amplitude PSNR and whose it is."""
+    """Returns {figure: mean} of the scenes' rows of `compare`, with the least amplitude PSNR and its scene."""
     means = {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
     worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
     return means | {
@@ -202,7 +205,7 @@ def means_and_worst(rows, scenes):
 
 
 def table(results):
-    """Markdown table of {method: {condition: figures}}."""
+    """Returns a Markdown table of {method: {condition: figures}}."""
     lines = ["| method | depth | amplitude PSNR / SSIM | focal stack PSNR / SSIM | worst scene |", "|---|---|---|---|---|"]
     for method, conditions in results.items():
         for condition, f in conditions.items():

@@ -1,4 +1,5 @@
-"""What encoded holograms show: the deep double phase method beside AA-DPM, BL-DPM and plain double phase (Fig. 5)."""
+"""The displayed images of encoded holograms: deep double phase compared with AA-DPM, BL-DPM and plain double phase
+(Fig. 5)."""
 
 import torch
 
@@ -9,14 +10,15 @@ from .optics import propagate
 from .plot import pictures
 
 DEEP = "deep double phase"
-STRONG_BLUR = (1.5, 7)  # σ in pixels and taps, and the bound of BL-DPM, that leave hardly any artefacts
+STRONG_BLUR = (1.5, 7)  # σ in pixels and taps that leave hardly any artefacts, and below the bound of BL-DPM
 STRONG_BAND_LIMIT = 0.1
 
 
 @torch.no_grad()
 def encodings(model, colour, depth, seed, others=True):
-    """Yields (method, phase map, midpoint hologram that it shows), both (1, 3, H, W), of a scene as `scene_as_seen` gives it:
-    the DeepDoublePhase `model`, and with `others` those after its hologram network, with a weak and a strong filter."""
+    """Yields (method, phase map, reconstructed midpoint hologram), both (1, 3, H, W), of a scene from `scene_as_seen`:
+    by the DeepDoublePhase `model` and, with `others`, by the other encodings of its hologram network, weak and
+    strong."""
     x = network_input(colour, depth, model.hologram.architecture.input, seed)[None]
     midpoint = model.hologram.field(x.to(next(model.parameters()).device))
     there = propagate(midpoint, model.offset_m, model.display)
@@ -30,7 +32,7 @@ def encodings(model, colour, depth, seed, others=True):
             "double phase": there,
         }
     for method, field in fields.items():
-        # The taken-out mean phase does not change amplitudes, so they compare as they are.
+        # Removing the mean phase does not change amplitudes, so they are comparable.
         centred = field if method == DEEP else field * torch.exp(-1j * field.angle().mean((-1, -2), keepdim=True))
         scale = scale_of(centred)
         phase = double_phase(centred, scale)
@@ -38,8 +40,8 @@ def encodings(model, colour, depth, seed, others=True):
 
 
 def encoding_figures(model, scenes, depth="clean", full=True, others=True):
-    """{method: mean figures} of `encodings`; `wraps` is the share of phases outside (−π, π], `brightness` the mean amplitude
-    over the true, and `worst_scene` the one of the least amplitude PSNR."""
+    """Returns {method: mean figures} of `encodings`. `wraps` is the fraction of phases outside (−π, π], `brightness`
+    the ratio of the mean amplitude to the true one, and `worst_scene` the scene with the least amplitude PSNR."""
     rows = {}
     for i in range(len(scenes)):
         *seen, truth = scene_as_seen(scenes, i, depth)
@@ -51,7 +53,7 @@ def encoding_figures(model, scenes, depth="clean", full=True, others=True):
 
 
 def table(results):
-    """Markdown table of what `encoding_figures` gives."""
+    """Returns the result of `encoding_figures` as a Markdown table."""
     columns = list(next(iter(results.values())))
     lines = ["| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
     for method, figures in results.items():
@@ -60,8 +62,8 @@ def table(results):
 
 
 def draw_worst(model, scenes, results, output, depth="clean"):
-    """Draws the true amplitude and what each encoding shows into one picture, of the scene that is worst for the deep
-    double phase method in `results`, which `encoding_figures` gave."""
+    """Draws the true amplitude and the displayed image of each encoding for the scene that is worst for the deep double
+    phase method in `results`, a result of `encoding_figures`."""
     i = scenes.numbers.index(results[DEEP]["worst_scene"])
     *seen, truth = scene_as_seen(scenes, i, depth)
     views = {"the true hologram": truth.abs()}

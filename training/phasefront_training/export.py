@@ -1,12 +1,16 @@
-"""Networks as ONNX files, and back.
+"""Writes networks as ONNX files and reads them.
 
-The graph is written node by node, so that its names are stable and a network's file is the same to the byte each time:
-input `rgbd` (1, 4, H, W) (`ldi` or `field` for the other kinds), nodes `conv_0`, `relu_0`, …, `add_3` before each
-layer that has a skip, `concat_L` before the last convolution, `tanh` behind it for the amplitude-phase head, output
-`field` (1, 6, H, W) (`filtered` where the input is `field`), the six channels of the last layer as networks.py gives them. H and W are dynamic.
-A halved network's graph begins with the node `squares` (SpaceToDepth), whose output `squares_out` the first and the last
-layer read, and `pixels` (DepthToSpace) follows the last convolution; it takes even H and W. What the
-network is stands in `metadata_props`, keys `phasefront.*`; of a seeded one also of how many planes its seed was. The int8 form is written by export_int8.py.
+The graph is written node by node, so that its names are stable and the same network always gives the same bytes. The
+input is `rgbd` (1, 4, H, W) (`ldi` or `field` for the other kinds). The nodes are `conv_0`, `relu_0`, …, `add_3` before
+each layer that has a skip, `concat_L` before the last convolution, and `tanh` after it for the amplitude-phase head.
+The output `field` (1, 6, H, W) (`filtered` if the input is `field`) has the six channels of the last layer in the order
+of networks.py. H and W are dynamic.
+
+The graph of a halved network begins with the node `squares` (SpaceToDepth), whose output `squares_out` the first and
+the last layer read, and `pixels` (DepthToSpace) follows the last convolution. It takes even H and W.
+
+`metadata_props` describes the network, with keys `phasefront.*`; for a seeded network also the number of planes of its
+seed. export_int8.py writes the int8 form.
 """
 
 import os
@@ -26,21 +30,21 @@ IR_VERSION = 8
 
 
 class ExportError(Exception):
-    """An .onnx that is not one of this package's networks; the message says what is missing."""
+    """An .onnx file is not a network of this package. The message names the missing part."""
 
 
 def input_name(architecture):
-    """The name of the graph's input."""
+    """Returns the name of the graph's input."""
     return "ldi" if architecture.input.startswith("ldi") else architecture.input
 
 
 def output_name(architecture):
-    """The name of the graph's output; a graph cannot use one name twice."""
+    """Returns the name of the graph's output, which must differ from that of the input."""
     return "filtered" if architecture.of_fields else "field"
 
 
 def metadata(architecture, display, offset_m=0.0, seed_planes=None):
-    """The key-value pairs that say what a network is and which display, and seed, it was trained for."""
+    """Returns the key-value pairs that describe a network, its display and the seed that it was trained for."""
     found = {
         "phasefront.input": architecture.input,
         "phasefront.head": architecture.head,
@@ -58,7 +62,7 @@ def _number(value):
 
 
 def build(architecture, nodes, initializers, properties):
-    """A checked model of nodes from the network's input to its output."""
+    """Builds and checks a model of the nodes from the network's input to its output."""
     shape = [1, architecture.input_channels, "H", "W"]
     graph = helper.make_graph(
         nodes,
@@ -76,7 +80,7 @@ def build(architecture, nodes, initializers, properties):
 
 
 def entering(architecture):
-    """The name of what the first layer and the last one read, and the nodes before it."""
+    """Returns the name of the tensor that the first and the last layer read, and the nodes before it."""
     given = input_name(architecture)
     if not architecture.halved:
         return given, []
@@ -84,7 +88,7 @@ def entering(architecture):
 
 
 def leaving(architecture):
-    """The name of what the last convolution gives, and the nodes behind it."""
+    """Returns the name of the last convolution's output, and the nodes after it."""
     conv = f"conv_{architecture.layers - 1}_out"
     tanh = architecture.head == "amplitude-phase"
     pixels = "pixels_out" if tanh else output_name(architecture)
@@ -97,12 +101,12 @@ def leaving(architecture):
 
 
 def conv_node(i, inputs, output):
-    """The convolution of layer i."""
+    """Returns the convolution node of layer i."""
     return helper.make_node("Conv", inputs, [output], f"conv_{i}", kernel_shape=[3, 3], pads=[1, 1, 1, 1], strides=[1, 1])
 
 
 def float_model(network, display, offset_m=0.0, seed_planes=None):
-    """The float32 model of a Chain."""
+    """Returns the float32 model of a Chain."""
     a = network.architecture
     given, nodes = entering(a)
     initializers, inputs = [], []
@@ -128,7 +132,7 @@ def float_model(network, display, offset_m=0.0, seed_planes=None):
 
 
 def write(model, path):
-    """Writes a model; the same model gives the same bytes."""
+    """Writes a model. The same model always gives the same bytes."""
     with replacing(path) as temporary:
         Path(temporary).write_bytes(model.SerializeToString(deterministic=True))
 
@@ -138,12 +142,12 @@ def load_model(path):
         return onnx.load(os.fspath(path))
     except FileNotFoundError:
         raise ExportError(f"{path}: not there") from None
-    except Exception as error:  # protobuf raises its own kinds for a damaged file
+    except Exception as error:  # protobuf raises its own exceptions for a damaged file
         raise ExportError(f"{path}: no readable ONNX file ({str(error).splitlines()[0]})") from None
 
 
 def read_description(path):
-    """{'input', 'head', 'pitch_um', …} from a model's metadata_props."""
+    """Returns {'input', 'head', 'pitch_um', …} from a model's metadata_props."""
     return _description(load_model(path), path)
 
 
@@ -157,7 +161,7 @@ def _description(model, path):
 
 
 def read_display(path):
-    """The Display that a model was trained for."""
+    """Returns the Display that a model was trained for."""
     return _display(read_description(path))
 
 
@@ -171,7 +175,7 @@ def _display(found):
 
 
 def read_onnx(path):
-    """(Chain, Display) of a float32 file of this package, to go on training from."""
+    """Returns (Chain, Display) of a float32 file of this package, to resume training from."""
     model = load_model(path)
     found = _description(model, path)
     weights = {t.name: numpy_helper.to_array(t) for t in model.graph.initializer}

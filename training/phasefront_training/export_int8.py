@@ -1,7 +1,8 @@
-"""Quantized networks as ONNX files in QDQ form. An engine that runs them in integers may rely on exactly this graph.
+"""Writes quantized networks as ONNX files in QDQ form. An integer engine may rely on exactly this graph.
 
-Names as in export.py. For each quantized tensor T of quantize.py there are the constants `T.scale` (float32 scalar) and
-`T.zero_point` (uint8 scalar) and the nodes `quantize_T` and `dequantize_T`. The order is that of the layers:
+The names are those of export.py. Each quantized tensor T of quantize.py has the constants `T.scale` (float32 scalar)
+and `T.zero_point` (uint8 scalar) and the nodes `quantize_T` and `dequantize_T`. The nodes follow the order of the
+layers:
 
     rgbd → [squares →] quantize_input → dequantize_input → conv_0 → relu_0 → quantize_relu_0 → dequantize_relu_0 → conv_1 → …
 
@@ -9,13 +10,13 @@ Names as in export.py. For each quantized tensor T of quantize.py there are the 
   (O, I, 3, 3) by `dequantize_conv_i.weight` with `conv_i.weight.scale` (O,) and `conv_i.weight.zero_point` (O,) all 0,
   axis 0; bias, `conv_i.bias` int32 (O,) by `dequantize_conv_i.bias` with `conv_i.bias.scale` (O,) =
   s_activation · s_weight[c], no zero point, axis 0.
-* A skip, odd i >= 3: add_i(dequantize_relu_{i-1}, input of layer i-2 as that layer read it) → quantize_add_i →
-  dequantize_add_i → conv_i. Zero points of relu_i and add_i are 0.
-* The last layer l: its features (add_l where it has a skip, else relu_{l-1}) → quantize_features →
-  dequantize_features; what quantize_input reads again → quantize_skip → dequantize_skip; concat_l of both, in this order, on
-  axis 1 → quantize_concat_l → dequantize_concat_l → conv_l → [pixels →] [tanh →] field, float. All three pairs take
-  `concat.scale` and `concat.zero_point`, so the pair behind concat_l changes nothing.
-* A convolution pads with the value 0, that is with the zero point of what it reads (not 0 for conv_0 and conv_l).
+* A skip, odd i >= 3: add_i(dequantize_relu_{i-1}, dequantized input of layer i-2) → quantize_add_i → dequantize_add_i →
+  conv_i. Zero points of relu_i and add_i are 0.
+* The last layer l: its features (add_l if it has a skip, else relu_{l-1}) → quantize_features → dequantize_features;
+  the source of quantize_input → quantize_skip → dequantize_skip; concat_l of both, in this order, on axis 1 →
+  quantize_concat_l → dequantize_concat_l → conv_l → [pixels →] [tanh →] field, float. All three pairs use
+  `concat.scale` and `concat.zero_point`, so the pair after concat_l changes nothing.
+* A convolution pads with the value 0, which is the zero point of its input (not 0 for conv_0 and conv_l).
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ from .quantize import tensors
 
 
 def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
-    """The QDQ model of a Quantized network."""
+    """Returns the QDQ model of a Quantized network."""
     a = quantized.architecture
     last = a.layers - 1
     given, nodes = entering(a)
@@ -41,7 +42,7 @@ def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
         constant(f"{name}.zero_point", np.uint8(zero))
 
     def rounded(source, name, parameters):
-        """Quantizes and dequantizes a value as tensor `name`; gives the dequantized value's name."""
+        """Quantizes and dequantizes a value as tensor `name`. Returns the name of the dequantized value."""
         scale = [f"{parameters}.scale", f"{parameters}.zero_point"]
         nodes.append(helper.make_node("QuantizeLinear", [source, *scale], [f"{name}_u8"], f"quantize_{name}"))
         nodes.append(helper.make_node("DequantizeLinear", [f"{name}_u8", *scale], [f"{name}_dq"], f"dequantize_{name}"))

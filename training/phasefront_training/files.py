@@ -1,4 +1,4 @@
-"""Writing files so that a half-written one is never seen: to a temporary name in the same folder, then renamed."""
+"""Writes files atomically: to a temporary name in the same folder, which is then renamed."""
 
 import os
 from contextlib import contextmanager
@@ -7,7 +7,7 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path):
-    """Yields a temporary path beside `path`; it becomes `path` when the block ends without an error."""
+    """Yields a temporary path beside `path` and renames it to `path` if the block ends without an error."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")

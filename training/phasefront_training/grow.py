@@ -1,13 +1,14 @@
-"""A deeper network from a trained one, or one that is told more, that begins by giving what the trained one gives.
+"""Makes a deeper network, or a network with more input channels, from a trained network. It starts with nearly the same
+output.
 
-A chain of an even number of layers is a first layer, residual pairs and the last layer; one of an odd number has one
-more layer without a skip before the last. New residual pairs begin as a tenth of what a fresh one is: near the identity,
-but with units that fire, for a branch that begins at zero dies behind its ReLU in the first steps. From even to odd, the
-new single layer is a kernel that copies. From odd to even the single layer must become a pair, whose skip adds what the old network did not
-have: its partner copies four times over, so that this
-weighs little, and the last layer is fitted anew to the old output by least squares over examples.
+A chain with an even number of layers has a first layer, residual pairs and the last layer. A chain with an odd number
+has one more layer without a skip before the last. New residual pairs start with a tenth of the weights of a fresh pair:
+near the identity, but with units that fire, because a branch that starts at zero dies behind its ReLU in the first
+steps. From even to odd, the new single layer is a copying kernel. From odd to even, the single layer becomes half of a
+pair, whose skip adds a term that the old network did not have. The other half copies with a gain of four, so that this
+term has little weight, and the last layer is fitted again to the old output by least squares over examples.
 
-Told more, it begins with weights of zero for what is new: hidden layers of a layered depth image, the place in the frame.
+For new input channels (hidden layers of a layered depth image, the place in the frame) the weights start at zero.
 """
 
 import copy
@@ -18,16 +19,16 @@ from torch.nn import functional as F
 
 from .networks import Chain
 
-BRANCH = 0.1  # of a fresh residual branch
-GAIN = 4.0  # of the copy that a skip's sum must not drown
-RIDGE = 1e-6  # of the mean diagonal, in the fit of the last layer
+BRANCH = 0.1  # factor of the weights of a new residual branch
+GAIN = 4.0  # of the copy, so that it outweighs the term of the skip
+RIDGE = 1e-6  # fraction of the mean diagonal, in the fit of the last layer
 
 
 def grow(network, layers, examples=()):
-    """A Chain of `layers` layers that gives nearly what `network` gives: the new branches are small.
+    """Returns a Chain of `layers` layers with nearly the output of `network`: the new branches are small.
 
-    examples: network inputs (C, H, W); needed from an odd to an even number of layers. Raises ValueError where the
-    network cannot grow so.
+    examples: network inputs (C, H, W), required from an odd to an even number of layers. Raises ValueError if the
+    network cannot grow to this number.
     """
     old = network.architecture
     if layers < old.layers:
@@ -40,9 +41,9 @@ def grow(network, layers, examples=()):
 
 
 def widen(network, kind):
-    """A Chain for inputs of `kind` that gives what `network` gives for the first of their channels.
+    """Returns a Chain for inputs of `kind` with the output of `network` for the first of their channels.
 
-    Raises ValueError where inputs of `kind` do not begin with those of the network.
+    Raises ValueError if inputs of `kind` do not begin with the channels of the network's input.
     """
     old = network.architecture
     new = replace(old, input=kind)
@@ -60,7 +61,8 @@ def widen(network, kind):
 
 
 def of_depths(network, stretch):
-    """A Chain that gives for depths stretched by this factor about the middle what `network` gives for them as they are."""
+    """Returns a Chain whose output for depths stretched about the middle by this factor equals that of `network` for
+    the original depths."""
     a = network.architecture
     places = [k for k in range(a.input_channels) if k % 4 == 3 and k < 4 * a.ldi_layers]
     other = copy.deepcopy(network)
@@ -80,7 +82,7 @@ def _chain(old, layers):
 def _insert_pairs(network, layers):
     old = network.architecture
     grown = _chain(old, layers)
-    tail = 1 if old.layers % 2 == 0 else 2  # the layers behind the last residual pair
+    tail = 1 if old.layers % 2 == 0 else 2  # the number of layers after the last residual pair
     with torch.no_grad():
         for i, conv in enumerate(network.convs):
             j = i if i < old.layers - tail else i + layers - old.layers
@@ -91,7 +93,8 @@ def _insert_pairs(network, layers):
 
 
 def _append_copy(network, gain=1.0):
-    """One more layer before the last, whose kernel copies, `gain` times; features are never negative, so its ReLU does nothing."""
+    """Adds a layer before the last, whose kernel copies with a gain. Features are not negative, so its ReLU has no
+    effect."""
     old = network.architecture
     grown = _chain(old, old.layers + 1)
     with torch.no_grad():
@@ -105,7 +108,7 @@ def _append_copy(network, gain=1.0):
 
 
 def _refit(network, grown, examples):
-    """Fits the last layer of `grown` to the last layer's output of `network`, before the tanh if there is one."""
+    """Fits the last layer of `grown` to the output of the last layer of `network`, before any tanh."""
     seen = []
     hooks = [
         grown.convs[-1].register_forward_pre_hook(lambda _, given: seen.append(given[0])),

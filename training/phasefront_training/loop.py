@@ -1,8 +1,8 @@
-"""The training loop that all stages share: schedule, budget, log, checkpoints, stopping, several processes.
+"""The training loop of all stages: schedule, budget, log, checkpoints, stopping, several processes.
 
-A stage gives a `Task`; nothing here knows what is trained. Gradients are clipped to norm 1; 50 steps of warm-up, then
-a cosine down to 2 % of the rate. The budget is a number of steps, or minutes of wall clock that
-count across resumptions. With steps, a stopped and resumed training repeats the uninterrupted one exactly.
+A stage implements a `Task`. Gradients are clipped to norm 1. The learning rate warms up over 50 steps and then follows
+a cosine down to 2 % of its value. The budget is a number of steps, or minutes of wall clock, resumptions included. With
+steps, a stopped and resumed training repeats the uninterrupted one exactly.
 """
 
 import json
@@ -26,53 +26,53 @@ from .files import replacing
 from .optimiser import MuonAndAdam
 
 WARM_UP = 50
-LOGS = 200  # lines of the curve in a whole budget
-VALIDATIONS = 25  # of them with a validation
+LOGS = 200  # lines of the curve over the whole budget
+VALIDATIONS = 25  # how many of these lines have a validation
 CHECKPOINT_S = 60.0
 
 
 class LossNotFinite(Exception):
-    """The loss became NaN or infinite; the last checkpoint holds the last good weights."""
+    """The loss became NaN or infinite. The last checkpoint holds the last finite weights."""
 
 
 class Task:
-    """What a stage trains. `networks` is {name: Chain}; `modules` are the trained modules (often the same)."""
+    """The training task of a stage. `networks` is {name: Chain}."""
 
     kind = ""
     networks = {}
     display = None
 
     def module(self):
-        """The trained nn.Module."""
+        """Returns the trained nn.Module."""
         raise NotImplementedError
 
     def sample(self, step):
-        """The batch of a step, on the CPU or the device; called from a thread where a GPU trains."""
+        """Returns the batch of a step, on the CPU or the device. A loader thread calls it when a GPU trains."""
         raise NotImplementedError
 
     def before(self, step):
-        """What is to be done before a step's batch is drawn."""
+        """Prepares a step before its batch is drawn."""
 
     def revive(self, step, progress):
-        """Gives units of the module that never fire fresh weights, if it is time to; returns how many there were."""
+        """Gives fresh weights to units that never fire, if it is time to. Returns the number of these units."""
         return 0
 
     def loss(self, module, batch, step):
-        """(loss, {name: tensor of a term}) for a batch; `module` is `module()`, perhaps wrapped."""
+        """Returns (loss, {name: tensor of a term}) for a batch. `module` is `module()`, possibly wrapped."""
         raise NotImplementedError
 
     def validate(self):
-        """{name: figure} on scenes not trained on."""
+        """Returns {name: figure} on scenes that are not in the training data."""
         raise NotImplementedError
 
     def extra(self):
-        """What else belongs in a checkpoint."""
+        """Returns further values for the checkpoint."""
         return {}
 
 
 @dataclass
 class Budget:
-    """Steps or minutes; exactly one is given."""
+    """The budget of a training: either steps or minutes."""
 
     steps: int | None = None
     minutes: float | None = None
@@ -89,7 +89,7 @@ class Budget:
 
 @dataclass
 class Workers:
-    """This process among those of torchrun (one process, where torchrun did not start it)."""
+    """The rank of this process among those of torchrun. Without torchrun there is one process."""
 
     rank: int
     count: int
@@ -108,7 +108,7 @@ class Workers:
         return cls(rank, count, device)
 
     def agree(self, *values):
-        """The sums of the values over all processes."""
+        """Returns the sums of the values over all processes."""
         if self.count == 1:
             return values
         together = torch.tensor(values, dtype=torch.float64, device=self.device)
@@ -116,14 +116,14 @@ class Workers:
         return together.tolist()
 
     def share(self, module):
-        """Gives all processes the first one's weights."""
+        """Copies the weights of the first process to all processes."""
         if self.count > 1:
             for parameter in module.parameters():
                 distributed.broadcast(parameter.data, 0)
 
 
 class Prefetch:
-    """Batches of the coming steps, drawn ahead by threads where a GPU would wait for them."""
+    """The batches of the next steps, drawn ahead by threads so that a GPU does not wait for them."""
 
     def __init__(self, sample, first, workers):
         self.sample, self.next = sample, first
@@ -147,24 +147,24 @@ class Prefetch:
 
 
 def rate(base, step, progress):
-    """The learning rate of a step."""
+    """Returns the learning rate of a step."""
     cosine = 0.5 * (1 + math.cos(math.pi * min(progress, 1)))
     return base * min(1, (step + 1) / WARM_UP) * (0.98 * cosine + 0.02)
 
 
 def to_device(batch, device):
-    """A dataclass of tensors, moved."""
+    """Moves a dataclass of tensors to a device."""
     if device.type == "cpu":
         return batch
     return type(batch)(**{k: v.to(device, non_blocking=True) for k, v in batch.__dict__.items()})
 
 
 def fit(task, budget, learning_rate, output, workers, resume=None, options=None, stop_at=None, loaders=0, average=0):
-    """Trains until the budget is spent or a signal asks to stop; returns the last checkpoint.
+    """Trains until the budget is spent or a signal asks to stop. Returns the last checkpoint.
 
-    output: folder for `checkpoint.pt` and `curve.jsonl`. resume: a Checkpoint to go on from. stop_at: stop (and save)
-    after this step though the budget is not spent. loaders: threads that draw batches ahead. average: keep and judge the
-    mean of the weights over about so many steps; 0: the weights as they are.
+    output: folder for `checkpoint.pt` and `curve.jsonl`. resume: a Checkpoint to resume from. stop_at: step to stop
+    (and save) after, even if the budget is not spent. loaders: threads that draw batches ahead. average: number of
+    steps of the running mean of the weights, which is kept and validated; 0 for the weights themselves.
     """
     output = Path(output)
     module = task.module()
@@ -278,7 +278,7 @@ def _on_cpu(value):
 
 
 class Curve:
-    """The log of a training, one JSON object a line; on resuming, lines after the checkpoint's step are dropped."""
+    """The log of a training, one JSON object per line. A resumed training drops lines after the checkpoint's step."""
 
     def __init__(self, path, step):
         self.path = Path(path)
@@ -293,7 +293,7 @@ class Curve:
 
 
 def read_curve(path):
-    """The lines of a curve; a last line that was cut off is left out."""
+    """Returns the lines of a curve, without an incomplete last line."""
     lines = []
     for text in Path(path).read_text().splitlines():
         try:
@@ -304,7 +304,7 @@ def read_curve(path):
 
 
 class _Signals:
-    """Takes note of SIGINT and SIGTERM, so that a step ends and a checkpoint is written first."""
+    """A handler that records SIGINT and SIGTERM, so that the step ends and a checkpoint is written first."""
 
     def __enter__(self):
         self.asked = False
@@ -312,7 +312,7 @@ class _Signals:
         try:
             for number in (signal.SIGINT, signal.SIGTERM):
                 self.previous[number] = signal.signal(number, self._ask)
-        except ValueError:  # not the main thread: nobody can signal us here
+        except ValueError:  # not the main thread, which alone receives signals
             pass
         return self
 

@@ -1,15 +1,15 @@
-"""What training minimizes: the distance of a predicted field to the true one, at the midpoint and in focus.
+"""The training losses: the distance between a predicted and a true field, at the midpoint and over a focal stack.
 
 * field: mean |P − T| of the complex fields (the modulus of the difference).
 * amplitude: mean ||P| − |T||.
 * focal stack: both fields propagated to planes chosen from the scene's depth; the difference of amplitudes, each
   pixel weighted by attention exp(0.35·(6 − |Δd|)), Δd the distance in mm of the pixel's depth from the plane,
   divided by its greatest value exp(0.35·6).
-* total variation: the same for the horizontal and vertical differences of the weighted amplitudes.
+* total variation: the error of the horizontal and vertical differences of the weighted amplitudes.
 
-Fields are complex (N, 3, H, W). Where a crop cuts the network's view (valid = 0) the prediction is replaced by the
-truth before anything is compared, so errors there neither count nor spread by propagation. The focal stack is taken
-circularly: both fields wrap round alike, and what differs between them keeps its energy.
+Fields are complex (N, 3, H, W). Where a crop cuts the network's view (valid = 0), the truth replaces the prediction
+before the comparison, so errors there neither count nor spread by propagation. The focal stack uses circular
+propagation: both fields wrap around alike, and their difference keeps its energy.
 """
 
 import math
@@ -20,20 +20,21 @@ import torch
 
 BINS = 200  # of the depth histogram
 FULLEST = 15  # planes at the fullest bins
-OTHERS = 5  # planes at random bins of the rest
+OTHERS = 5  # planes at random other bins
 ATTENTION_PER_MM = 0.35
 
 
 def fill_invalid(prediction, target, valid):
-    """The prediction where valid (N, 1, H, W) is 1, the target elsewhere."""
+    """Returns the prediction where valid (N, 1, H, W) is 1, and the target elsewhere."""
     return torch.where(valid > 0, prediction, target)
 
 
 def stack_distances(depth, display, planes, rng):
-    """Signed distances in metres (N, planes) to the planes of one dynamic focal stack for each depth map (N, H, W).
+    """Returns signed distances in metres (N, planes) to the planes of a dynamic focal stack of each depth map (N, H,
+    W).
 
-    The 15 fullest bins of a 200-bin histogram and 5 of the rest make 20 candidates, all shifted by one sub-bin
-    jitter an image. All 20 are taken, or `planes` of them at random.
+    The candidates are the 15 fullest bins of a 200-bin histogram and 5 random others, all shifted by one sub-bin jitter
+    per image. The stack has all 20, or `planes` of them at random.
     """
     distances = np.empty((len(depth), planes))
     for row, image in zip(distances, depth):
@@ -47,7 +48,7 @@ def stack_distances(depth, display, planes, rng):
 
 
 def _phase_per_metre(display, height, width, device):
-    """The carrier-free exponent per metre (3, H, W), float64."""
+    """Returns the carrier-free exponent per metre (3, H, W), float64."""
     key = (display, height, width, device)
     if key not in _phase_per_metre.cache:
         x = torch.fft.fftfreq(width, display.pitch_m, dtype=torch.float64)
@@ -63,7 +64,7 @@ _phase_per_metre.cache = {}
 
 
 def focal_stack(field, distances_m, display):
-    """Fields (N, K, 3, H, W) of (N, 3, H, W) at distances (N, K), propagated circularly."""
+    """Propagates fields (N, 3, H, W) circularly to distances (N, K). Returns fields (N, K, 3, H, W)."""
     per_metre = _phase_per_metre(display, *field.shape[-2:], field.device)
     phase = (distances_m.to(field.device)[..., None, None, None] * per_metre).float()
     kernel = torch.polar(torch.ones_like(phase), phase)
@@ -71,7 +72,7 @@ def focal_stack(field, distances_m, display):
 
 
 def focal_stack_terms(prediction, target, depth, display, planes, rng):
-    """(focal stack, total variation) terms; depth is the clean normalized depth (N, H, W)."""
+    """Returns the (focal stack, total variation) terms. depth is the clean normalized depth (N, H, W)."""
     distances = stack_distances(depth, display, planes, rng)
     away_mm = (display.z_m(depth)[:, None] - distances.to(depth)[..., None, None]).abs() * 1e3
     attention = torch.exp(-ATTENTION_PER_MM * away_mm)[:, :, None]
@@ -84,6 +85,6 @@ def focal_stack_terms(prediction, target, depth, display, planes, rng):
 
 
 def field_terms(prediction, target):
-    """(field, amplitude) terms."""
+    """Returns the (field, amplitude) terms."""
     field = (prediction - target).abs().mean()
     return field, (prediction.abs() - target.abs()).abs().mean()

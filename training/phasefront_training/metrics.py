@@ -1,4 +1,4 @@
-"""How near an amplitude is to the true one: PSNR and SSIM with peak 1, over (3, H, W) or (K, 3, H, W)."""
+"""Measures of the error of an amplitude: PSNR and SSIM with peak 1, over (3, H, W) or (K, 3, H, W)."""
 
 import math
 
@@ -9,12 +9,13 @@ SIGMA = 1.5
 
 
 def psnr(a, b):
-    """Peak signal-to-noise ratio in dB for peak 1, over all values."""
+    """Returns the peak signal-to-noise ratio in dB for peak 1, over all values."""
     return float(-10 * torch.log10(((a.double() - b.double()) ** 2).mean()))
 
 
 def ssim(a, b):
-    """Structural similarity (Wang 2004): Gaussian window of 11 px with σ 1.5, peak 1, mean over all whole windows."""
+    """Returns the structural similarity (Wang 2004) for peak 1: the mean over all whole Gaussian windows of 11 px with
+    σ 1.5."""
     a, b = a.double(), b.double()
     mean_a, mean_b = _blur(a), _blur(b)
     var_a, var_b = _blur(a * a) - mean_a**2, _blur(b * b) - mean_b**2
@@ -25,7 +26,8 @@ def ssim(a, b):
 
 
 def _blur(x):
-    """The Gaussian mean over each whole window; sums of shifted planes, many times faster here than a convolution."""
+    """Returns the Gaussian mean over each whole window. Sums of shifted planes are much faster than a convolution
+    here."""
     weights = [math.exp(-((k - WINDOW // 2) ** 2) / (2 * SIGMA**2)) for k in range(WINDOW)]
     for axis in (-1, -2):
         length = x.shape[axis] - WINDOW + 1

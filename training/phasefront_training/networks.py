@@ -1,26 +1,33 @@
-"""The networks: a plain chain of 3x3 convolutions with skips, and what its output means.
+"""The networks: a plain chain of 3x3 convolutions with skips, and the field that its output represents.
 
-Layers are counted from 0. Layer i is a convolution (3x3, stride 1, zero padding) and, but for the last,
-a ReLU. For odd i >= 3 the input is input[i] = output[i-1] + input[i-2], so layers (1, 2), (3, 4), ... are
-residual pairs. The last layer also reads the network's input, concatenated behind the features.
+Layers are counted from 0. Layer i is a convolution (3x3, stride 1, zero padding) and, except in the last layer, a ReLU.
+For odd i >= 3 the input is input[i] = output[i-1] + input[i-2], so layers (1, 2), (3, 4), ... are residual pairs. The
+last layer also reads the network's input, concatenated after the features.
 
-Two heads turn the last layer's six channels into a field :
+Two heads convert the last layer's six channels to a field:
 
 * ``amplitude-phase`` (the paper's): t = tanh(o); amplitude = (t[0:3] + 1)·√½, phase = π·t[3:6].
 * ``real-imaginary``: real = base[0:3] + o[0:3], imaginary = base[3:6] + o[3:6], where the base is the front
-  layer's image (imaginary part 0) or, for the pre-filter, the field that came in.
+  layer's image (imaginary part 0) or, for the pre-filter, its input field.
 
-Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``rgbdxy`` (the same, then x and y over the frame from
--0.5 to 0.5, for holograms that correct an aberration which differs over the frame), ``ldiN`` (N from 2 to 9; 4·N channels: rgb0,
-depth0, rgb1, ..., each minus 0.5; a pixel without a hit has colour 0 and depth 1), ``seeded`` (10 channels: those of
-rgbd, then the plane sweep's field as data.network_input lays it; the field is the base), ``field`` (6 channels: the
-real parts of the three colours, then the imaginary ones; a pre-filter of the deep double phase method),
-``blurred-field`` (the same of a field that AA-DPM's blur has gone over: what is left for the network is small, so that
-its rounding is too) and ``split-blurred-field`` (12 channels: the same in two parts, see `split`, for int8).
+Inputs:
 
-A halved network runs at half the resolution: the four pixels of a square of two by two are channels of one, those of the
-upper left first, then upper right, lower left, lower right; so are the outputs. It sees twice as far for as many layers.
-Frames with odd sides repeat their last row or column.
+* ``rgbd``: 4 channels, R, G, B, depth, each minus 0.5.
+* ``rgbdxy``: those of rgbd, then x and y over the frame from -0.5 to 0.5, for holograms that correct an aberration that
+  varies over the frame.
+* ``ldiN``, N from 2 to 9: 4·N channels, rgb0, depth0, rgb1, ..., each minus 0.5. A pixel without a hit has colour 0 and
+  depth 1.
+* ``seeded``: 10 channels, those of rgbd, then the field of the plane sweep in the layout of data.network_input. That
+  field is the base.
+* ``field``: 6 channels, the real parts of the three colours, then the imaginary parts, for a pre-filter of the deep
+  double phase method.
+* ``blurred-field``: the channels of field after the blur of AA-DPM. The network's correction is then small, and so is
+  its rounding error.
+* ``split-blurred-field``: 12 channels, the blurred field in two parts (see `split`), for int8.
+
+A halved network runs at half the resolution: the four pixels of each 2x2 square become channels of one pixel, in the
+order upper left, upper right, lower left, lower right; likewise the outputs. With the same number of layers it reaches
+twice as far. Frames with odd sides repeat their last row or column.
 """
 
 import math
@@ -33,14 +40,14 @@ from torch.nn import functional as F
 from .data import seed_of_input
 
 HEADS = ("real-imaginary", "amplitude-phase")
-LDI_COUNTS = tuple("23456789")  # as the core takes them; of one layer it is rgbd
+LDI_COUNTS = tuple("23456789")  # the counts that the core supports; one layer is rgbd
 SPLIT_STEP = 1 / 64  # of the first part of a split field
-REMAINDER_GAIN = 16  # of the second
+REMAINDER_GAIN = 16  # of the second part
 
 
 @dataclass(frozen=True)
 class Architecture:
-    """Everything that fixes a network's graph."""
+    """The parameters that determine a network's graph."""
 
     layers: int
     filters: int = 24
@@ -57,11 +64,11 @@ class Architecture:
             raise ValueError("a seeded network corrects its seed: its head is real-imaginary")
         if self.head not in HEADS:
             raise ValueError(f"the head is one of {', '.join(HEADS)}, not '{self.head}'")
-        self.input_channels  # raises where the input is unknown
+        self.input_channels  # raises if the input is unknown
 
     @property
     def ldi_layers(self):
-        """How many layers of a layered depth image the input takes; rgbd, rgbdxy and seeded take one."""
+        """The number of layers of a layered depth image in the input: 1 for rgbd, rgbdxy and seeded."""
         if self.input in ("rgbd", "rgbdxy", "seeded"):
             return 1
         count = self.input.removeprefix("ldi")
@@ -71,7 +78,7 @@ class Architecture:
 
     @property
     def of_fields(self):
-        """Whether it is a pre-filter: what it takes is a field."""
+        """Whether the network is a pre-filter, whose input is a field."""
         return self.input in ("field", "blurred-field", "split-blurred-field")
 
     @property
@@ -80,7 +87,7 @@ class Architecture:
         return known.get(self.input) or 4 * self.ldi_layers
 
     def channels(self, i):
-        """(input, output) channels of layer i."""
+        """Returns the (input, output) channels of layer i."""
         last = i == self.layers - 1
         pixels = 4 if self.halved else 1
         given = pixels * self.input_channels
@@ -89,11 +96,11 @@ class Architecture:
 
     @property
     def reach_px(self):
-        """How far it sees, in pixels of the frame."""
+        """The reach of the receptive field, in pixels of the frame."""
         return self.layers * (2 if self.halved else 1)
 
     def has_skip(self, i):
-        """Whether the input of layer i is output[i-1] + input[i-2]."""
+        """Checks whether the input of layer i is output[i-1] + input[i-2]."""
         return i >= 3 and i % 2 == 1
 
     def as_dict(self):
@@ -101,7 +108,7 @@ class Architecture:
 
 
 class Chain(nn.Module):
-    """The chain; `forward` gives the six channels of the last layer (after tanh for `amplitude-phase`)."""
+    """The chain. `forward` returns the six channels of the last layer (after tanh for `amplitude-phase`)."""
 
     def __init__(self, architecture):
         super().__init__()
@@ -112,7 +119,8 @@ class Chain(nn.Module):
         self.reset()
 
     def reset(self):
-        """He initialisation; residual branches and the last layer begin small, so that depth does not amplify."""
+        """Initialises the weights after He. Residual branches and the last layer start small, so that depth does not
+        amplify."""
         layers = self.architecture.layers
         with torch.no_grad():
             for i, conv in enumerate(self.convs):
@@ -126,14 +134,14 @@ class Chain(nn.Module):
         return self.leaving(self._chain(self.entering(x)).float(), x.shape[-2:])
 
     def entering(self, x):
-        """What the first layer and the last one read of the network's input."""
+        """Converts the network's input to the form that the first and the last layer read."""
         if not self.architecture.halved:
             return x
         height, width = x.shape[-2:]
         return unshuffle(F.pad(x, (0, width % 2, 0, height % 2), mode="replicate"))
 
     def leaving(self, h, size):
-        """The network's output (N, 6, *size) of what the last layer gives."""
+        """Converts the output of the last layer to the network's output (N, 6, *size)."""
         if self.architecture.halved:
             h = shuffle(h)[..., : size[0], : size[1]]
         return torch.tanh(h) if self.architecture.head == "amplitude-phase" else h
@@ -153,33 +161,33 @@ class Chain(nn.Module):
         return h
 
     def field(self, x):
-        """The complex field (N, 3, H, W) for network inputs (N, C, H, W)."""
+        """Returns the complex field (N, 3, H, W) of network inputs (N, C, H, W)."""
         return head_field(self.architecture, self(x), x)
 
 
 def unshuffle(x):
-    """(N, C, 2·H, 2·W) as (N, 4·C, H, W): squares of two by two pixels, pixel by pixel (ONNX's SpaceToDepth)."""
+    """Converts (N, C, 2·H, 2·W) to (N, 4·C, H, W): 2x2 squares, pixel by pixel (SpaceToDepth of ONNX)."""
     n, c, h, w = x.shape
     return x.reshape(n, c, h // 2, 2, w // 2, 2).permute(0, 3, 5, 1, 2, 4).reshape(n, 4 * c, h // 2, w // 2)
 
 
 def shuffle(x):
-    """The inverse of `unshuffle` (ONNX's DepthToSpace, DCR)."""
+    """Inverts `unshuffle` (DepthToSpace of ONNX, DCR)."""
     n, c, h, w = x.shape
     return x.reshape(n, 2, 2, c // 4, h, w).permute(0, 3, 4, 1, 5, 2).reshape(n, c // 4, 2 * h, 2 * w)
 
 
 def split(x):
-    """A field's channels (N, 6, H, W) in two parts (N, 12, H, W): in steps of 1/64, and what is left, 16 times.
+    """Splits a field's channels (N, 6, H, W) in two parts (N, 12, H, W): steps of 1/64, and 16 times the remainder.
 
-    u8 activations hold the first exactly and the second to 1/2048.
+    u8 activations hold the first part exactly and the second to 1/2048.
     """
     first = torch.round(x / SPLIT_STEP) * SPLIT_STEP
     return torch.cat([first, REMAINDER_GAIN * (x - first)], 1)
 
 
 def head_field(architecture, output, x):
-    """The complex field (N, 3, H, W) that the output (N, 6, H, W) means for the input x."""
+    """Converts the output (N, 6, H, W) for the input x to a complex field (N, 3, H, W)."""
     output = output.float()
     if architecture.head == "amplitude-phase":
         amplitude = (output[:, :3] + 1) * math.sqrt(0.5)
@@ -197,6 +205,6 @@ def head_field(architecture, output, x):
 
 
 def multiplies_per_pixel(architecture):
-    """Multiply-accumulates per pixel of the whole chain."""
+    """Returns the multiply-accumulates of the whole chain per pixel."""
     count = sum(9 * a * b for a, b in map(architecture.channels, range(architecture.layers)))
     return count // 4 if architecture.halved else count

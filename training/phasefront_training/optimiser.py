@@ -1,8 +1,8 @@
-"""What takes the steps: Muon for the hidden layers' weights, Adam for the first and last layer's and for biases.
+"""The optimiser: Muon for the weights of hidden layers, Adam for those of the first and last layer and for biases.
 
-Muon takes a layer's gradient as a matrix, filters by weights of a filter, and steps along the orthogonal matrix next to
-it, so that all directions of a layer learn alike. The hidden layers of a chain have matrices of one shape and are taken
-together: torch.optim.Muon takes them one by one, which costs four times as much.
+Muon treats the gradient of a layer as a matrix, filters by weights of a filter, and steps along the nearest orthogonal
+matrix, so that all directions of a layer learn at the same rate. The hidden layers of a chain have matrices of the same
+shape, so one batch holds all of them. torch.optim.Muon processes them one by one, which takes four times as long.
 """
 
 import math
@@ -12,15 +12,15 @@ import torch
 from .networks import Chain
 
 MOMENTUM = 0.95
-MUON_RATE = 2.5  # times Adam's
-MATCH_ADAM = 0.2  # of the root of the matrix's longer side: steps as large as Adam's
+MUON_RATE = 2.5  # times the rate of Adam
+MATCH_ADAM = 0.2  # times the root of the matrix's longer side, for steps as large as those of Adam
 BETAS = (0.9, 0.99)
-ROUNDS = ((3.4445, -4.7750, 2.0315),) * 5  # Newton-Schulz, as Muon's makers have it
+ROUNDS = ((3.4445, -4.7750, 2.0315),) * 5  # Newton-Schulz coefficients of the authors of Muon
 LEAST_NORM = 1e-7
 
 
 class MuonAndAdam:
-    """Both, with as much of a torch optimiser's face as the loop needs."""
+    """Muon and Adam, with the part of the interface of a torch optimiser that the loop needs."""
 
     def __init__(self, module, learning_rate):
         chains = [chain for chain in module.modules() if isinstance(chain, Chain)]
@@ -44,7 +44,7 @@ class MuonAndAdam:
         return {"muon": [chain.momentum for chain in self.chains], "adam": self.adam.state_dict()}
 
     def load_state_dict(self, state):
-        """Raises ValueError for the state of another optimiser."""
+        """Loads a state. Raises ValueError for the state of another optimiser."""
         known = state.keys() == {"muon", "adam"} and isinstance(state["muon"], list) and len(state["muon"]) == len(self.chains)
         if not known:
             raise ValueError("the training to resume took other steps; begin a new one with its network: --init")
@@ -58,12 +58,12 @@ class Muon:
 
     def __init__(self, weights):
         self.weights = weights
-        # Views of the weights, so that a step on them is one on the layers.
+        # Views of the weights, so that a step changes the layers.
         self.matrices = [_as_matrix(weight.detach(), weight) for weight in weights]
         self.momentum = torch.zeros(len(weights), *self.matrices[0].shape, device=weights[0].device)
 
     def step(self, rate):
-        # A network that is only passed through has no gradient, and stays.
+        # A frozen network has no gradient and does not change.
         if any(weight.grad is None for weight in self.weights):
             return
         gradients = torch.stack([_as_matrix(weight.grad, weight) for weight in self.weights])
@@ -75,7 +75,7 @@ class Muon:
 
 
 def orthogonal(matrices):
-    """Matrices (N, A, B), nearly orthogonal ones next to the given ones, by Newton-Schulz in bf16."""
+    """Returns nearly orthogonal matrices (N, A, B) close to the given ones, by Newton-Schulz in bf16."""
     tall = matrices.shape[1] > matrices.shape[2]
     x = (matrices.mT if tall else matrices).bfloat16()
     x = x / x.flatten(1).norm(dim=1).clamp(min=LEAST_NORM)[:, None, None]
@@ -86,7 +86,8 @@ def orthogonal(matrices):
 
 
 def _as_matrix(values, weight):
-    """values (O, I, 3, 3) as (O, 9·I), in the order in which `weight` lies in memory, so that of weights it is a view."""
+    """Reshapes values (O, I, 3, 3) to (O, 9·I), in the memory order of `weight`, so that the result for weights is a
+    view."""
     if weight.is_contiguous(memory_format=torch.channels_last):
         values = values.permute(0, 2, 3, 1)
     return values.reshape(len(values), -1)

@@ -1,4 +1,4 @@
-"""Pictures: the curves of trainings, the loss and the figures on validation scenes over minutes; and views of a scene."""
+"""Plots: the curves of trainings (the loss and the validation figures over minutes) and views of a scene."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ FIGURES = {"validation_psnr": "-", "validation_sensor_depth_psnr": "--"}
 
 
 def plot(folders, output):
-    """Plots `curve.jsonl` of each folder into one picture (.png or .svg)."""
+    """Plots `curve.jsonl` of each folder in one image (.png or .svg)."""
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
     for k, folder in enumerate(folders):
         curve = read_curve(Path(folder) / "curve.jsonl")
@@ -36,7 +36,7 @@ def plot(folders, output):
 
 
 def pictures(views, output):
-    """Draws {title: amplitude (3, H, W)}, four in a row, into one picture; amplitude 1 is white."""
+    """Draws {title: amplitude (3, H, W)} in one image, four in a row. Amplitude 1 is white."""
     columns = min(len(views), 4)
     rows = -(-len(views) // columns)
     height, width = next(iter(views.values())).shape[-2:]

@@ -1,13 +1,13 @@
-"""A pool of scenes that grows while networks are trained on it.
+"""A pool of scenes that grows while networks train on it.
 
-A pool is a folder of shards, `shard_0000`, `shard_0001`, …: data sets of one kind of scenes each, with their own splits.
-A shard is made under another name and renamed when it is whole, so whoever reads the pool sees whole shards only.
-Shard k has the seed FIRST_SEED + k and the kind that the shares are most short of, so that a pool of any length holds the
-kinds in their shares, and one that is made again has the same bytes.
+A pool is a folder of shards, `shard_0000`, `shard_0001`, …. Each shard is a data set of one kind of scenes with its own
+splits. A shard is renamed to its final name when it is complete, so readers see only complete shards. Shard k has the
+seed FIRST_SEED + k and the kind that is farthest below its share, so that a pool of any length holds the kinds in their
+shares, and a pool that is made again has the same bytes.
 
-Networks train on the shards' training scenes; those that are added later join at once. The first shards' validation
-scenes judge the training. What is drawn at a step depends on how many scenes there are at that step: a training on a pool
-that grows does not repeat itself bit by bit; on one that is complete it does.
+Networks train on the training scenes of all shards, including shards that are added later. The validation scenes of the
+first shards validate the training. The samples of a step depend on the number of scenes at that step, so a training on
+a growing pool is not reproducible bit by bit. A training on a complete pool is.
 """
 
 import sys
@@ -15,15 +15,15 @@ from pathlib import Path
 
 from . import data
 
-FIRST_SEED = 1000  # seeds below are for other data sets, of which some are for tests
+FIRST_SEED = 1000  # lower seeds are for other data sets, some of them for tests
 KINDS = ("objects", "photographs", "varied")
 SHARES = {"objects": 1.0, "photographs": 1.0, "varied": 2.0}
-SHARD_SCENES = 40  # with one of them for validation and one for tests
-PART = ".part"  # what a shard is called as well until it is whole
+SHARD_SCENES = 40  # one of them for validation and one for tests
+PART = ".part"  # suffix of an incomplete shard
 
 
 def kind_of(shard, shares):
-    """The kind of a shard's scenes."""
+    """Returns the kind of a shard's scenes."""
     whole = sum(shares.values())
     made = dict.fromkeys(shares, 0)
     for k in range(shard + 1):
@@ -33,7 +33,7 @@ def kind_of(shard, shares):
 
 
 def check(shares, scenes, shard_scenes, arguments):
-    """Raises ValueError where no pool can be made so."""
+    """Raises ValueError if no pool can be made with these arguments."""
     if unknown := [kind for kind in shares if kind not in KINDS]:
         raise ValueError(f"no kind of scenes is called {', '.join(unknown)}; there are {', '.join(KINDS)}")
     if not shares or min(shares.values()) < 0 or sum(shares.values()) <= 0:
@@ -45,10 +45,10 @@ def check(shares, scenes, shard_scenes, arguments):
 
 
 def make(folder, scenes, shares=None, shard_scenes=SHARD_SCENES, limit_bytes=None, textures=None, arguments=(), command="phasefront-lab"):
-    """Makes the shards that are not there yet, until there are `scenes` scenes or the disk's share is spent.
+    """Makes the missing shards until there are `scenes` scenes or the disk limit is reached.
 
-    textures: a folder of pictures for surfaces. arguments: more for `phasefront-lab dataset`, such as --size 256. Stopped, the
-    same call goes on. Returns how many shards there are.
+    textures: a folder of images for surfaces. arguments: more arguments for `phasefront-lab dataset`, such as --size
+    256. After an interruption the same call resumes. Returns the number of shards.
     """
     shares = shares or SHARES
     check(shares, scenes, shard_scenes, arguments)
@@ -72,24 +72,24 @@ def make(folder, scenes, shares=None, shard_scenes=SHARD_SCENES, limit_bytes=Non
 
 
 def size_of(folder):
-    """Bytes of all files in it."""
+    """Returns the size in bytes of all files in a folder."""
     return sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
 
 
 def shards(folder):
-    """The manifests of the shards that are whole, in their order."""
+    """Returns the manifests of the complete shards, in order."""
     found = sorted(path for path in Path(folder).glob("shard_*") if not path.name.endswith(PART))
     return [data.Manifest.read(path) for path in found]
 
 
 def validation(folder, ldi_layers, scenes):
-    """The validation scenes of the first `scenes` shards, one of each."""
+    """Returns one validation scene of each of the first `scenes` shards."""
     first = shards(folder)[:scenes]
     return data.Scenes.joined([data.Scenes(manifest, "validation", ldi_layers, 1) for manifest in first])
 
 
 class Pool(data.Scenes):
-    """The training scenes of a pool in memory, each scene a tensor of its own, so that more can come."""
+    """The training scenes of a pool in memory. Each scene is a separate tensor, so that more scenes can be added."""
 
     def __init__(self, folder, ldi_layers=1, limit=None):
         self.folder, self.limit = Path(folder), limit
@@ -111,7 +111,7 @@ class Pool(data.Scenes):
 
     @property
     def facts(self):
-        """What a checkpoint keeps about the pool: how many scenes of which kind."""
+        """The facts about the pool that a checkpoint keeps: the number of scenes of each kind."""
         kinds = {}
         for each in self.sets:
             known = kinds.setdefault(each["like"], dict(each) | {"scenes": 0, "shards": 0})
@@ -123,9 +123,9 @@ class Pool(data.Scenes):
         return 1.0
 
     def look(self):
-        """Takes in the shards that have come since the last look; returns how many scenes there are more.
+        """Adds the shards that are new since the last call. Returns the number of new scenes.
 
-        A shard for another display or of another size than the first is named and left out.
+        A shard whose display or size differs from the first is reported and skipped.
         """
         before = len(self)
         for manifest in shards(self.folder):
@@ -155,12 +155,12 @@ class Pool(data.Scenes):
         self.damaged += scenes.damaged
         for mine, its in ((self.colour, scenes.colour), (self.depth, scenes.depth), (self.target, scenes.target)):
             mine += list(its)
-        # Their count comes last: samples may be drawn meanwhile.
+        # The count changes last, because other threads may draw samples meanwhile.
         self.numbers += scenes.numbers
 
 
 def parse_shares(texts):
-    """{kind: share} of words such as varied=2."""
+    """Parses words such as varied=2 as {kind: share}."""
     try:
         pairs = (text.split("=") for text in texts)
         return {kind: float(share) for kind, share in pairs}

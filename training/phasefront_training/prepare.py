@@ -1,10 +1,9 @@
-"""From a trained Chain to a Quantized one, without training: what is done so that rounding costs little.
+"""Converts a trained Chain to a Quantized network with a small rounding error, without training.
 
-A pre-filter first takes its field in two parts (`in_two_parts`). Channels are scaled against each other (`equalise`), and
-features against the network's input beside which the last layer reads them (`balance`); none of this changes what the
-network gives, for a ReLU scales with what it reads. Then ranges are chosen (`calibrate`), and sums take the same steps as
-the sums after them where that loses less (`share`): what a branch adds nothing to then passes on without being rounded
-anew.
+A pre-filter first gets its field in two parts (`in_two_parts`). Channels are scaled against each other (`equalise`),
+and features against the network's input, which the last layer reads with them (`balance`). Neither changes the output,
+because a ReLU scales with its input. Then ranges are chosen (`calibrate`), and a sum uses the same steps as the next
+sum if that reduces the error (`share`): values to which a branch adds nothing are then not rounded again.
 """
 
 import copy
@@ -15,23 +14,25 @@ import torch
 from .networks import REMAINDER_GAIN, Chain
 from .quantize import Quantized, activations, calibrate
 
-LEVEL = 0.999  # of a channel's values lie under what counts as its greatest
-EVERY = 7  # pixel counts for that
-EVENNESS = 0.5  # 1 makes all channels of a tensor one size, which costs the weights more than the tensor gains
+LEVEL = 0.999  # quantile of a channel's values that counts as its maximum
+EVERY = 7  # stride of the pixels for this quantile
+EVENNESS = 0.5  # 1 gives all channels of a tensor the same size, but loses more in the weights than it gains
 MOST_SCALED = 8.0
-BALANCES = [2.0**k for k in range(-6, 5)]  # powers of two, which no float32 weight is rounded by
-SCENES = 4  # that scales and ranges are compared on
+BALANCES = [2.0**k for k in range(-6, 5)]  # powers of two, which do not round float32 weights
+SCENES = 4  # for comparing scales and ranges
 
 
 def prepare(chain, examples):
-    """The Quantized network of a Chain, whose channels it scales in place. examples: a list of inputs (C, H, W)."""
+    """Returns the Quantized network of a Chain and scales the Chain's channels. examples: a list of inputs (C, H,
+    W)."""
     equalise(chain, examples)
     balance(chain, examples)
     return Quantized(chain, share(chain, calibrate(chain, examples), examples))
 
 
 def in_two_parts(prefilter):
-    """The same pre-filter for a split field: dark pixels, at which the modulator's light cancels, cannot bear a field rounded to u8."""
+    """Returns the same pre-filter for a split field. A field rounded to u8 is too coarse for dark pixels, where the
+    modulator's light cancels."""
     old = prefilter.architecture
     if old.input != "blurred-field":
         return prefilter
@@ -45,7 +46,8 @@ def in_two_parts(prefilter):
 
 
 def scale_channels(chain, writers, readers, factors):
-    """Multiplies the channels that layers give by factors (filters,), and divides what reads them by the same."""
+    """Multiplies the output channels of the writers by factors (filters,) and divides the weights of the readers by
+    them."""
     with torch.no_grad():
         for i in writers:
             chain.convs[i].weight *= factors[:, None, None, None]
@@ -55,22 +57,23 @@ def scale_channels(chain, writers, readers, factors):
 
 
 def scale_features(chain, factor):
-    """Multiplies the features that a Chain's last layer reads, and divides what reads them: its output stays the same."""
+    """Multiplies the features that a Chain's last layer reads and divides its weights, so that the output stays the
+    same."""
     a = chain.architecture
     last = a.layers - 1
-    # Features that the last layer takes as a sum with a skip are sums of what every second layer gives.
+    # If the last layer has a skip, its features are sums of the outputs of every second layer.
     writers, readers = (range(0, last, 2), range(1, last + 1, 2)) if a.has_skip(last) else ([last - 1], [last])
     scale_channels(chain, writers, readers, torch.full((a.filters,), factor))
 
 
 def equalise(chain, examples):
-    """Scales channels of each tensor nearer to one size: those of the sums, all alike, and those within branches."""
+    """Scales the channels of each tensor to more similar sizes: the sums with common factors, and those in branches."""
     a = chain.architecture
     last = a.layers - 1
     found = _levels(chain, examples)
     sums = [level / level.max() for name, level in found.items() if name.startswith("add")]
     if sums:
-        # With an even number of layers the last one reads the sums too.
+        # With an even number of layers the last layer also reads the sums.
         readers = [*range(1, last, 2), *([last] if a.has_skip(last) else [])]
         writers = [i for i in range(0, last, 2) if i == 0 or a.has_skip(i + 1)]
         scale_channels(chain, writers, readers, _factors(torch.stack(sums).amax(0)))
@@ -79,7 +82,7 @@ def equalise(chain, examples):
 
 
 def _levels(chain, examples):
-    """{tensor: (channels,)}: what nearly all of each channel's values lie under."""
+    """Returns {tensor: (channels,)}, a bound of nearly all values of each channel."""
     found = {}
     with torch.no_grad():
         for x in examples[:SCENES]:
@@ -91,13 +94,14 @@ def _levels(chain, examples):
 
 
 def _factors(levels):
-    """What channels of these levels are multiplied by; those where hardly anything is are left."""
+    """Returns the factors for channels of these levels: 1 for nearly empty channels."""
     share = levels / levels.max()
     return torch.where(share > 1e-3, share.clamp(min=1e-3) ** -EVENNESS, 1.0).clamp(max=MOST_SCALED)
 
 
 def balance(chain, examples):
-    """Scales the features against the network's input by the power of two that loses least over a list of inputs (C, H, W)."""
+    """Scales the features against the network's input by the power of two with the least error over inputs (C, H,
+    W)."""
     exact = _outputs(chain, examples)
 
     def error(factor):
@@ -109,7 +113,8 @@ def balance(chain, examples):
 
 
 def share(chain, ranges, examples):
-    """The ranges, each sum's, from the last to the first, that of the sum after it where this loses less."""
+    """Returns the ranges after replacing the range of each sum, from last to first, by the next sum's if that reduces
+    the error."""
     sums = [name for name in ranges if name.startswith("add")]
     exact = _outputs(chain, examples)
     least = _loss(exact, Quantized(chain, ranges), examples)
@@ -127,5 +132,5 @@ def _outputs(network, examples):
 
 
 def _loss(exact, quantized, examples):
-    """The mean square by which a Quantized's outputs differ from the exact ones."""
+    """Returns the mean square error of the outputs of a Quantized network."""
     return sum(float((a - b).square().mean()) for a, b in zip(_outputs(quantized, examples), exact))

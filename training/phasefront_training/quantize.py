@@ -1,19 +1,22 @@
-"""int8 networks: what is quantized how, calibration, and a Chain that quantizes as it goes (for evaluation and QAT).
+"""int8 networks: the quantization scheme, calibration, and a Chain that quantizes in its forward pass (for evaluation
+and QAT).
 
-Weights are int8, one scale an output channel, symmetric: scale = max|w| / 127. Biases are int32 with the scale
-s_input · s_weight[c]. Activations are u8 with one scale and zero point a tensor, from ranges chosen on training scenes (`calibrate`):
+Weights are int8 and symmetric with one scale for each output channel: scale = max|w| / 127. Biases are int32 with the
+scale s_input · s_weight[c]. Activations are u8 with one scale and zero point for each tensor, from ranges chosen on
+training scenes (`calibrate`):
 
-* behind a ReLU, and sums of two such: zero point 0, scale = max / 255;
-* the network's input, and what the last convolution reads (features and the network's input, concatenated):
+* outputs of a ReLU and sums of two of them: zero point 0, scale = max / 255;
+* the network's input, and the input of the last convolution (features and the network's input, concatenated):
   scale = (max − min) / 254, zero point = round(−min / scale), so that 0 is exact.
 
-Each tensor that a convolution or a skip reads is quantized once: `input`; `relu_i`, the output of layer i; `add_i`,
-the sum before layer i, of the dequantized terms, rounded again; and `concat`, the one scale and zero point of
-the last layer's input: its features are quantized to it directly (never by a scale of their own first), and so is the
-network's input a second time. The last convolution's output is float. Rounding is half to even.
+Each tensor that a convolution or a skip reads is quantized once: `input`; `relu_i`, the output of layer i; `add_i`, the
+sum of the dequantized terms before layer i, rounded again; and `concat`, the common scale and zero point of the last
+layer's input. The features are quantized to it directly, without a scale of their own, and the network's input a second
+time. The last convolution's output is float. Rounding is half to even.
 
-As features and the network's input share that scale, and their weights in a filter of the last layer share another, both
-must be of one size, as must channels of one tensor: prepare.py sees to it. Weights are rounded in order (rounding.py), last.
+Features and the network's input share that scale, and their weights in a filter of the last layer share another, so
+both must have a similar size, as must the channels of each tensor: prepare.py scales them. The last step rounds the
+weights in order (rounding.py).
 """
 
 import numpy as np
@@ -28,15 +31,15 @@ from .networks import SPLIT_STEP
 from .stage1 import Stage1
 from .stage2 import Stage2
 
-ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
+ALLOWED_LOSS_DB = 0.1  # the largest loss without quantization-aware training
 CALIBRATION_SCENES = 16
-BINS = 4096  # of a tensor's values, where its range is chosen
-CLIPPED = [1 - 0.05 * k for k in range(17)]  # ends of ranges to choose among, of the greatest value
-SILENT = 1.0  # the range of a tensor that is 0 everywhere: any finer and the layer before it scales beyond all bounds
+BINS = 4096  # of a tensor's histogram, for choosing its range
+CLIPPED = [1 - 0.05 * k for k in range(17)]  # candidate ends of ranges, as fractions of the maximum
+SILENT = 1.0  # range of a tensor that is 0 everywhere; a finer one gives the layer before it unbounded scales
 
 
 def tensors(architecture):
-    """The names of the quantized tensors, in the order of the graph."""
+    """Returns the names of the quantized tensors, in the order of the graph."""
     last = architecture.layers - 1
     names = ["input"]
     for i in range(last):
@@ -48,7 +51,7 @@ def tensors(architecture):
 
 
 def quantizer(name, low, high):
-    """(scale, zero point) of the tensor `name` with values from low to high; the scale is a float32 value."""
+    """Returns (scale, zero point) of the tensor `name` with values from low to high. The scale is a float32 value."""
     if name in ("input", "concat"):
         low, high = min(low, 0.0), max(high, 0.0)
         scale = float(np.float32((high - low if high > low else SILENT) / 254))
@@ -57,21 +60,21 @@ def quantizer(name, low, high):
 
 
 def weight_scale(weight, bias, input_scale):
-    """Scales (O,) of a layer's weights (O, I, 3, 3); an empty channel gets one that its bias still fits by."""
+    """Returns scales (O,) of a layer's weights (O, I, 3, 3). An empty channel gets a scale that fits its bias."""
     largest = weight.detach().abs().amax((1, 2, 3)) / 127
     return torch.maximum(largest, bias.detach().abs() / (input_scale * 2**30)).clamp(min=1e-12)
 
 
 def _through(exact, rounded):
-    """The rounded value, with the gradient of the exact one."""
+    """Returns the rounded value with the gradient of the exact value."""
     return exact + (rounded - exact).detach()
 
 
 class Quantized(nn.Module):
-    """A Chain whose forward pass rounds weights and activations as its int8 file does.
+    """A Chain whose forward pass rounds weights and activations like its int8 file.
 
-    ranges: {tensor: (min, max)} for the names of `tensors`. scales: {layer: (O,)} of layers whose weights' scales are
-    settled (rounding.py); the others' follow from their weights.
+    ranges: {tensor: (min, max)} for the names of `tensors`. scales: {layer: (O,)} of layers with fixed weight scales
+    (rounding.py). The scales of other layers follow from their weights.
     """
 
     def __init__(self, chain, ranges):
@@ -88,14 +91,14 @@ class Quantized(nn.Module):
         return torch.fake_quantize_per_tensor_affine(x, *self.parameters_of(name), 0, 255)
 
     def scale(self, i, input_name):
-        """Scales (O,) of the weights of layer i, which reads the tensor `input_name`."""
+        """Returns scales (O,) of the weights of layer i, which reads the tensor `input_name`."""
         if i in self.scales:
             return self.scales[i]
         conv = self.chain.convs[i]
         return weight_scale(conv.weight, conv.bias, self.parameters_of(input_name)[0])
 
     def layer(self, i, input_name):
-        """Rounded (weight, bias) of layer i."""
+        """Returns the rounded (weight, bias) of layer i."""
         conv = self.chain.convs[i]
         scale = self.scale(i, input_name)
         wide = scale[:, None, None, None]
@@ -117,7 +120,8 @@ class Quantized(nn.Module):
                 return end.value
 
     def walk(self, x):
-        """Yields each layer's number, what it reads and as which tensor; is sent what it gives, and returns the output."""
+        """Yields the number, input and input tensor's name of each layer, receives the layer's output by `send`, and
+        returns the network's output."""
         a = self.architecture
         last = a.layers - 1
         inputs, name, size = [], "input", x.shape[-2:]
@@ -138,7 +142,7 @@ class Quantized(nn.Module):
 
 
 def activations(chain, x):
-    """Yields the names of `tensors` with what is rounded there, for a network input (1, C, H, W)."""
+    """Yields each name of `tensors` with its exact values, for a network input (1, C, H, W)."""
     x = chain.entering(x)
     a = chain.architecture
     last = a.layers - 1
@@ -158,16 +162,16 @@ def activations(chain, x):
 
 @torch.no_grad()
 def calibrate(chain, examples):
-    """{tensor: (min, max)} of a Chain over a list of inputs (C, H, W): the range whose rounding and clipping costs least,
-    for a few bright pixels are worth less than finer steps for all."""
+    """Returns {tensor: (min, max)} of a Chain over a list of inputs (C, H, W): the range with the least error of
+    rounding and clipping, because finer steps for all pixels matter more than a few bright pixels."""
     ranges = extremes(chain, examples)
-    # The image is never clipped: its range is as far below 0 as above, and no end comes nearer than that.
+    # Never clips the image: its range is symmetric about 0, and no end is below it.
     counts = {name: 0 for name, (low, high) in ranges.items() if name != "input" and high > -low}
     for x in examples:
         for name, values in activations(chain, x[None]):
             if name in counts:
                 low, high = ranges[name]
-                # Where what a tensor can be was known beforehand, a few values may still lie outside.
+                # A few values may lie outside a range that was fixed beforehand.
                 at = (values.clamp(low, high) - low) * ((BINS - 1) / (high - low))
                 counts[name] += torch.bincount(at.round().long().flatten(), minlength=BINS)
     for name, seen in counts.items():
@@ -179,8 +183,8 @@ def calibrate(chain, examples):
 
 @torch.no_grad()
 def extremes(chain, examples):
-    """{tensor: (least, greatest value)} over inputs; of colours, depths and seeds the whole range that they can have, of a
-    split field the one whose steps are its own."""
+    """Returns {tensor: (min, max)} over inputs. Colours, depths and seeds have their whole possible range, and a split
+    field the range whose steps match its own."""
     ranges = {}
     for x in examples:
         for name, values in activations(chain, x[None]):
@@ -195,14 +199,15 @@ def extremes(chain, examples):
 
 
 def rounding_error(name, low, high, end, counts):
-    """The summed square error of the tensor's values, counted in `BINS` bins from low to high, where its range is low to end."""
+    """Returns the summed square error of a tensor's values, counted in `BINS` bins from low to high, for a range from
+    low to end."""
     values = torch.linspace(low, high, BINS)
     rounded = torch.fake_quantize_per_tensor_affine(values, *quantizer(name, low, end), 0, 255)
     return float((counts * (rounded - values).double().square()).sum())
 
 
 def examples(scenes, kind):
-    """Inputs of networks of this kind on scenes from all over the set, for calibration."""
+    """Yields inputs of networks of this kind on scenes spread over the whole set, for calibration."""
     count = min(len(scenes), CALIBRATION_SCENES)
     for i in range(count):
         colour, depth, seed, _ = scene_as_seen(scenes, i * len(scenes) // count, "clean")
@@ -210,7 +215,7 @@ def examples(scenes, kind):
 
 
 class QuantizationAware(Stage1):
-    """Stage 1 once more, through the rounding; ranges stay as calibrated, and dead units dead."""
+    """Stage 1 with rounding in the forward pass. Ranges stay as calibrated, and dead units are not revived."""
 
     kind = "qat"
 
@@ -226,7 +231,7 @@ class QuantizationAware(Stage1):
 
 
 class PrefilterQuantizationAware(Stage2):
-    """Stage 2 once more, through the rounding of the pre-filter alone; its ranges stay as calibrated."""
+    """Stage 2 with rounding in the forward pass of the pre-filter alone. Its ranges stay as calibrated."""
 
     kind = "qat"
 
@@ -240,16 +245,16 @@ class PrefilterQuantizationAware(Stage2):
 
 
 def prefilter_examples(model, scenes):
-    """Inputs of a DeepDoublePhase's pre-filter on the first scenes, for calibration."""
+    """Yields inputs of a DeepDoublePhase's pre-filter, for calibration."""
     for x in examples(scenes, model.hologram.architecture.input):
         yield model.seen_by_prefilter(model.hologram.field(x[None]))[0]
 
 
 def figure(network, scenes):
-    """Amplitude PSNR of a Chain or a Quantized on scenes."""
+    """Returns the amplitude PSNR of a Chain or a Quantized network on scenes."""
     return evaluate(torch_predictor(network), scenes, full=False)["amplitude_psnr"]
 
 
 def encoded_figure(model, scenes):
-    """Amplitude PSNR on scenes of what a DeepDoublePhase's holograms show."""
+    """Returns the amplitude PSNR of the displayed images of a DeepDoublePhase on scenes."""
     return encoding_figures(model, scenes, full=False, others=False)[DEEP]["amplitude_psnr"]

@@ -1,4 +1,5 @@
-"""All shipped networks from nothing, and one at half the resolution beside that of 8 layers: data, trainings, int8, figures, cards. What is done is not done again."""
+"""Makes all shipped networks from scratch, and a network at half the resolution to compare with that of 8 layers: data,
+trainings, int8, figures and cards. Completed steps are not repeated."""
 
 import json
 import subprocess
@@ -8,8 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-KINDS = {"objects": 1, "photographs": 22}  # of scenes, and the data sets' seeds
-DEEP = "-deep"  # what is called so is of twice the volume's depth
+KINDS = {"objects": 1, "photographs": 22}  # kinds of scenes and the seeds of their data sets
+DEEP = "-deep"  # suffix of data sets with twice the depth of the volume
 DEEP_DISPLAY = """pitch_um = 8.0
 wavelengths_nm = [638.0, 520.0, 450.0]
 volume_depth_mm = 12.0
@@ -20,12 +21,12 @@ SEED_PLANES = 80
 
 @dataclass(frozen=True)
 class Network:
-    """A network of stage 1, or a pair of stage 2, and its share of the training time."""
+    """A network of stage 1 or a pair of stage 2, with its share of the training time."""
 
     share: float
     flags: tuple[str, ...]
-    after: str | None = None  # the network that a pair begins with
-    wide: bool = False  # whether it learns volumes of twice the depth too
+    after: str | None = None  # the network that a pair starts from
+    wide: bool = False  # whether it also learns volumes of twice the depth
 
     @property
     def seeded(self):
@@ -51,7 +52,7 @@ NETWORKS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What may differ from machine to machine."""
+    """The settings of a run, which may differ between machines."""
 
     output: Path
     phasefront: str  # the lab's command
@@ -65,15 +66,15 @@ class Settings:
 
 @dataclass(frozen=True)
 class Step:
-    """A command of this package."""
+    """A step: a command of this package."""
 
     name: str
     arguments: tuple[str, ...]
-    resumed: Path | None = None  # where this file is, the command goes on with --resume
+    resumed: Path | None = None  # if this file exists, the command resumes with --resume
 
 
 def steps(settings: Settings) -> Iterator[Step]:
-    """All of it, in order."""
+    """Returns all steps, in order."""
     folder = settings.output
     chosen = {name: NETWORKS[name] for name in NETWORKS if name in settings.networks}
     for kind, seed in KINDS.items():
@@ -126,7 +127,7 @@ def _step(name, *arguments, resumed=None):
 
 
 def check(settings: Settings):
-    """Raises ValueError where the settings ask for what there is not."""
+    """Raises ValueError if the settings name unknown networks or values."""
     if unknown := [name for name in settings.networks if name not in NETWORKS]:
         raise ValueError(f"no network is called {', '.join(unknown)}; there are {', '.join(NETWORKS)}")
     for name in settings.networks:
@@ -137,7 +138,8 @@ def check(settings: Settings):
 
 
 def run(settings: Settings, call: Callable[[tuple[str, ...]], int] | None = None) -> int:
-    """Takes every step that is not done yet; gives how many were. A step counts as done with the arguments it had.
+    """Runs every step that is not done yet and returns their number. A step counts as done only with the same
+    arguments.
 
     `call` takes a command's arguments and gives its exit status.
     """

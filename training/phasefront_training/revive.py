@@ -1,26 +1,27 @@
-"""Dead units begin again.
+"""Gives dead units fresh weights.
 
-A unit whose ReLU fires nowhere gives no gradient, so it stays dead; in deep chains many die early, for what a residual
-branch adds is never negative. Of the 24 units of every second layer of a network of 15 layers, half were left in the
-middle and none at the end. Revived, a unit of a branch's first layer fires as strongly as its neighbours, and nothing
-reads it yet; what one of its second layer adds is a tenth of that.
+A unit whose ReLU never fires has no gradient, so it stays dead. In deep chains many units die early, because the output
+of a residual branch is never negative. In a network of 15 layers with 24 units each, half of the units of every second
+layer survived in the middle and none at the end. A revived unit in the first layer of a branch fires as strongly as its
+neighbours, and the next layer reads it with weight 0. One in the second layer adds a tenth of that.
 """
 
 import torch
 
 BRANCH = 0.1
-SILENT = 1e-3  # the share of pixels under which a unit counts as dead
+SILENT = 1e-3  # fraction of pixels below which a unit counts as dead
 
 
 def revive(network, examples):
-    """Gives fresh weights to the dead units of a Chain, layer by layer; returns how many there were.
+    """Gives fresh weights to the dead units of a Chain, layer by layer. Returns their number.
 
     examples: network inputs (N, C, H, W), a few.
     """
     revived = 0
 
     def revive_layer(i, conv, seen, output):
-        """A forward hook of layer i: `output` (N, units, H, W) before the ReLU, with its dead units fresh."""
+        """Revives the dead units of layer i in a forward hook. Returns the new output (N, units, H, W) before the
+        ReLU."""
         nonlocal revived
         dead = _of_units(output > 0).float().mean(-1) < SILENT
         if not dead.any():
@@ -50,5 +51,5 @@ def revive(network, examples):
 
 
 def _of_units(values):
-    """(N, units, H, W) as (units, pixels)."""
+    """Converts (N, units, H, W) to (units, pixels)."""
     return values.transpose(0, 1).flatten(1)

@@ -1,21 +1,21 @@
-"""Weights of an int8 network rounded in order, so that errors do not add up.
+"""Rounds the weights of an int8 network in order, so that errors do not add up.
 
-Rounding each weight to its nearest step leaves errors that add up in a sum of 216 products. Here a filter's weights are
-rounded one after another, and those not yet rounded make good, as far as their inputs go together, what that changed:
-optimal brain compression (Frantar and Alistarh 2022), in the order of their GPTQ. What goes together is seen on inputs
-that the rounded layers before give.
+If each weight is rounded to its nearest step, the errors add up in a sum of 216 products. This module rounds the
+weights of a filter one after another. The weights that are not rounded yet compensate each error, as far as their
+inputs correlate: optimal brain compression (Frantar and Alistarh 2022), in the order of their GPTQ. The correlations
+are measured on the outputs of the rounded layers before.
 """
 
 import torch
 from torch.nn import functional as F
 
-SCENES = 2  # whose pixels show which inputs go together
-RIDGE = 1e-3  # of the inputs' mean power
+SCENES = 2  # whose pixels give the correlations of inputs
+RIDGE = 1e-3  # fraction of the inputs' mean power
 
 
 @torch.no_grad()
 def round_in_order(quantized, examples):
-    """Settles the scales of a Quantized network's weights, and its weights on their steps; biases make good the rest.
+    """Fixes the weight scales of a Quantized network and rounds its weights. Biases compensate the remaining error.
 
     examples: a list of network inputs (C, H, W).
     """
@@ -34,12 +34,12 @@ def round_in_order(quantized, examples):
 
 
 def in_order(weights, scale, products):
-    """Weights (O, K + 1) of which the first K are rounded to steps of scale (O,), one after another.
+    """Rounds the first K of the weights (O, K + 1) to steps of scale (O,), one after another.
 
-    products: (K + 1, K + 1), the mean products of what they multiply.
+    products: (K + 1, K + 1), the mean products of the inputs of the weights.
     """
     weights = weights.clone()
-    # Row k of the upper factor says what an error of weight k asks of those behind it.
+    # Row k of the upper factor holds the corrections of the later weights for an error of weight k.
     factor = torch.linalg.cholesky(torch.linalg.inv(products), upper=True)
     for k in range(weights.shape[1] - 1):
         exact = weights[:, k].clone()
@@ -50,7 +50,8 @@ def in_order(weights, scale, products):
 
 
 def _products(inputs):
-    """Mean products of 3x3 windows of the inputs (N, C, H, W), and 1 behind, with themselves, in float64."""
+    """Returns the mean products, in float64, of 3x3 windows of the inputs (N, C, H, W), extended by 1, with
+    themselves."""
     products, pixels = 0, 0
     for x in inputs:
         windows = F.unfold(x, 3, padding=1)[0]

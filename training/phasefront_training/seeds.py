@@ -1,11 +1,11 @@
-"""Seeds: the plane sweep's field of each scene, on clean and on simulated sensor depth, as seeded networks see it in use.
+"""Seeds: the plane sweep's field of each scene, on clean and on simulated sensor depth, the inputs of seeded networks.
 
-A folder beside a data set, made by `python -m phasefront_training seeds`. This package writes the depths,
-`depth_000123.npy`, uint16 (V, H, W), d·65535: variant 0 is the clean depth of the visible layer, the others are simulated
-sensor depth (sensor_depth.py); `evaluate` judges that scene on the first of them. `phasefront-lab seeds` may add R more,
-read by a sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W). It adds to all of them the fields that
-the SDK computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale that
-`seeds.json` says.
+The seeds of a data set are a folder that `python -m phasefront_training seeds` makes. This package writes the depths,
+`depth_000123.npy`, uint16 (V, H, W), d·65535. Variant 0 is the clean depth of the visible layer. The others are
+simulated sensor depth (sensor_depth.py), and `evaluate` uses the first of them. `phasefront-lab seeds` can add R depths
+that are read by a sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W). It adds the fields of all
+depths, which the SDK computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the
+scale in `seeds.json`.
 """
 
 import json
@@ -25,7 +25,7 @@ FORMAT = "phasefront-seeds-1"
 
 
 def make(manifest, output, variants, arguments, command="phasefront-lab"):
-    """Makes or completes the seeds of a data set: `variants` depths a scene, then the lab's command for the fields."""
+    """Makes or completes the seeds of a data set: `variants` depths per scene, then the fields by the lab's command."""
     output = Path(output)
     output.mkdir(parents=True, exist_ok=True)
     for number in range(manifest.table["scenes"]):
@@ -72,7 +72,8 @@ class Seeds:
         return cls(Path(folder), float(table["scale"]), int(table["planes"]), int(table.get("refined", 0)))
 
     def of(self, number):
-        """Depths float16 (V + R, H, W) and fields float16 (V + R, 6, H, W) of a scene; refined depths come last."""
+        """Returns depths float16 (V + R, H, W) and fields float16 (V + R, 6, H, W) of a scene. Refined depths are
+        last."""
         depths, fields = (self._array(f"{name}_{number:06d}.npy") for name in ("depth", "seed"))
         if self.refined:
             depths = np.concatenate([depths, self._array(f"refined_{number:06d}.npy")])

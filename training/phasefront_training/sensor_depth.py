@@ -1,25 +1,25 @@
-"""Simulated sensor depth, made from clean depth; colour and target do not change.
+"""Simulates sensor depth from clean depth. Colour and target do not change.
 
-Phone depth is coarse (a LiDAR frame is 256x192 beside a 1920x1440 image), its noise grows with distance, it has
-holes where nothing came back, its edges bleed, and it stands a few pixels beside the colour. Each of these is drawn
-at random with a random strength. Holes are then filled with the nearest valid depth, as the core does before a
-network sees a frame.
+Phone depth is coarse (a LiDAR frame has 256x192 pixels for an image of 1920x1440), its noise grows with distance, it
+has holes where no light returned, its edges bleed, and it is shifted by a few pixels against the colour. Each defect
+occurs at random with a random strength. Holes are then filled with the nearest valid depth, as the core does before a
+network reads a frame.
 """
 
 import numpy as np
 import torch
 from torch.nn import functional as F
 
-MAX_FACTOR = 6.0  # coarseness against colour
-MAX_NOISE = 0.012  # standard deviation at the far end, of the volume
+MAX_FACTOR = 6.0  # of the pixel size relative to colour
+MAX_NOISE = 0.012  # standard deviation at the far end, as a fraction of the volume
 MAX_SHIFT_PX = 3.0
-MAX_HOLES = 0.04  # share of the coarse pixels that seed a hole
+MAX_HOLES = 0.04  # fraction of the coarse pixels that seed a hole
 
 
 def simulate_sensor_depth(colour, depth, rng):
-    """Normalized depth (H, W) as a phone would give it for the colour (3, H, W); values stay in [0, 1].
+    """Simulates a phone's normalized depth (H, W) for the colour (3, H, W). Values stay in [0, 1].
 
-    `rng` is a numpy Generator; the same state gives the same depth.
+    `rng` is a numpy Generator. The same state gives the same depth.
     """
     height, width = depth.shape
     coarse = depth[None, None]
@@ -29,7 +29,8 @@ def simulate_sensor_depth(colour, depth, rng):
         coarse = _bleed(coarse, int(rng.integers(1, 3)), toward_viewer=rng.random() < 0.7)
     factor = rng.uniform(1.5, MAX_FACTOR) if rng.random() < 0.8 else 1.0
     size = max(2, round(height / factor)), max(2, round(width / factor))
-    # Averaging mixes the two sides of an edge (flying pixels); a sensor that picks one keeps it abrupt but jagged.
+    # Averaging mixes the two sides of an edge (flying pixels). A sensor that picks one side keeps the edge abrupt but
+    # jagged.
     averaged = rng.random() < 0.5
     if factor > 1:
         coarse = F.interpolate(coarse, size, mode="area" if averaged else "nearest-exact")
@@ -46,7 +47,7 @@ def simulate_sensor_depth(colour, depth, rng):
 
 
 def _shift(depth, dx, dy):
-    """Moves a depth map (1, 1, H, W) by whole pixels, so that edges do not blur; borders are repeated."""
+    """Shifts a depth map (1, 1, H, W) by whole pixels, so that edges do not blur. Borders are repeated."""
     dx, dy = round(float(dx)), round(float(dy))
     if dx == 0 and dy == 0:
         return depth
@@ -57,14 +58,14 @@ def _shift(depth, dx, dy):
 
 
 def _bleed(depth, radius, toward_viewer):
-    """Near surfaces grow over far ones by `radius` pixels (or the other way round)."""
+    """Grows near surfaces over far surfaces by `radius` pixels, or far over near."""
     size = 2 * radius + 1
     sign = -1 if toward_viewer else 1
     return sign * F.max_pool2d(sign * depth, size, 1, radius)
 
 
 def _holes(depth, colour, rng):
-    """True where no depth came back: blots anywhere, and dark surfaces."""
+    """Returns True where the sensor has no reading: random spots and dark surfaces."""
     height, width = depth.shape[-2:]
     seeds = torch.from_numpy(rng.random((1, 1, height, width), dtype=np.float32)).to(depth.device)
     holes = (seeds < rng.uniform(0, MAX_HOLES)).float()
@@ -76,7 +77,7 @@ def _holes(depth, colour, rng):
 
 
 def fill_nearest(depth, holes):
-    """Depth (1, 1, H, W) with each hole set to the depth of a nearest valid pixel (in steps of one pixel)."""
+    """Fills each hole of a depth map (1, 1, H, W) with the depth of a nearest valid pixel, in steps of one pixel."""
     if holes.all():
         return torch.full_like(depth, 0.5)
     depth, valid = depth.clone(), ~holes

@@ -1,8 +1,8 @@
-"""A data set made by many processes or machines: each shard of `phasefront-lab dataset` is a Ray task.
+"""Makes a data set with many processes or machines: each shard of `phasefront-lab dataset` is a Ray task.
 
-All tasks write into one folder, which every machine must see under the same path, as it must the command. A pair
-is renamed into its place when it is whole, so shards neither wait for nor disturb each other, and a stopped run goes
-on when it is started again, with any number of shards. Ray is an extra: `pip install './training[ray]'`.
+All tasks write to one folder. Every machine must have the folder and the command under the same paths. A pair is
+renamed to its final name when it is complete, so shards do not depend on each other, and a stopped run can resume with
+any number of shards. Ray is an extra: `pip install './training[ray]'`.
 """
 
 import subprocess
@@ -13,15 +13,15 @@ from tqdm import tqdm
 
 from .data import DataError
 
-SHARDS_PER_SLOT = 4  # scenes differ in cost: small shards leave no machine idle at the end
+SHARDS_PER_SLOT = 4  # scenes differ in cost, and small shards keep all machines busy to the end
 RETRIES = 2  # of a shard whose machine was lost
 
 
 def make(output, arguments, command="phasefront-lab", address=None, shards=None, cpus=1):
-    """Makes the data set in `output`, `shards` tasks of `cpus` cores; returns how many shards there were.
+    """Makes the data set in `output` with `shards` tasks of `cpus` cores. Returns the number of shards.
 
-    `address` is the Ray cluster's; None starts one on this machine for the time of the call. Raises DataError where
-    Ray is not installed or a shard fails.
+    `address` is the address of the Ray cluster. None starts a cluster on this machine for the duration of the call.
+    Raises DataError if Ray is not installed or a shard fails.
     """
     try:
         import ray
@@ -63,7 +63,7 @@ def _call(command, arguments, output, shard, count, cpus):
 
 
 def _run(call):
-    """Runs one shard on whatever machine this is; returns what went wrong, or None."""
+    """Runs a shard on this machine. Returns an error message or None."""
     try:
         done = subprocess.run(call, capture_output=True, text=True, check=False)
     except OSError as error:

@@ -1,7 +1,7 @@
-"""Stage 1: the hologram network learns the midpoint hologram, supervised.
+"""Stage 1: supervised training of the hologram network on midpoint holograms.
 
-Loss: field + amplitude + 2·focal stack + total variation (losses.py). The focal stack takes all 20 planes where the
-machine allows, or a few of them at random in each step, which has the same mean. Units that no longer fire begin again
+The loss is field + amplitude + 2·focal stack + total variation (losses.py). The focal stack uses all 20 planes on a
+GPU, or a few random planes in each step, which has the same mean. Units that no longer fire get fresh weights
 (revive.py) every hundred steps of the first part.
 """
 
@@ -24,17 +24,17 @@ PLANES_ON_CPU = 1
 PLANES_ON_GPU = 20
 LIGHT_REACH_PX = 16
 REVIVAL_STEPS = 100
-REVIVALS_END = 0.6  # of the training: what begins again needs time to learn
-REVIVAL_SCENES = 4  # whose crops show which units fire
+REVIVALS_END = 0.6  # fraction of the training; revived units need time to learn
+REVIVAL_SCENES = 4  # whose crops determine which units fire
 
 
 def margin(architecture):
-    """Pixels of a cut side left out of the loss: what the network cannot see there, at most the light's reach."""
+    """Returns the pixels at a cut side that the loss leaves out: the network's reach, but at most the light's."""
     return min(architecture.reach_px, LIGHT_REACH_PX)
 
 
 class Stage1(Task):
-    """Trains `network` (a Chain, or one that quantizes as it goes) on the scenes of one data set."""
+    """The task that trains `network` (a Chain or a Quantized network) on scenes."""
 
     kind = "stage1"
 
@@ -57,7 +57,7 @@ class Stage1(Task):
         return self.network
 
     def before(self, step):
-        """Looks for new scenes of a pool when as many samples have been drawn as there are scenes."""
+        """Looks for new scenes of a pool once the number of samples since the last look reaches that of the scenes."""
         if isinstance(self.scenes, Pool) and (step - self.looked) * self.sampler.batch >= len(self.scenes):
             self.looked = step
             if more := self.scenes.look():

@@ -1,10 +1,11 @@
-"""Stage 2, the deep double phase method: hologram network and pre-filter learn together what survives encoding.
+"""Stage 2, the deep double phase method: the hologram network and the pre-filter are trained together through the
+encoding.
 
-The pre-filter works on a field that AA-DPM's blur has gone over, and begins by leaving it alone: so training starts from
-that method's quality. (The paper's start, the pre-filter alone learning to give true holograms at the modulator's plane as
-they are, is there too, by a number of steps.) Then both are trained
-through encoding, aperture and back propagation by the focal-stack loss against the true midpoint hologram, plus 0.07
-times the phase regulariser; the truth of the field itself is left out on purpose.
+The pre-filter reads a field after the blur of AA-DPM and initially leaves it unchanged, so training starts from the
+quality of that method. (The start of the paper, in which the pre-filter alone first learns to reproduce true holograms
+at the modulator's plane, is available with a number of steps.) Both networks are then trained through encoding,
+aperture and back propagation by the focal-stack loss against the true midpoint hologram, plus 0.07 times the phase
+regulariser. The loss deliberately leaves out the field itself.
 """
 
 import numpy as np
@@ -24,14 +25,14 @@ PHASE_WEIGHT = 0.07
 
 
 def prefilter_network(layers=8, filters=8):
-    """A pre-filter that leaves a blurred field as it is so far; 8 layers of 8 filters are the paper's."""
+    """Returns a pre-filter that initially leaves a blurred field unchanged. The paper uses 8 layers of 8 filters."""
     network = Chain(Architecture(layers, filters, "blurred-field"))
     torch.nn.init.zeros_(network.convs[-1].weight)
     return network
 
 
 class _OnHolograms(Task):
-    """What both parts share: samples whose cut sides are farther in than light comes from beyond them."""
+    """The common base of both parts. The margin of its samples exceeds the reach of light from beyond the cut sides."""
 
     def __init__(self, model, scenes, validation, workers, batch=1, crop=384, sensor_depth=0.0, seed=0):
         self.model = model.to(workers.device, memory_format=torch.channels_last)
@@ -50,7 +51,7 @@ class _OnHolograms(Task):
 
 
 class Identity(_OnHolograms):
-    """The pre-filter learns to give what it is given."""
+    """The task that trains the pre-filter to reproduce its input."""
 
     kind = "identity"
 
@@ -70,7 +71,7 @@ class Identity(_OnHolograms):
 
 
 class Stage2(_OnHolograms):
-    """Both networks, by what the encoded hologram shows."""
+    """The task that trains both networks by the displayed images of the encoded hologram."""
 
     kind = "stage2"
 

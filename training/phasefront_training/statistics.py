@@ -1,9 +1,10 @@
-"""What scenes look like, in numbers: brightness, spectrum and depths of data sets beside those of captured frames.
+"""Statistics of scenes: brightness, spectrum and depths of data sets, to compare with captured frames.
 
-Of each image: its mean amplitude; the slope of its grey spectrum, power against frequency (photographs have about -2,
-blurred ones less); the correlation of its colours; how its depths are spread; and the share of neighbouring pixels
-across a step in depth. A captured frame is a file `colorNAME` with a `depthNAME.png` beside it; its depths run from the
-1st to the 99th percentile of what was read, and pixels without a reading count for nothing.
+The numbers of an image are its mean amplitude, the slope of its grey spectrum, power against frequency (about -2 for
+photographs, less for blurred ones), the correlation of its colours, the distribution of its depths, and the fraction of
+neighbouring pixels across a step in depth. A captured frame is a file `colorNAME` with a `depthNAME.png` in the same
+folder. Its depths are normalized from the 1st to the 99th percentile of the readings. Pixels without a reading are
+ignored.
 """
 
 from dataclasses import dataclass
@@ -15,23 +16,23 @@ from PIL import Image
 from .data import DataError, Manifest, read_pair
 
 DEPTH_BINS = 10
-STEP = 0.05  # of the volume
-FREQUENCIES = np.geomspace(0.02, 0.4, 12)  # cycles a pixel
+STEP = 0.05  # fraction of the volume
+FREQUENCIES = np.geomspace(0.02, 0.4, 12)  # cycles per pixel
 
 
 @dataclass(frozen=True)
 class Look:
-    """The numbers of one image."""
+    """The statistics of an image."""
 
     amplitude: float
     slope: float
     correlation: float
-    depths: np.ndarray  # shares of the bins from near to far
+    depths: np.ndarray  # fractions of the bins from near to far
     steps: float
 
 
 def look(colour, depth):
-    """The Look of colour (3, H, W) in [0, 1] and normalized depth (H, W), NaN where there is none."""
+    """Returns the Look of colour (3, H, W) in [0, 1] and normalized depth (H, W), NaN without a reading."""
     known = depth[np.isfinite(depth)]
     shares = np.histogram(known.clip(0, 1), DEPTH_BINS, (0, 1))[0] / max(known.size, 1)
     steps = np.abs(np.diff(depth, axis=1))
@@ -40,7 +41,8 @@ def look(colour, depth):
 
 
 def slope(grey):
-    """The exponent of power against frequency, fitted to rings of the spectrum of the largest square in the middle."""
+    """Returns the exponent of power against frequency, fitted to rings of the spectrum of the largest central
+    square."""
     size = min(grey.shape)
     top, left = ((n - size) // 2 for n in grey.shape)
     window = np.hanning(size)[:, None] * np.hanning(size)
@@ -54,7 +56,7 @@ def slope(grey):
 
 
 def correlation(colour):
-    """The mean correlation of two colours; NaN where a colour does not vary."""
+    """Returns the mean correlation of two colours, or NaN if a colour does not vary."""
     flat = colour.reshape(3, -1)
     if flat.std(1).min() == 0:
         return float("nan")
@@ -63,7 +65,7 @@ def correlation(colour):
 
 
 def of_data(folder, split, limit=None):
-    """The Looks of the scenes of a split, those that are there."""
+    """Returns the Looks of the existing scenes of a split."""
     manifest = Manifest.read(folder)
     paths = [manifest.pair(n) for n in manifest.indices(split) if manifest.pair(n).exists()][:limit]
     if not paths:
@@ -76,7 +78,7 @@ def of_data(folder, split, limit=None):
 
 
 def of_frames(folder):
-    """The Looks of the captured frames below a folder."""
+    """Returns the Looks of the captured frames in a folder and its subfolders."""
     looks = []
     for path in sorted(Path(folder).rglob("color*")):
         beside = path.with_name(path.name.replace("color", "depth", 1)).with_suffix(".png")
@@ -87,7 +89,7 @@ def of_frames(folder):
 
 
 def normalized(readings):
-    """Readings (0: none) as normalized depth, NaN where there is none."""
+    """Converts readings to normalized depth. A reading of 0 becomes NaN."""
     known = readings[readings > 0]
     if known.size == 0:
         return np.full_like(readings, np.nan)
@@ -96,7 +98,7 @@ def normalized(readings):
 
 
 def table(named):
-    """{name: Looks} as Markdown."""
+    """Returns {name: Looks} as a Markdown table."""
     lines = [
         "| | images | mean amplitude (10 % below, above) | spectrum's slope | colours' correlation | depth, shares of tenths from near to far, % | steps in depth, % |",
         "|---|---|---|---|---|---|---|",

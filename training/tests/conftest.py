@@ -1,4 +1,4 @@
-"""A tiny data set of random planes, its holograms by an angular spectrum method in plain numpy."""
+"""A tiny data set of random planes, with holograms by an angular spectrum method in plain numpy."""
 
 import json
 
@@ -12,7 +12,7 @@ VOLUME = 6e-3
 
 
 def asm(field, s, pad=64):
-    """The angular spectrum method in float64, zero-padded on all sides, without the carrier: the reference."""
+    """Propagates by the reference angular spectrum method in float64, zero-padded on all sides, without the carrier."""
     _, h, w = field.shape
     big = np.pad(field.astype(complex), ((0, 0), (pad, pad), (pad, pad)))
     fx, fy = np.fft.fftfreq(w + 2 * pad, PITCH), np.fft.fftfreq(h + 2 * pad, PITCH)
@@ -23,7 +23,7 @@ def asm(field, s, pad=64):
 
 
 def scene(rng, size, layers):
-    """A background and rectangles in front, as a layered depth image and its midpoint hologram."""
+    """Returns a background with rectangles in front, as a layered depth image and its midpoint hologram."""
     y, x = np.mgrid[:size, :size] / size
     waves = [0.5 + 0.4 * np.sin(rng.uniform(4, 20) * x + rng.uniform(4, 20) * y + k) for k in range(3)]
     surfaces = [(np.stack(waves), np.full((size, size), 0.9), np.ones((size, size), bool))]
@@ -53,7 +53,7 @@ def scene(rng, size, layers):
 
 @pytest.fixture(scope="session")
 def data_folder(tmp_path_factory):
-    """Eight scenes of 64x64 with three layers: five to train, two to validate, one to test."""
+    """Makes eight scenes of 64x64 with three layers: five for training, two for validation and one for tests."""
     folder = tmp_path_factory.mktemp("data")
     rng = np.random.default_rng(3)
     for i in range(8):

@@ -51,7 +51,7 @@ def test_pairs_of_too_few_layers_are_refused(data_folder):
 
 
 def found(scene, batch, n, turn):
-    """Whether sample n of a batch, turned, is a window of the scene."""
+    """Checks whether sample n of a batch, after flips and a transpose, is a window of the scene."""
     colour, depth, truth = scene
     views = torch.cat([network_input(colour, depth), truth.real, truth.imag]).unfold(-2, 48, 1).unfold(-2, 48, 1)
     window = torch.cat([batch.input[n], batch.target[n].real, batch.target[n].imag])
@@ -68,7 +68,7 @@ def test_samples_are_cut_from_scenes_and_repeat(data_folder):
     assert torch.equal(one.input, again.input) and torch.equal(one.target, again.target)
     assert not torch.equal(one.input, other.input)
     assert one.input.shape == (3, 4, 48, 48) and one.target.shape == (3, 3, 48, 48) and one.valid.shape == (3, 1, 48, 48)
-    # Each sample, its flips and transposes undone, is a window of one scene: input and target at the same place.
+    # Without its flips and transposes, each sample is a window of one scene, with input and target at the same place.
     for n in range(3):
         assert any(found(scenes.scene(k), one, n, turn) for k in range(len(scenes)) for turn in range(8))
 
@@ -103,7 +103,7 @@ def test_dimmed_samples_are_a_scene_and_its_hologram_by_the_same_gains(data_fold
     sampler = Sampler(scenes, 1, 64, 8, seed=5, dimmed=1.0)
 
     def dimmed(k, batch):
-        """The gains that make scene k the sample, if there are any."""
+        """Returns the gains that convert scene k to the sample, or None."""
         colour, _, field = scenes.scene(k)
         for turn in range(8):
             seen, target = batch.input[0, :3] + 0.5, batch.target[0]
@@ -120,7 +120,7 @@ def test_dimmed_samples_are_a_scene_and_its_hologram_by_the_same_gains(data_fold
         batch = sampler.draw(step)
         gains = next(found for k in range(len(scenes)) if (found := dimmed(k, batch)) is not None)
         assert batch.input[:, :3].max() <= 0.5 + 1e-5 and gains.min() > 0 and (gains - 1).abs().max() > 1e-3
-        # What the samples rest on: waves through a scene with occlusion are linear in each of its colours.
+        # The samples assume that waves through a scene with occlusion are linear in each of its colours.
         colour, depth, _ = scenes.scene(0)
         by_waves = visible_layers(scenes.display, 16)
         assert torch.allclose(by_waves(gains * colour, depth), gains * by_waves(colour, depth), atol=1e-5)
@@ -139,7 +139,7 @@ def test_data_sets_are_joined(data_folder, tmp_path):
 
 
 def for_another_display(folder, to, **changes):
-    """A data set's copy whose manifest says another display."""
+    """Copies a data set with another display in its manifest."""
     shutil.copytree(folder, to)
     table = json.loads((to / "manifest.json").read_text())
     table["display"] |= changes
@@ -163,7 +163,7 @@ def test_depths_of_a_shallower_volume_are_stretched_to_the_deeper_one(data_folde
 
 
 def test_a_wave_depends_on_stretched_depths_alone(data_folder):
-    """What stretching rests on: the waves of half the volume in as many planes are those of depths pressed to the middle half."""
+    """The waves of half the volume, in as many planes, equal those of depths compressed to the middle half."""
     scenes = Scenes(Manifest.read(data_folder), "train")
     colour, depth, _ = scenes.scene(0)
     depth = (depth * 16).floor().clamp(max=15).add(0.5) / 16
@@ -218,7 +218,7 @@ def test_coordinates_say_where_a_crop_lies_and_nothing_is_flipped(data_folder):
     for step in range(20):
         given = sampler.draw(step).input[0]
         assert given.shape[0] == 6
-        # Of all scenes the one whose pixels at that place are these.
+        # The scene that has these pixels at this place.
         x, y = round(((given[4, 0, 0] + 0.5) * width - 0.5).item()), round(((given[5, 0, 0] + 0.5) * height - 0.5).item())
         window = (..., slice(y, y + 16), slice(x, x + 16))
         inputs = (network_input(*scenes.scene(i)[:2], kind="rgbdxy")[window] for i in range(len(scenes)))

@@ -31,7 +31,7 @@ def test_double_phase_is_the_float64_reference():
     theta = np.arccos(np.minimum(np.abs(u) / scale, 1 - 1e-6))
     expected = np.angle(u) + np.where((x + y) % 2 == 0, theta, -theta)
     field = torch.from_numpy(u).to(torch.complex64)[None]
-    # Near full amplitude acos turns a float32 ulp into a few 1e-4.
+    # Near full amplitude, acos amplifies a float32 ulp to a few 1e-4.
     assert np.abs(double_phase(field, scale_of(field))[0].numpy() - expected).max() < 2e-3
 
 
@@ -114,7 +114,7 @@ def test_both_networks_learn_through_the_encoding():
 
 
 def deep(table):
-    """The first figure of the deep double phase method."""
+    """Returns the first figure of the deep double phase method."""
     return float(table.split("| deep double phase |")[1].split("|")[0])
 
 

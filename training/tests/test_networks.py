@@ -112,7 +112,7 @@ def test_a_halved_network_is_a_network_on_squares_of_pixels(size):
     out = halved(x)
     assert out.shape == (1, 6, *size)
     assert multiplies_per_pixel(halved.architecture) == 9 * (16 * 8 + 3 * 64 + 24 * 24) / 4
-    # Twice as far as its layers, and no farther.
+    # The reach is exactly twice the number of layers.
     near, far = x.clone(), x.clone()
     near[..., 10:] += 1
     far[..., 12:] += 1

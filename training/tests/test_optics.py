@@ -16,11 +16,11 @@ def test_propagation_is_the_numpy_reference():
     rng = np.random.default_rng(0)
     for h, w, s in ((48, 37, 2e-3), (33, 64, -5e-3)):
         u = field(rng, h, w)
-        # The reference pads more: a kernel sampled on another grid differs by its faint tail beyond the reach.
+        # The reference pads more, and a kernel on another grid differs by its faint tail beyond the reach.
         ours = propagate(torch.from_numpy(u).to(torch.complex64), s, DISPLAY).numpy()
         error = np.abs(ours - asm(u, s, 160))
         assert np.sqrt((error**2).mean()) < 0.02
-    # On the same grid they are the same to float32.
+    # On the same grid they agree to float32 precision.
     pad = 32
     u = field(rng, 40, 40)
     big = np.pad(u, ((0, 0), (pad, pad), (pad, pad)))

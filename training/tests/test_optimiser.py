@@ -18,7 +18,8 @@ def test_hidden_layers_step_along_orthogonal_matrices_and_everything_steps(memor
     for conv, old in zip(network.convs[1:-1], before[2:-2:2]):
         step = (conv.weight - old).flatten(1)
         values = torch.linalg.svdvals(step) / (1e-2 * MUON_RATE * 0.2 * 72**0.5)
-        # Newton-Schulz in five rounds brings singular values near 1, as Muon's makers say: to 0.5 to 1.5 at worst.
+        # Five rounds of Newton-Schulz bring singular values close to 1: at worst 0.5 to 1.5, according to Muon's
+        # authors.
         assert values.max() < 1.6 and values.median() > 0.5
 
 

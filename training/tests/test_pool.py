@@ -15,7 +15,7 @@ from phasefront_training.networks import Architecture, Chain
 from phasefront_training.pool import Pool
 from phasefront_training.stage1 import Stage1
 
-# Takes the place of the lab's command: it notes its flags, and fails for seed 1002 while the folder holds no `mended`.
+# Replaces the lab's command: it records its flags and fails for seed 1002 until the folder holds a file `mended`.
 COMMAND = """#!{python}
 import json, pathlib, sys
 arguments = sys.argv[1:]

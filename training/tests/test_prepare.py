@@ -15,7 +15,7 @@ CASES = [Architecture(layers, 8, input) for layers in (3, 4, 7, 8) for input in 
 
 
 def network(architecture, seed=0):
-    """A Chain whose channels differ much in size."""
+    """Returns a Chain whose channels have very different sizes."""
     torch.manual_seed(seed)
     chain = Chain(architecture)
     with torch.no_grad():
@@ -52,7 +52,7 @@ def test_features_are_balanced_against_the_input(layers):
     chain = network(Architecture(layers, 8))
     with torch.no_grad():
         chain.convs[-1].weight[:, 8:] = 0
-        chain.convs[-1].weight[:3, 8:11, 1, 1] = -torch.eye(3)  # as trained networks take part of the image away
+        chain.convs[-1].weight[:3, 8:11, 1, 1] = -torch.eye(3)  # trained networks subtract part of the image
         chain.convs[-1].weight[:, :8] *= 0.1
     seen = torch.rand(3, 4, 32, 32) - 0.5
 
@@ -109,7 +109,7 @@ def test_rounding_in_order_loses_less_than_rounding_each(architecture):
 
 
 def test_in_order_an_error_is_made_good_by_what_goes_together():
-    # Two weights of the same input: the second takes what the first's rounding left.
+    # Of two weights of the same input, the second compensates the rounding error of the first.
     products = torch.ones(3, 3, dtype=torch.float64) + 1e-9 * torch.eye(3, dtype=torch.float64)
     rounded = in_order(torch.tensor([[1.4, 1.4, 0.0]], dtype=torch.float64), torch.ones(1, dtype=torch.float64), products)
     assert rounded[0, 0] == 1 and rounded[0, 1] == 2

@@ -38,7 +38,7 @@ def test_the_int8_file_is_the_rounded_network(architecture, tmp_path):
         ours, exact = quantized(x).numpy(), chain(x).numpy()
     theirs = session.run(None, {session.get_inputs()[0].name: x.numpy()})[0]
     rms = lambda e: np.sqrt((e**2).mean())
-    # Float sums may round a value at a tie to the other side: equal but for a few last digits.
+    # Float sums may round a tie to the other side, so the values are equal except for a few last digits.
     assert rms(theirs - ours) < 0.1 * rms(ours - exact) + 1e-6
     assert 0 < rms(ours - exact) < 0.05 * rms(exact)
     write(int8_model(quantized, Display()), tmp_path / "again.onnx")
@@ -79,7 +79,7 @@ def test_an_empty_channel_keeps_its_bias(tmp_path):
 
 def test_ranges_end_where_the_error_is_least():
     chain = network(Architecture(5, 8))
-    seen = 0.05 * torch.randn(3, 4, 64, 64) ** 3  # few values are large, some beyond what colours can be
+    seen = 0.05 * torch.randn(3, 4, 64, 64) ** 3  # few values are large, and some are out of the range of colours
     ranges, widest = calibrate(chain, seen), extremes(chain, seen)
     assert ranges["input"] == (-0.5, 0.5) and ranges["concat"][1] >= 0.5
 

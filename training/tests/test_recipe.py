@@ -1,4 +1,4 @@
-"""The recipe's order, what it leaves out when called again, and one run of all its commands."""
+"""Tests the order of the recipe, the steps that it skips when it is called again, and one run of all its commands."""
 
 import json
 import os
@@ -55,7 +55,7 @@ def test_what_is_done_is_not_done_again(tmp_path):
     assert taken[5] == failed
     assert recipe.run(few, call) == 0
     longer = settings(tmp_path, networks=("rgbd-8",), hours=3.0)
-    assert recipe.run(longer, call) == 1  # the training, whose budget is another
+    assert recipe.run(longer, call) == 1  # the training, whose budget has changed
 
 
 def test_a_training_that_was_stopped_goes_on(tmp_path):

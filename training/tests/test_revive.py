@@ -9,7 +9,7 @@ from phasefront_training.stage1 import REVIVAL_STEPS, Stage1
 
 
 def firing(network, x):
-    """Shares of pixels where each unit of each hidden layer fires."""
+    """Returns the fraction of pixels where each unit of each hidden layer fires."""
     seen = []
     hooks = [conv.register_forward_hook(lambda _, __, output: seen.append(output)) for conv in network.convs[:-1]]
     network(x)

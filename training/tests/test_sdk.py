@@ -1,4 +1,4 @@
-"""The SDK makes of exported networks what this package makes of them: the same hologram, pre-filtered and encoded."""
+"""Tests that the SDK and this package make the same holograms with exported networks, pre-filtered and encoded."""
 
 import json
 import os
@@ -27,7 +27,7 @@ OFFSET_MM = 2.0
 
 
 def networks():
-    """A hologram network and a pre-filter that both do more than they begin with."""
+    """Returns a hologram network and a pre-filter that both differ from their initial state."""
     hologram, prefilter = Chain(Architecture(3, 8)), prefilter_network()
     for network, size in ((hologram, 0.02), (prefilter, 0.01)):
         with torch.no_grad():
@@ -70,8 +70,8 @@ def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
     assert json.loads(run.stdout)["scale"] == pytest.approx(float(scale), rel=2e-3)
     levels = np.asarray(Image.open(tmp_path / "out.png")).transpose(2, 0, 1)
     apart = (levels * (2 * np.pi / 256) - phase + np.pi) % (2 * np.pi) - np.pi
-    # Half a level is rounding. Both pad for the offset by different amounts, acos is steep at full light, and int8
-    # engines round some values by a step otherwise.
+    # Rounding is half a level. The two pad for the offset by different amounts, acos is steep at full light, and int8
+    # engines round some values to a neighbouring step.
     step = np.pi / 256
     assert np.median(np.abs(apart)) < step
     assert (np.abs(apart) > 2 * step).mean() < (0.04 if precision == "int8" else 0.01)
@@ -89,5 +89,5 @@ def test_what_is_visible_by_waves_is_the_labs(tmp_path):
     truth = torch.from_numpy(pair["hologram"])
     field = visible_layers(manifest.display, 23)(colour, depth)
     error = (field - truth).abs().square().mean() / truth.abs().square().mean()
-    # What leaves the frame comes back in part, and both pad it by other amounts.
+    # Light that leaves the frame returns in part, and the two pad it by different amounts.
     assert error < 1e-4

@@ -21,8 +21,8 @@ def stored(field):
 
 @pytest.fixture
 def seeds_folder(data_folder, tmp_path):
-    """Seeds made by the command, with a stand-in for the lab: the seed is the truth, on simulated sensor depth half of it; the one
-    refined depth is 0.25 throughout."""
+    """Makes seeds by the command with a substitute for the lab: the seed is the truth, or half of it on simulated
+    sensor depth. The single refined depth is 0.25 everywhere."""
     folder = tmp_path / "seeds"
     main(["seeds", "--data", str(data_folder), "-o", str(folder), "--variants", "3", "--phasefront", "true"])
     for i in range(8):

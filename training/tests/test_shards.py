@@ -9,7 +9,7 @@ from phasefront_training import shards
 from phasefront_training.__main__ import main
 from phasefront_training.data import DataError
 
-# Takes the place of the lab's command: it notes its shard and threads for each pair that is the shard's.
+# Replaces the lab's command: it records its shard and threads for each pair of the shard.
 COMMAND = """#!{python}
 import json, pathlib, sys
 arguments = sys.argv[1:]

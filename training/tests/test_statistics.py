@@ -7,7 +7,7 @@ from phasefront_training.__main__ import main
 
 
 def noise(exponent, size=128):
-    """Grey noise whose power falls with frequency by that exponent."""
+    """Returns grey noise whose power falls with frequency by this exponent."""
     rng = np.random.default_rng(1)
     f = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.fftfreq(size))
     f[0, 0] = 1
