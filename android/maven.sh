@@ -1,7 +1,8 @@
-# Sourced by tests/kotlin and release/linux, which set `cache`: the Kotlin API's documents and its artefact for JVMs, by Maven.
+# Makes the documents of the Kotlin API and its artefact for JVMs by Maven. tests/kotlin and release/linux source this
+# file and set `cache`.
 # shellcheck shell=bash
 
-# What an earlier run of these pom.xml fetched is there; nothing is asked of Maven Central then.
+# Stays offline if an earlier run fetched everything for these pom.xml files.
 fetched="$cache/maven/fetched-$(cat android/pom.xml tests/maven/pom.xml | sha256sum | cut -c 1-16)"
 offline=()
 [ ! -e "$fetched" ] || offline=(--offline -Daether.offline.protocols=file)
@@ -9,15 +10,16 @@ maven() {
     mvn --batch-mode "${offline[@]}" "-Dmaven.repo.local=$cache/maven" --file android/pom.xml "$@"
 }
 
-# generate_kotlin GENERATOR LIBRARY FOLDER: what UniFFI generates for JVMs and for Android, into FOLDER/jvm and FOLDER/android.
+# generate_kotlin GENERATOR LIBRARY FOLDER: generates Kotlin for JVMs and for Android by UniFFI, into FOLDER/jvm and
+# FOLDER/android.
 generate_kotlin() {
     "$1" generate "$2" --language kotlin --no-format --config bindings/generators.toml --out-dir "$3/jvm" &&
         "$1" generate "$2" --language kotlin --no-format --config android/uniffi.toml --out-dir "$3/android" &&
         tests/snippets kotlin "$3/snippets"
 }
 
-# document_kotlin FOLDER: the documents of what was generated there and of the layers by hand, into FOLDER/documents. The links of
-# what is generated are Rust's; they become words.
+# document_kotlin FOLDER: documents the generated code in FOLDER and the hand-written code, into FOLDER/documents.
+# Replaces the Rust links in the generated code by plain words.
 document_kotlin() {
     mkdir -p "$1/documented"
     cp -r "$1/android/." "$1/documented"
@@ -29,12 +31,12 @@ document_kotlin() {
     }
 }
 
-# publish_jvm FOLDER NATIVES: the artefact for JVMs into the Maven repository FOLDER/repository. NATIVES has a folder for each platform,
-# as JNA calls it, with its library.
+# publish_jvm FOLDER NATIVES: publishes the artefact for JVMs into the Maven repository FOLDER/repository. NATIVES has a
+# folder with the library for each platform, named as in JNA.
 publish_jvm() {
     mkdir -p "$1/sources"
     cp -r android/phasefront/src/core/kotlin/. "$1/jvm/." "$1/sources"
-    # Maven deploys nothing while it is offline, not even into a folder.
+    # Offline, Maven deploys nothing, not even into a folder.
     local offline=()
     maven --quiet -Ppublish "-Dsnippets=$1/snippets" "-Dgenerated=$1/jvm" "-Doutput=$1/published" "-Dsources=$1/sources" \
         "-Ddocuments=$1/documents" "-Dnatives=$2" "-DaltDeploymentRepository=made::file://$1/repository" \

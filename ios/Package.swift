@@ -1,15 +1,15 @@
 // swift-tools-version: 6.0
-// For work on Phasefront itself, and for apps that depend on a checkout by path: the library comes from
-// `build-xcframework.sh`. Apps that depend on the git URL take the Package.swift at the root.
+// The package for work on Phasefront and for apps that depend on a checkout by path. `build-xcframework.sh` builds the
+// library. Apps that depend on the git URL use the Package.swift at the root.
 import Foundation
 import PackageDescription
 
 #if os(Linux)
-    // The tests run against the library of a Rust build, in the folder that PHASEFRONT_LIBRARY names.
+    // The tests use the library of a Rust build, in the folder that PHASEFRONT_LIBRARY names.
     let library = ProcessInfo.processInfo.environment["PHASEFRONT_LIBRARY"] ?? "../target/release"
     let ffi = Target.systemLibrary(name: "PhasefrontFFI", path: "Generated")
     let link: [LinkerSetting] = [.unsafeFlags(["-L", library]), .linkedLibrary("phasefront_ffi")]
-    // Of the example app, what needs no framework of Apple's.
+    // The part of the example app that needs no Apple framework.
     let more: [Target] = [
         .target(name: "Benchmark", dependencies: ["PhasefrontCore"], path: "Example.swiftpm/Sources/Benchmark"),
         .testTarget(name: "BenchmarkTests", dependencies: ["Benchmark", "PhasefrontCore"]),

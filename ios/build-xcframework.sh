@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds PhasefrontFFI.xcframework for Package.swift, on a Mac with Xcode and Rust: devices, and the simulator on both
-# processors. With --release it is also zipped, and the checksum for the Package.swift at the root is printed.
+# Builds PhasefrontFFI.xcframework for Package.swift, on a Mac with Xcode and Rust, for devices and for the simulator on
+# both processors. With --release it also zips the framework and prints the checksum for the Package.swift at the root.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,7 +16,7 @@ for target in "${targets[@]}"; do
 done
 library() { echo "${CARGO_TARGET_DIR:-target}/$1/mobile/libphasefront_ffi.a"; }
 
-# Headers in a folder of their own: module maps of several frameworks would meet in one.
+# Puts the headers in a folder of their own, because the module maps of several frameworks would collide in one folder.
 cp ios/Generated/PhasefrontFFI.h ios/Generated/module.modulemap "$build/Headers/PhasefrontFFI/"
 for target in "${targets[@]}"; do strip -S "$(library "$target")"; done
 ios/required-reasons "$(library aarch64-apple-ios)"
@@ -25,7 +25,7 @@ xcodebuild -create-xcframework \
     -library "$(library aarch64-apple-ios)" -headers "$build/Headers" \
     -library "$build/simulator/libphasefront_ffi.a" -headers "$build/Headers" \
     -output ios/PhasefrontFFI.xcframework
-# For who takes the framework without the Swift package, which has the notices as a resource.
+# For users of the framework without the Swift package, which has the notices as a resource.
 cp LICENSE-MIT LICENSE-APACHE THIRD-PARTY.md ios/PhasefrontFFI.xcframework/
 
 if [ "${1:-}" = --release ]; then

@@ -1,5 +1,5 @@
-// The Gradle library: the Kotlin API over what is generated, and libphasefront_ffi.so for two ABIs. Needs cargo,
-// cargo-ndk 4 and NDK r28 or later, whose libraries have pages of 16 KB.
+// The Gradle library: the Kotlin API over the generated code, and libphasefront_ffi.so for two ABIs. Needs cargo,
+// cargo-ndk 4 and NDK r28 or later, which aligns libraries to pages of 16 KB.
 import com.vanniktech.maven.publish.AndroidSingleVariantLibrary
 
 plugins {
@@ -63,9 +63,9 @@ android {
     }
 
     sourceSets["main"].apply {
-        // `core` has no class of Android's: it is tested on a JVM, by pom.xml and tests/kotlin.
+        // `core` uses no Android class, so pom.xml and tests/kotlin test it on a JVM.
         kotlin.srcDirs("src/core/kotlin", generated)
-        // The notices of what the library carries of others.
+        // The third-party notices of the library.
         resources.srcDir("src/core/resources")
         jniLibs.srcDir(libraries)
     }
@@ -80,7 +80,7 @@ tasks.named("preBuild") { dependsOn(generateKotlin) }
 dependencies {
     api(libs.coroutines)
     implementation("${libs.jna.get()}@aar")
-    // Of the generated Kotlin.
+    // For the generated Kotlin.
     compileOnly(libs.annotation)
 }
 

@@ -23,7 +23,7 @@ android {
 
     buildTypes {
         release {
-            // With R8, so that the library's consumer rules are tested with the sample.
+            // Uses R8, so that the sample tests the library's consumer rules.
             isMinifyEnabled = true
             proguardFiles(getDefaultProguardFile("proguard-android-optimize.txt"))
             signingConfig = signingConfigs.getByName("debug")
@@ -31,9 +31,9 @@ android {
     }
 
     sourceSets["main"].apply {
-        // `core` has no class of Android's but org.json: it is tested on a JVM, by pom.xml and tests/kotlin.
+        // `core` uses no Android class except org.json, so pom.xml and tests/kotlin test it on a JVM.
         kotlin.srcDir("src/core/kotlin")
-        // The sample scene is the project's.
+        // The project's sample scene.
         assets.srcDir("../../samples")
     }
 }

@@ -8,8 +8,8 @@
 >>> session.process(phasefront.Frame(colour, metres)).levels.shape
 (3, 48, 64)
 
-Arrays go in and come out through the buffer protocol, without a copy. Every error is a `PhasefrontError`, whose message is
-one line that names what is wrong and what would be right.
+The buffer protocol passes arrays in and out without a copy. Every error is a `PhasefrontError`, whose message is one
+line that names the problem and the remedy.
 """
 
 from ._ffi import (

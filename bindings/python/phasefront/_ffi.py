@@ -1,4 +1,4 @@
-"""What is generated, with its documents, and its fields where it is shown. `_ffi.pyi` has its types."""
+"""The generated module with docstrings, and with fields in its representations. `_ffi.pyi` declares its types."""
 
 import dataclasses as _dataclasses
 
@@ -12,5 +12,5 @@ for _name, _document in _DOCUMENTS.items():
         _described = getattr(_described, _part)
     getattr(_described, "__func__", _described).__doc__ = _document
     if _dataclasses.is_dataclass(_described):
-        # That of a dataclass knows no fields here, for what is generated declares none.
+        # The dataclass representation shows no fields, because the generated code declares none.
         _described.__repr__ = _described.__str__

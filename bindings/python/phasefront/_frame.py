@@ -1,4 +1,4 @@
-"""Frames: arrays of colour and depth, described for the library."""
+"""Frames: arrays of colour and depth with their description for the library."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def _array(what: str, values: ArrayLike) -> _Array:
 
 
 def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _ffi.PlaneInfo, int, int]:
-    """The memory of an image of (H, W) or (H, W, pixel) values, its strides, its width and height."""
+    """Returns the memory, strides, width and height of an image of (H, W) or (H, W, pixel) values."""
     if array.dtype != dtype or array.dtype.byteorder == ">":
         raise PhasefrontError.Frame(f"frame: {what} holds {array.dtype}; {dtype} is needed{_remedy(what, array, dtype)}")
     dimensions = 2 if pixel == 1 else 3
     if array.ndim != dimensions or (pixel > 1 and array.shape[2] != pixel):
         right = "(H, W)" if pixel == 1 else f"(H, W, {pixel})"
         raise PhasefrontError.Frame(f"frame: {what} is {array.shape}; {right} is right")
-    # Row by row, as cameras give it; what is turned or mirrored is copied.
+    # The library reads images row by row, as from cameras. Rotated or mirrored arrays are copied.
     rows, pixels = array.strides[:2]
     value = pixel * array.itemsize
     is_plain = pixels >= value and rows >= (array.shape[1] - 1) * pixels + value
@@ -69,7 +69,7 @@ def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _f
 
 
 def _remedy(what: str, array: _Array, dtype: str) -> str:
-    """What makes bytes of an image's numbers."""
+    """Returns a hint that converts an image's numbers to bytes, or nothing."""
     if dtype == "uint8" and array.dtype.kind == "f":
         return f"; where 1 is the most, (255 * {what}).round().astype(numpy.uint8) makes it so"
     if dtype == "uint8" and array.dtype == "uint16":
@@ -78,7 +78,7 @@ def _remedy(what: str, array: _Array, dtype: str) -> str:
 
 
 def _colour(colour: ArrayLike, colour_format: ColourFormat | None) -> tuple[list[_Array], ColourFormat]:
-    """The planes of a colour image, and their format."""
+    """Returns the planes of a colour image and their format."""
     planar = isinstance(colour, (tuple, list))
     if planar and colour_format is None:
         raise PhasefrontError.Frame("frame: colour comes in planes; say whether it is ColourFormat.NV12 or YUV420")
@@ -96,7 +96,7 @@ def _colour(colour: ArrayLike, colour_format: ColourFormat | None) -> tuple[list
 
 
 def _depth(depth: ArrayLike, depth_format: DepthFormat | None) -> tuple[_Array, DepthFormat]:
-    """A depth image, and its format. Numbers of 64 bits are rounded to 32; what is then infinite is no reading."""
+    """Returns a depth image and its format. Rounds 64-bit numbers to 32 bits; infinite results are no readings."""
     array = _array("depth", depth)
     if array.dtype == "float64":
         with numpy.errstate(over="ignore"):
@@ -112,26 +112,26 @@ def _depth(depth: ArrayLike, depth_format: DepthFormat | None) -> tuple[_Array, 
 
 
 class Frame:
-    """Colour and depth of one moment.
+    """A colour image and a depth image of the same moment.
 
     Args:
-        colour: uint8: (H, W) for grey, (H, W, 3) for RGB, (H, W, 4) for RGBA or BGRA; for NV12 the pair of luma (H, W) and
-            chroma (H/2, W/2, 2), for YUV 420 the three planes; halves are rounded up.
-        depth: (h, w): metres in float32, float16 or float64, millimetres in uint16, or normalized in uint8 (0 nearest, 255
-            farthest), unless `depth_format` says otherwise. What is not finite or not over 0 is no reading, but for
-            normalized depth.
-        timestamp_ns: When it was taken, in nanoseconds of any clock that runs forward. Image sessions do not look at it.
-        colour_format: How colour lies in memory; needed for BGRA and for planes.
-        depth_format: What the depth's numbers mean, where the default is wrong.
-        confidence: How sure the depth is, uint8, (h, w).
-        confidence_format: What its numbers mean.
-        matrix: Between luma, chroma and colour; other formats do not look at it.
-        video_range: Whether luma runs over 16 to 235, not 0 to 255; other formats do not look at it.
-        orientation: How the sensor's picture becomes the one that is shown; upright unless it is said.
-        cameras: How colour and depth camera stand to each other, where they are apart.
+        colour: uint8: (H, W) for grey, (H, W, 3) for RGB, (H, W, 4) for RGBA or BGRA; for NV12 the pair of luma (H, W)
+            and chroma (H/2, W/2, 2), for YUV 420 the three planes. Halves are rounded up.
+        depth: (h, w): metres in float32, float16 or float64, millimetres in uint16, or normalized in uint8 (0 nearest,
+            255 farthest), unless `depth_format` is given. Except in normalized depth, a value that is not finite or not
+            over 0 is no reading.
+        timestamp_ns: The capture time in nanoseconds of any monotonic clock. Image sessions ignore it.
+        colour_format: The memory layout of the colour image. Required for BGRA and for planes.
+        depth_format: The meaning of the depth's numbers, if the default is wrong.
+        confidence: The confidence of the depth, uint8, (h, w).
+        confidence_format: The meaning of the confidence's numbers.
+        matrix: The matrix that converts luma and chroma to colour. RGB formats ignore it.
+        video_range: Whether luma spans 16 to 235 instead of 0 to 255. RGB formats ignore it.
+        orientation: The rotation and mirroring that bring the sensor's image upright. By default it is upright.
+        cameras: The colour camera and the depth camera, if they are apart.
 
-    Arrays are read during the call that takes the frame, where they lie; grey images, depth in float64 and arrays that are
-    turned or mirrored are copied. Raises `PhasefrontError.Frame` for arrays of other types or shapes.
+    A session reads the arrays in place, during the call that takes the frame. Grey images, float64 depth and rotated or
+    mirrored arrays are copied. Raises `PhasefrontError.Frame` for arrays of other types or shapes.
     """
 
     def __init__(

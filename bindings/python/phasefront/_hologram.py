@@ -1,4 +1,4 @@
-"""Results: holograms, what is seen of them, and their files."""
+"""Results: holograms, their displayed images and their files."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Number = TypeVar("Number", numpy.float32, numpy.complex64)
 
 @dataclass(frozen=True)
 class Purpose:
-    """What a session's holograms are made for, and how they are encoded."""
+    """The target and the encoding of a session's holograms."""
 
     target: _ffi.Target
     encoding: Encoding
 
     def told(self, scale: float) -> str:
-        """What travels with a hologram's file, as the command `phasefront` writes it."""
+        """Returns the metadata of a hologram's file in the format of the command `phasefront`."""
         target = self.target
         display = target.display()
         told: dict[str, object] = {"display": _display(display), "encoder": _encoder(self.encoding), "scale": scale}
@@ -39,7 +39,7 @@ class Purpose:
 
 
 def _display(display: Display) -> dict[str, object]:
-    """A display as its TOML form has it."""
+    """Returns a display with the keys of its TOML form."""
     fields = dict(vars(display))
     three = [fields.pop(f"{colour}_nm") for colour in ("red", "green", "blue")]
     laser = fields.pop("laser_nm")
@@ -47,15 +47,15 @@ def _display(display: Display) -> dict[str, object]:
 
 
 def _encoder(encoding: Encoding) -> str:
-    """An encoding's name on the command line."""
+    """Returns the name of an encoding on the command line."""
     names = [("double", Encoding.DOUBLE_PHASE), ("anti-alias", Encoding.ANTI_ALIAS), ("band-limit", Encoding.BAND_LIMIT)]
     return next((name for name, kind in names if isinstance(encoding, kind)), "deep")
 
 
 class Hologram:
-    """The hologram of one frame. Its memory goes back to the session when it and all its arrays are gone."""
+    """The hologram of one frame. The session reuses its memory when the hologram and all its arrays are gone."""
 
-    #: What is known of it.
+    #: The metadata of the hologram.
     info: HologramInfo
 
     def __init__(self, raw: _ffi.RawHologram, purpose: Purpose):
@@ -65,17 +65,19 @@ class Hologram:
 
     @property
     def levels(self) -> NDArray[numpy.uint8]:
-        """The modulator levels in place, uint8, (3, H, W): red, green, blue; (1, H, W) of one laser. Read only."""
+        """The modulator levels in place, uint8, (3, H, W): red, green, blue; (1, H, W) for a single laser. Read
+        only."""
         return array_at(self._raw, self._raw.plane_address(0), self._shape, numpy.uint8)
 
     def z_at(self, x: float, y: float) -> float:
-        """z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, in mm."""
+        """Returns the z in mm of the scene point at (x, y) of the image, each 0 to 1 from the upper left corner."""
         return self._raw.z_at(x, y)
 
     def preview(self, z_mm: float, width: int, height: int) -> NDArray[numpy.uint8]:
-        """What an eye focused at `z_mm` sees: red, green, blue, alpha, uint8, (height, width, 4). Read only.
+        """Returns the displayed image for an eye focused at `z_mm`: red, green, blue, alpha, uint8, (height, width, 4).
+        Read only.
 
-        Raises `PhasefrontError.Setting` for an image that is empty or too large, or a z too far away.
+        Raises `PhasefrontError.Setting` if the image is empty or too large, or if z is too far away.
         """
         if width < 1 or height < 1:
             raise PhasefrontError.Setting(f"a preview of {width}×{height} is empty; each side must be at least 1")
@@ -83,41 +85,40 @@ class Hologram:
         return array_at(image, image.address(), (height, width, 4), numpy.uint8)
 
     def refocus(self, z_mm: float) -> NDArray[numpy.float32]:
-        """What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white, float32,
-        (C, H, W). Read only.
+        """Returns the displayed image of the whole hologram for an eye focused at `z_mm`, as amplitudes; 1 is white,
+        float32, (C, H, W). Read only.
 
-        Raises `PhasefrontError.Setting` for a z too far away.
+        Raises `PhasefrontError.Setting` if z is too far away.
         """
         return self._numbers(self._raw.refocus(z_mm), numpy.float32)
 
     def field(self, z_mm: float = 0.0) -> NDArray[numpy.complex64]:
-        """The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, complex64, (C, H, W),
-        without the carrier exp(i2πz/λ). Read only.
+        """Returns the complex field of the levels behind the aperture at `z_mm` (0 is the midpoint), complex64,
+        (C, H, W), without the carrier exp(i2πz/λ). Read only.
 
-        Raises `PhasefrontError.Setting` for a z too far away.
+        Raises `PhasefrontError.Setting` if z is too far away.
         """
         return self._numbers(self._raw.field(z_mm), numpy.complex64)
 
     def _numbers(self, planes: _ffi.RawPlanes, kind: type[Number]) -> NDArray[Number]:
-        """Planes as an array of their kind of numbers."""
+        """Returns planes as an array of this type."""
         return array_at(planes, planes.plane_address(0), self._shape, kind)
 
     def output(self, placement: Placement | None = None, image: int = 0) -> NDArray[numpy.uint8]:
-        """Image `image` of those that the modulator's driver takes, of the modulator's resolution, levels as they are;
-        uint8, (H, W, bytes of a pixel). All layouts but grey have one; RGB is the default. Read only.
+        """Returns image `image` of the images for the modulator's driver, at the modulator's resolution, with unchanged
+        levels, uint8, (H, W, bytes per pixel). All layouts except grey have one image. RGB is the default. Read only.
 
-        Raises `PhasefrontError.Setting` for an image that the layout has not.
+        Raises `PhasefrontError.Setting` if the layout has no such image.
         """
         output = self._raw.output(placement or Placement(layout=Layout.RGB), image)
         return array_at(output, output.address(), (output.height(), output.width(), output.pixel_bytes()), numpy.uint8)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the levels as a PNG that carries what they are for, as the command `phasefront hologram` does:
-        `phasefront refocus` and `phasefront view` take it. A hologram for a calibration's file needs that display's
-        `--display` there.
+        """Writes the levels and their metadata as a PNG, like the command `phasefront hologram`. `phasefront refocus`
+        and `phasefront view` read it. If the target is a calibration file, these commands need its `--display`.
 
-        Raises `PhasefrontError.File` for a file that cannot be written, or whose name does not end in .png, and
-        `PhasefrontError.Setting` for a display of over 8 bits, whose levels a byte does not hold.
+        Raises `PhasefrontError.File` if the file cannot be written or its name does not end in .png, and
+        `PhasefrontError.Setting` if the display has more than 8 bits, because a byte cannot hold its levels.
         """
         file = Path(path)
         if file.suffix.lower() != ".png":

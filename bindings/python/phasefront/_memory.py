@@ -1,4 +1,4 @@
-"""Memory of arrays, handed to the library where it lies."""
+"""The memory of arrays, passed to the library in place."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .ffi import phasefront_ffi as _generated
 
 Kind = TypeVar("Kind", bound=numpy.generic)
 
-#: What is generated counts bytes in 32 bits.
+#: The largest size in bytes. The generated code counts bytes in 32 bits.
 MOST_BYTES = 2**31 - 1
 
 
@@ -28,7 +28,7 @@ class Memory:
 
 
 class _ByRefBytes:
-    """What is generated takes `bytes` alone for a `&[u8]`; this takes any memory."""
+    """A converter that accepts any memory for a `&[u8]`. The generated converter accepts only `bytes`."""
 
     @staticmethod
     def check_lower(value: object) -> None:
@@ -53,7 +53,7 @@ _generated._UniffiFfiConverterByRefBytes = _ByRefBytes
 
 
 def array_at(owner: object, address: int, shape: tuple[int, ...], kind: type[Kind]) -> numpy.typing.NDArray[Kind]:
-    """The library's memory as an array that keeps its owner alive, read only."""
+    """Returns the library's memory as a read-only array that keeps its owner alive."""
     memory: Any = (ctypes.c_uint8 * (numpy.dtype(kind).itemsize * int(numpy.prod(shape)))).from_address(address)
     memory.owner = owner
     array = numpy.frombuffer(memory, kind).reshape(shape)

@@ -1,4 +1,4 @@
-"""PNG files of 8-bit RGB or grey with a text in them. By hand, so that NumPy stays all that is needed."""
+"""PNG files of 8-bit RGB or grey with a text. Written without a library, so that NumPy is the only dependency."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def write(path: Path, image: NDArray[numpy.uint8], keyword: str, text: str) -> None:
-    """Writes `image`, (H, W, 3) or (H, W, 1), with `text` under `keyword`, both Latin-1. The file is there whole or not at all."""
+    """Writes `image`, (H, W, 3) or (H, W, 1), with `text` under `keyword`, both Latin-1. The write is atomic."""
     height, width, colours = image.shape
-    rows = numpy.zeros((height, 1 + colours * width), numpy.uint8)  # each begins with its filter: none
+    rows = numpy.zeros((height, 1 + colours * width), numpy.uint8)  # each row begins with its filter type: 0, none
     rows[:, 1:] = image.reshape(height, -1)
     chunks = [
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2 if colours == 3 else 0, 0, 0, 0)),

@@ -1,4 +1,4 @@
-"""Sessions: frames in, holograms out."""
+"""Sessions, which turn frames into holograms."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Dropped:
     """A frame was dropped.
 
     Fields:
-        timestamp_ns: The frame's.
-        reason: Why.
+        timestamp_ns: The timestamp of the frame.
+        reason: The reason.
     """
 
     timestamp_ns: int
@@ -59,11 +59,11 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Failed:
-    """A frame could not be processed. The session goes on.
+    """A frame could not be processed. The session continues.
 
     Fields:
-        timestamp_ns: The frame's.
-        message: What is wrong and what would be right, in one line.
+        timestamp_ns: The timestamp of the frame.
+        message: One line that names the problem and the remedy.
     """
 
     timestamp_ns: int
@@ -72,18 +72,18 @@ class Failed:
 
 @dataclass(frozen=True)
 class QualityChanged:
-    """The frames after this one are made at another quality level.
+    """The session processes the frames after this one at another quality level.
 
     Fields:
-        timestamp_ns: The frame's.
-        change: From which quality level to which, and why.
+        timestamp_ns: The timestamp of the frame.
+        change: The old and the new quality level, and the reason.
     """
 
     timestamp_ns: int
     change: QualityChange
 
 
-#: What a live stream tells its listener.
+#: An event of a live stream.
 Event: TypeAlias = Processed | Dropped | Failed | QualityChanged
 
 
@@ -104,11 +104,11 @@ class _Listener(_ffi.SessionListener):
         self._tell(QualityChanged(timestamp_ns, change))
 
     def on_closed(self) -> None:
-        """Nothing waits for it: Python keeps the listener as long as it is needed."""
+        """Does nothing: Python keeps the listener as long as it is needed."""
 
 
 class Changes(TypedDict, total=False):
-    """Fields of `SessionOptions`, any of them."""
+    """Any fields of `SessionOptions`."""
 
     quality_levels: list[QualityLevel]
     quality: Quality
@@ -128,15 +128,15 @@ class Changes(TypedDict, total=False):
 def session_options(
     method: Network | Method | None = None, target: Display | _ffi.Target | None = None, **changes: Unpack[Changes]
 ) -> SessionOptions:
-    """The default options for `target`, with changes.
+    """Returns the default options for `target`, with changes.
 
     Args:
-        method: A network or another method; without one the network that is built in, and the plane sweep where that was
-            not trained for the display.
-        target: A display, or a calibrated one; without it the default display of 1920×1080. Holograms have its resolution.
-        changes: Fields of `SessionOptions`, which says what each does.
+        method: A network or another method. By default the built-in network, or the plane sweep if that network was not
+            trained for the display.
+        target: A display or a calibrated target. By default the display of 1920×1080. Holograms have its resolution.
+        changes: Fields of `SessionOptions`, which documents each of them.
 
-    Raises `PhasefrontError.Display` for a display that cannot be.
+    Raises `PhasefrontError.Display` for an impossible display.
     """
     if not isinstance(target, _ffi.Target):
         target = Target.of_display(Display() if target is None else target)
@@ -147,15 +147,18 @@ def session_options(
 
 
 class Session:
-    """Frames in, holograms out. Every call may come from any thread, at any moment.
+    """A session that turns frames into holograms. Every method may be called from any thread at any time.
 
     Args:
-        options: What to make, and how: `session_options` gives the defaults.
-        mode: Image and video sessions answer `process`. A live stream takes `submit` and never waits.
-        listener: For a live stream alone: hears `Processed`, `Dropped`, `Failed` and `QualityChanged` on the session's
-            own thread; no frame is processed while it is busy. What it raises is counted in the statistics.
+        options: The options. `session_options` returns the defaults.
+        mode: The running mode. Image and video sessions accept `process`. A live stream accepts `submit` and never
+            waits.
+        listener: A listener for a live stream. The session calls it with `Processed`, `Dropped`, `Failed` and
+            `QualityChanged` on its own thread and processes no frame during a call. The statistics count its
+            exceptions.
 
-    As a context it is closed at its end. Raises `PhasefrontError` for options that cannot be meant or planned for.
+    As a context manager, it closes the session at the end. Raises `PhasefrontError` if the options are invalid or
+    cannot be planned for.
     """
 
     def __init__(
@@ -166,60 +169,61 @@ class Session:
     ):
         self._purpose = Purpose(options.target, options.encoding)
         self._raw = _ffi.RawSession(options, mode, None if listener is None else _Listener(listener, self._purpose))
-        # Also when Python exits: later the session's thread could not call it any more, which aborts the process.
+        # Also closes it when Python exits. A later call from the session's thread would abort the process.
         weakref.finalize(self, self._raw.shut_down)
 
     def process(self, frame: Frame) -> Hologram:
-        """The hologram of `frame`, in an image or a video session. Waits for it; other Python threads run meanwhile.
+        """Returns the hologram of `frame`, in an image or a video session. Blocks until it is done; other Python
+        threads run meanwhile.
 
-        Raises `PhasefrontError.Frame` for a frame that is not usable, `.Timestamp` for one that is not later than the last
-        of a video, `.Session` where the session is live, paused or closed. None of them harms the frames that follow.
+        Raises `PhasefrontError.Frame` if the frame is unusable, `.Timestamp` if it is not later than the previous frame
+        of a video, and `.Session` if the session is live, paused or closed. Later frames are not affected.
         """
         return Hologram(self._raw.process(*frame._arguments()), self._purpose)
 
     def submit(self, frame: Frame) -> DropReason | None:
-        """Hands `frame` to a live stream, which copies it and goes on by itself. Gives why it was dropped, if it was at
-        once; the listener hears of it too.
+        """Submits `frame` to a live stream, which copies it. Never waits for a frame. Returns the reason if the frame
+        was dropped at once; the listener receives that event too.
 
-        Raises as `process` does.
+        Raises the same errors as `process`.
         """
         return self._raw.submit(*frame._arguments())
 
     def warm_up(self) -> None:
-        """Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it."""
+        """Processes an empty frame, so that the first real frame is as fast as the later ones. Blocks until it is
+        done."""
         self._raw.warm_up()
 
     def reset(self) -> None:
-        """Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again."""
+        """Discards all earlier frames, including one in progress. The next frame may have any timestamp."""
         self._raw.reset()
 
     def pause(self) -> None:
-        """Takes no frames until `resume`."""
+        """Stops accepting frames until `resume`."""
         self._raw.pause()
 
     def resume(self) -> None:
-        """Takes frames again."""
+        """Accepts frames again."""
         self._raw.resume()
 
     def set_thermal(self, thermal: Thermal) -> None:
-        """Says how hot the device is. A session with several quality levels steps down where it is hot."""
+        """Reports how hot the device is. A session with several quality levels lowers its level on a hot device."""
         self._raw.set_thermal(thermal)
 
     def set_quality(self, quality: Quality) -> None:
-        """Allows or forbids changes of the quality level.
+        """Sets whether the session may change its quality level.
 
-        Raises `PhasefrontError.Setting` for one that the session does not have.
+        Raises `PhasefrontError.Setting` for a level that the session does not have.
         """
         self._raw.set_quality(quality)
 
     def statistics(self) -> Statistics:
-        """What the session has done so far; of a closed one, what it did. Never waits for a frame."""
+        """Returns the session's statistics, also after it is closed. Never blocks on a frame."""
         return self._raw.statistics()
 
     def close(self) -> None:
-        """Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, the
-        listener has heard everything; called by a listener, of this session or another, it does not wait for that. Closing
-        twice does nothing."""
+        """Stops accepting frames and frees the memory. Returned holograms stay valid. Waits until the listener has
+        received all events, unless a listener of this or another session calls it. Closing twice does nothing."""
         self._raw.shut_down()
 
     def __enter__(self) -> Session:
@@ -240,7 +244,8 @@ class _LogHandler(_ffi.LogListener):
 
 
 def send_log(level: LogLevel, handler: Callable[[LogLevel, str], object] | None) -> None:
-    """Sends the library's messages of `level` and above to `handler`, which is called on any thread; None for silence."""
+    """Sends the library's messages of `level` and above to `handler`, which may be called on any thread. None turns
+    them off."""
     _ffi.set_log_listener(level, None if handler is None else _LogHandler(handler))
 
 
@@ -256,6 +261,6 @@ class _StageHandler(_ffi.StageListener):
 
 
 def send_stages(handler: Callable[[Stage, bool], object] | None) -> None:
-    """Calls `handler` with each stage of a frame that begins (True) or ends (False), on the thread that computes it, where
-    stages lie within one another; None for silence. It must not call the library."""
+    """Calls `handler` with each stage of a frame that begins (True) or ends (False), on the thread that computes it.
+    Stages on a thread are nested. None turns the calls off. The handler must not call the library."""
     _ffi.set_stage_listener(None if handler is None else _StageHandler(handler))

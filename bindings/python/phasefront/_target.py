@@ -1,4 +1,4 @@
-"""What holograms are made for."""
+"""The target that holograms are made for."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ class Target(_ffi.Target):
 
     #: The table of `with_look_up_table`.
     _table: bytes | None = None
-    #: Whether there is more to it than what a hologram's file says.
+    #: Whether the target holds more than the metadata of a hologram's file.
     _calibrated = True
 
     @classmethod
     def of_display(cls, display: _ffi.Display) -> Target:
-        """A display with levels in equal steps of phase, as many as its bits have.
+        """Creates a target whose levels are equal steps of phase, as many as the display's bits allow.
 
-        Errors: A display that cannot be.
+        Errors: An impossible display.
         """
         target = super().of_display(display)
         assert isinstance(target, cls)
@@ -26,9 +26,9 @@ class Target(_ffi.Target):
 
     @classmethod
     def with_look_up_table(cls, display: _ffi.Display, levels: bytes) -> Target:
-        """A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+        """Creates a target whose modulator was calibrated as a whole: the i-th of 256 levels has the phase 2πi/256.
 
-        Errors: A display that cannot be, or another number of levels.
+        Errors: An impossible display, or another number of levels.
         """
         target = super().with_look_up_table(display, levels)
         assert isinstance(target, cls)

@@ -33,7 +33,7 @@ def suite():
 
 
 def still(timestamp_ns=0, metres=0.5):
-    """A small frame with something in it."""
+    """Returns a small frame that is not uniform."""
     y, x = numpy.mgrid[0:48, 0:64]
     colour = numpy.stack([x * 4, y * 5, 255 - x * 3], axis=2).astype(numpy.uint8)
     depth = numpy.full((24, 32), metres, numpy.float32)

@@ -1,5 +1,5 @@
-"""Measures what the way to the library and back costs: a camera frame in, three planes of 1080p out. `tests/border`
-runs it for many frames."""
+"""Measures the cost of a call to the library: a camera frame in, three planes of 1080p out. `tests/border` runs it for
+many frames."""
 
 import os
 import statistics

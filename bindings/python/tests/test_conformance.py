@@ -1,4 +1,4 @@
-"""The conformance suite, run from Python: the levels must be those of the suite, and Rust's to the bit."""
+"""Runs the conformance suite from Python: the levels must match the suite, and match Rust bit for bit."""
 
 import os
 import pathlib
@@ -48,7 +48,7 @@ ENCODING = {
 
 
 def view(memory, plane, width, height, dtype, values=1):
-    """A plane of the suite as an array in place, with its gaps."""
+    """Returns a plane of the suite as an array in place, with its gaps."""
     dtype = numpy.dtype(dtype)
     shape, strides = (height, width), (plane["row_stride"], plane["pixel_stride"])
     if values > 1:
@@ -95,7 +95,7 @@ def target_of(case):
 
 
 def made_of(case, memory, network):
-    """The levels of a case's frames, and what is seen of them."""
+    """Returns the levels of a case's frames and their displayed images."""
     encoding = case["encoding"]
     changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.DEEP(prefilter=model(encoding))}
     if case["brightness"] is not None:

@@ -1,4 +1,4 @@
-"""Everything that is public is told of: classes, functions, fields, options, types."""
+"""Tests that everything public is documented: classes, functions, fields, options and types."""
 
 import importlib.resources
 import inspect
@@ -14,7 +14,7 @@ CLASSES = {name: thing for name, thing in PUBLIC.items() if inspect.isclass(thin
 
 
 def kinds(thing):
-    """A class's own classes: of an error, or of values that have fields."""
+    """Returns the nested classes of a class: those of an error, or of values with fields."""
     return [inner for name, inner in vars(thing).items() if name[0].isupper() and inspect.isclass(inner)]
 
 

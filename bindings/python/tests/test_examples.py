@@ -1,4 +1,4 @@
-"""The examples run on the sample scene, and the command reads what they write."""
+"""Tests that the examples run on the sample scene and that the command reads their files."""
 
 import os
 import pathlib
@@ -15,7 +15,7 @@ COMMAND = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "release"
 @pytest.mark.parametrize(("example", "size"), [("still.py", (1920, 1080)), ("live.py", (640, 360))])
 def test_an_example_makes_a_hologram_that_the_command_reads(example, size, tmp_path):
     sample = [ROOT / "samples" / name for name in ("scene_rgb.jpg", "scene_depth.png")]
-    # Not in this folder, where the package lies without what is generated.
+    # Runs in another folder, because the package in this folder lacks the generated module.
     for run in (
         [sys.executable, "-P", ROOT / "examples" / example, *sample, "hologram.png"],
         [COMMAND.absolute(), "refocus", "hologram.png", "--z-mm", "2", "-o", "view.png"],

@@ -1,4 +1,4 @@
-"""Holograms as files: what the command reads again."""
+"""Tests holograms as files, which the command reads."""
 
 import json
 import os
@@ -19,7 +19,7 @@ COMMAND = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "release"
 
 
 def chunks(path):
-    """The chunks of a PNG by their kind."""
+    """Returns the chunks of a PNG by kind."""
     data, found, at = path.read_bytes(), {}, 8
     while at < len(data):
         length, kind = struct.unpack(">I4s", data[at : at + 8])
@@ -61,7 +61,7 @@ def test_a_table_travels_and_a_calibration_is_named(display, tmp_path):
     saved(str(tmp_path / "table.png"), target=Target.with_look_up_table(display, table), encoding=Encoding.DOUBLE_PHASE())
     info = told(tmp_path / "table.png")
     assert bytes(info["lut"]) == table and info["encoder"] == "double" and "calibrated" not in info
-    # As one of a calibration's file.
+    # Like the target of a calibration file.
     calibrated = Target.of_display(display)
     del calibrated._calibrated
     saved(tmp_path / "calibrated.png", target=calibrated)

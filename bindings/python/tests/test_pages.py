@@ -1,4 +1,4 @@
-"""What the pages print runs, and holds to its types."""
+"""Tests that the code in the pages runs and type-checks."""
 
 import os
 import pathlib
@@ -70,7 +70,7 @@ def test_a_type_checker_follows_the_pages(tmp_path):
         (tmp_path / f"snippet_{i}.py").write_text(code)
     wrong = "import phasefront\nphasefront.session_options(dark_threshold='much', no_option=1)\nphasefront.Display(width='1')\n"
     (tmp_path / "wrong.py").write_text(wrong)
-    # Not in this folder, where the package lies without what is generated.
+    # Runs in another folder, because the package in this folder lacks the generated module.
     mypy = [sys.executable, "-P", "-m", "mypy", "--strict", "."]
     told = subprocess.run(mypy, cwd=tmp_path, capture_output=True, text=True)
     found = [line for line in told.stdout.splitlines() if ": error:" in line]

@@ -1,4 +1,4 @@
-"""Sessions from Python: threads, live streams, misuse, memory."""
+"""Tests sessions from Python: threads, live streams, misuse and memory."""
 
 import gc
 import os
@@ -94,7 +94,8 @@ def test_a_preview_shows_the_picture_and_a_tap_gives_z(options):
 
 
 def seen_by_equation(hologram, display, z_mm):
-    """Eq. 2 and Eq. 8 in NumPy: the levels' light, cut by a round aperture, taken to z, without the carrier."""
+    """Computes Eq. 2 and Eq. 8 in NumPy: the levels' light through a round aperture, propagated to z, without the
+    carrier."""
     height, width = hologram.levels.shape[1:]
     light = hologram.info.scale * numpy.exp(2j * numpy.pi * hologram.levels / 2**display.bits)
     fy, fx = numpy.meshgrid(numpy.fft.fftfreq(4 * height), numpy.fft.fftfreq(4 * width), indexing="ij")
@@ -114,7 +115,7 @@ def test_a_whole_view_is_what_the_equations_say(offset_mm):
     for z_mm in (0.0, 1.5):
         field, wanted = hologram.field(z_mm), seen_by_equation(hologram, display, z_mm)
         assert field.dtype == numpy.complex64 and field.shape == (3, 90, 120) and not field.flags.writeable
-        # They differ in how far they pad, which the light at the border sees.
+        # They pad by different amounts, which changes the light at the border.
         inner = (slice(None), slice(12, -12), slice(12, -12))
         error = numpy.linalg.norm((field - wanted)[inner]) / numpy.linalg.norm(wanted[inner])
         assert error < 0.02
@@ -148,7 +149,7 @@ def test_a_live_stream_answers_every_frame_on_its_own_thread(options):
     with Session(options, RunningMode.LIVE, events) as session:
         for i in range(50):
             session.submit(still(timestamp_ns=1000 + i))
-        events.wait(50)  # closing would drop what still waits, on a busy machine all of it
+        events.wait(50)  # closing would drop waiting frames, on a busy machine all of them
     made = [e.hologram.info.timestamp_ns for e in events.all if isinstance(e, Processed)]
     dropped = [e.timestamp_ns for e in events.all if isinstance(e, Dropped)]
     assert sorted(made + dropped) == list(range(1000, 1050))
@@ -194,7 +195,7 @@ session = phasefront.Session(options, phasefront.RunningMode.LIVE, print)
 
 
 def test_a_live_stream_that_is_left_open_ends_with_python():
-    """Its thread calls Python as it ends, which aborts a process whose interpreter is gone."""
+    """The session's thread calls Python when it ends, which aborts a process without an interpreter."""
     run = subprocess.run([sys.executable, "-P", "-c", LEFT_OPEN], capture_output=True, text=True, timeout=60)
     assert (run.returncode, run.stderr) == (0, "")
 
@@ -302,7 +303,7 @@ def test_grey_and_float64_are_taken(options):
         expected = session.process(Frame(numpy.stack(3 * [grey], axis=2), metres.astype(numpy.float32))).levels
         for colour, depth in [(grey, metres), (grey[:, :], numpy.asfortranarray(metres))]:
             numpy.testing.assert_array_equal(session.process(Frame(colour, depth)).levels, expected)
-        # What 32 bits do not hold is no reading.
+        # A value that overflows 32 bits is no reading.
         metres[0, 0], infinite = 1e300, metres.astype(numpy.float32, copy=True)
         infinite[0, 0] = numpy.inf
         far, none = (session.process(Frame(grey, depth)).levels.tobytes() for depth in (metres, infinite))
@@ -310,7 +311,7 @@ def test_grey_and_float64_are_taken(options):
 
 
 def test_arrays_of_two_gibibytes_are_refused():
-    """Views of little memory: no more is looked at."""
+    """The library reads no memory beyond a view of a small array."""
     small = numpy.zeros((48, 64, 3), "u1")
     side = 2**31 // 64 + 1
     wide = numpy.lib.stride_tricks.as_strided(numpy.ones(1, "f4"), (16, side), (4 * side, 4))
@@ -331,7 +332,7 @@ def test_in_a_fork_what_is_the_parents_is_refused_and_what_is_new_works(options)
         hologram.preview(0.0, 8, 8)
         child = os.fork()
         if child == 0:
-            signal.alarm(60)  # one that hangs is a failure
+            signal.alarm(60)  # a test that hangs must fail
             result = 1
             try:
                 calls = [lambda: session.process(still()), session.warm_up, lambda: live.submit(still())]
@@ -467,7 +468,7 @@ def test_targets_that_cannot_be_are_named(display, tmp_path):
 def test_a_target_is_taken_as_its_display_is(display):
     options = session_options(target=Target.with_look_up_table(display, bytes(range(256))))
     assert options.target.display() == display
-    # The table is that of equal steps.
+    # This table has equal steps.
     with Session(options) as by_table, Session(session_options(target=display)) as linear:
         numpy.testing.assert_array_equal(by_table.process(still()).levels, linear.process(still()).levels)
 
@@ -543,7 +544,7 @@ def test_a_log_handler_may_use_the_library_as_it_ends(options):
         phasefront.send_log(LogLevel.INFO, lambda level, message: messages.append(message))
         gc.collect()
 
-    # A second thread, so that a deadlock is a failure and not a test without end.
+    # A second thread, so that a deadlock makes the test fail instead of hang.
     thread = threading.Thread(target=replace, daemon=True)
     thread.start()
     thread.join(60)
@@ -566,7 +567,7 @@ def test_memory_of_ten_thousand_frames_is_flat(network, display):
                 gc.collect()
                 before = resident_mb()
         gc.collect()
-        # Each frame's results are 15 KB: kept, they would be 138 MB.
+        # The results of each frame take 15 KB. All of them would take 138 MB.
         assert resident_mb() - before < 16
         assert levels.shape == (3, 48, 64)
 

@@ -4,33 +4,33 @@ using System.Text;
 
 namespace Phasefront
 {
-    /// <summary>Whether a call did what it says, and else why not.</summary>
+    /// <summary>The result of a call: success or the kind of error.</summary>
     public enum Status : uint
     {
-        /// <summary>It did.</summary>
+        /// <summary>The call succeeded.</summary>
         Ok = 0,
         /// <summary>A display whose physics is impossible or out of range.</summary>
         Display = 1,
         /// <summary>A frame, plane or image of the wrong shape or with unusable values.</summary>
         Frame = 2,
-        /// <summary>A frame that is not later than the last one.</summary>
+        /// <summary>A frame that is not later than the previous frame.</summary>
         Timestamp = 3,
-        /// <summary>A setting or an argument that cannot be meant or planned for.</summary>
+        /// <summary>A setting or an argument that is invalid or cannot be planned for.</summary>
         Setting = 4,
-        /// <summary>What is not a hologram network, or one for another display.</summary>
+        /// <summary>Data that is not a hologram network, or a network for another display.</summary>
         Network = 5,
         /// <summary>A file that cannot be read.</summary>
         File = 6,
         /// <summary>A call that a session cannot answer in its mode or state.</summary>
         Session = 7,
-        /// <summary>A fault of Phasefront; please report it.</summary>
+        /// <summary>A bug in Phasefront. Please report it.</summary>
         Internal = 8,
     }
 
-    /// <summary>Why Phasefront refused to go on: one line that names what is wrong and what would be right.</summary>
+    /// <summary>An error of Phasefront. Its message is one line that names the problem and the remedy.</summary>
     public sealed class PhasefrontException : Exception
     {
-        /// <summary>What kind of fault it is.</summary>
+        /// <summary>The kind of error.</summary>
         public Status Status { get; }
 
         internal PhasefrontException(Status status, string message) : base(message) { Status = status; }
@@ -41,7 +41,7 @@ namespace Phasefront
         }
     }
 
-    // Text of C is UTF-8 with a zero behind it.
+    // C strings are UTF-8 and end with a zero.
     internal static class Text
     {
         public static byte[] Write(string text)
@@ -65,7 +65,7 @@ namespace Phasefront
     /// <summary>The library.</summary>
     public static class Library
     {
-        /// <summary>Its version, as "0.1.0".</summary>
+        /// <summary>The version of the library, for example "0.1.0".</summary>
         public static string Version => Text.Read(Native.pf_version());
     }
 }

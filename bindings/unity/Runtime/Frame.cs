@@ -4,7 +4,7 @@ using System.Runtime.InteropServices;
 
 namespace Phasefront
 {
-    /// <summary>How a colour image lies in memory.</summary>
+    /// <summary>The memory layout of a colour image.</summary>
     public enum ColourFormat : uint
     {
         /// <summary>One plane; bytes red, green, blue, alpha.</summary>
@@ -13,13 +13,13 @@ namespace Phasefront
         Bgra = 1,
         /// <summary>One plane; bytes red, green, blue.</summary>
         Rgb = 2,
-        /// <summary>Two planes: luma; and at half the resolution blue and red chroma side by side.</summary>
+        /// <summary>Two planes: luma, and interleaved blue and red chroma at half the resolution.</summary>
         Nv12 = 3,
-        /// <summary>Three planes: luma, and at half the resolution blue chroma and red chroma.</summary>
+        /// <summary>Three planes: luma, and blue chroma and red chroma at half the resolution.</summary>
         Yuv420 = 4,
     }
 
-    /// <summary>The matrix between luma, chroma and colour.</summary>
+    /// <summary>The matrix that converts luma and chroma to colour.</summary>
     public enum YuvMatrix : uint
     {
         /// <summary>Standard definition, JPEG, most Android cameras.</summary>
@@ -28,7 +28,8 @@ namespace Phasefront
         Bt709 = 1,
     }
 
-    /// <summary>How a depth image lies in memory. But for the normalized ones, 0, negative and not finite mean no reading.</summary>
+    /// <summary>The memory layout of a depth image. Except in normalized formats, a value that is not finite or not
+    /// over 0 means no reading.</summary>
     public enum DepthFormat : uint
     {
         /// <summary>Metres, 32-bit floats.</summary>
@@ -49,7 +50,7 @@ namespace Phasefront
         NormalizedU16 = 7,
     }
 
-    /// <summary>How a confidence map lies in memory.</summary>
+    /// <summary>The memory layout of a confidence map.</summary>
     public enum ConfidenceFormat : uint
     {
         /// <summary>0 low, 1 medium, 2 high.</summary>
@@ -58,20 +59,20 @@ namespace Phasefront
         U8 = 1,
     }
 
-    /// <summary>How far a sensor's picture must be turned clockwise to stand upright.</summary>
+    /// <summary>The clockwise rotation that brings a sensor's image upright.</summary>
     public enum Rotation : uint
     {
-        /// <summary>Not at all.</summary>
+        /// <summary>No rotation.</summary>
         Upright = 0,
-        /// <summary>A quarter turn.</summary>
+        /// <summary>A quarter turn clockwise.</summary>
         Clockwise90 = 1,
         /// <summary>Half a turn.</summary>
         Half = 2,
-        /// <summary>Three quarters.</summary>
+        /// <summary>Three quarter turns clockwise.</summary>
         Clockwise270 = 3,
     }
 
-    /// <summary>One plane of an image: bytes of an array, or of native memory that lives as long as the call.</summary>
+    /// <summary>One plane of an image, in an array or in native memory that stays valid during the call.</summary>
     public struct Plane
     {
         internal readonly byte[] Bytes;
@@ -81,7 +82,7 @@ namespace Phasefront
         internal readonly int RowStride;
         internal readonly int PixelStride;
 
-        /// <summary>A plane in an array, from <paramref name="offset"/> to its end.</summary>
+        /// <summary>Creates a plane in an array, from <paramref name="offset"/> to its end.</summary>
         public Plane(byte[] bytes, int rowStride, int pixelStride, int offset = 0)
         {
             if (bytes == null) throw new ArgumentNullException(nameof(bytes));
@@ -90,7 +91,7 @@ namespace Phasefront
                 (bytes, offset, IntPtr.Zero, bytes.Length - offset, rowStride, pixelStride);
         }
 
-        /// <summary>A plane in native memory, as of a NativeArray or a camera's image.</summary>
+        /// <summary>Creates a plane in native memory, for example of a NativeArray or a camera image.</summary>
         public Plane(IntPtr data, long length, int rowStride, int pixelStride)
         {
             (Bytes, Offset, Data, Length, RowStride, PixelStride) = (null, 0, data, length, rowStride, pixelStride);
@@ -118,63 +119,63 @@ namespace Phasefront
     /// <summary>A colour image.</summary>
     public struct Colour
     {
-        /// <summary>How it lies in memory.</summary>
+        /// <summary>The memory layout.</summary>
         public ColourFormat Format;
-        /// <summary>Pixels along x, as the sensor gives them.</summary>
+        /// <summary>The width in pixels, in the sensor's orientation.</summary>
         public int Width;
-        /// <summary>Pixels along y.</summary>
+        /// <summary>The height in pixels.</summary>
         public int Height;
-        /// <summary>Only formats of luma and chroma look at it.</summary>
+        /// <summary>The matrix of luma and chroma. RGB formats ignore it.</summary>
         public YuvMatrix Matrix;
-        /// <summary>Whether luma runs over 16 to 235 and chroma over 16 to 240; the same.</summary>
+        /// <summary>Whether luma spans 16 to 235 and chroma 16 to 240. RGB formats ignore it.</summary>
         public bool VideoRange;
-        /// <summary>Its planes, in the format's order.</summary>
+        /// <summary>The planes, in the order of the format.</summary>
         public Plane[] Planes;
     }
 
     /// <summary>A depth image.</summary>
     public struct Depth
     {
-        /// <summary>How it lies in memory.</summary>
+        /// <summary>The memory layout.</summary>
         public DepthFormat Format;
-        /// <summary>Pixels along x, as the sensor gives them.</summary>
+        /// <summary>The width in pixels, in the sensor's orientation.</summary>
         public int Width;
-        /// <summary>Pixels along y.</summary>
+        /// <summary>The height in pixels.</summary>
         public int Height;
-        /// <summary>Its plane.</summary>
+        /// <summary>The plane.</summary>
         public Plane Plane;
     }
 
     /// <summary>The confidence map of a depth image.</summary>
     public struct Confidence
     {
-        /// <summary>How it lies in memory.</summary>
+        /// <summary>The memory layout.</summary>
         public ConfidenceFormat Format;
-        /// <summary>Pixels along x: as many as the depth has.</summary>
+        /// <summary>The width in pixels, equal to that of the depth image.</summary>
         public int Width;
-        /// <summary>Pixels along y: as many as the depth has.</summary>
+        /// <summary>The height in pixels, equal to that of the depth image.</summary>
         public int Height;
-        /// <summary>Its plane.</summary>
+        /// <summary>The plane.</summary>
         public Plane Plane;
     }
 
-    /// <summary>A frame: colour, depth, and how they belong together.</summary>
+    /// <summary>A frame: a colour image, a depth image and their orientation.</summary>
     public sealed class Frame
     {
-        /// <summary>When it was taken, in nanoseconds of any clock that runs forward.</summary>
+        /// <summary>The capture time in nanoseconds of any monotonic clock.</summary>
         public ulong TimestampNs;
         /// <summary>The colour image.</summary>
         public Colour Colour;
         /// <summary>The depth image.</summary>
         public Depth Depth;
-        /// <summary>The confidence map of the depth, where there is one.</summary>
+        /// <summary>The confidence map of the depth, or null.</summary>
         public Confidence? Confidence;
-        /// <summary>How all must be turned to stand upright.</summary>
+        /// <summary>The rotation that brings all images upright.</summary>
         public Rotation Rotation;
-        /// <summary>Whether left and right are exchanged after the turn, as front cameras need.</summary>
+        /// <summary>Whether the images are mirrored left to right after the rotation, as for front cameras.</summary>
         public bool Mirrored;
 
-        /// What `call` gives of this frame as C takes it, its memory held in place meanwhile.
+        /// Calls `call` with this frame in the form of the C interface, and pins its memory during the call.
         internal T Pinned<T>(Func<NativeFrame, T> call)
         {
             var pins = new List<GCHandle>();

@@ -4,51 +4,51 @@ using static Phasefront.PhasefrontException;
 
 namespace Phasefront
 {
-    /// <summary>How long each stage of a frame took, milliseconds.</summary>
+    /// <summary>The time of each stage of a frame, in milliseconds.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct FrameTimes
     {
-        /// <summary>Colour to amplitudes of the display's resolution.</summary>
+        /// <summary>Converting colour to amplitudes at the display's resolution.</summary>
         public double ColourMs;
-        /// <summary>Depth to normalized depth of the display's resolution.</summary>
+        /// <summary>Converting depth to normalized depth at the display's resolution.</summary>
         public double DepthMs;
-        /// <summary>The midpoint hologram.</summary>
+        /// <summary>Computing the midpoint hologram.</summary>
         public double MethodMs;
-        /// <summary>From the midpoint to the modulator.</summary>
+        /// <summary>Propagating from the midpoint to the modulator.</summary>
         public double PropagateMs;
-        /// <summary>From the field to levels.</summary>
+        /// <summary>Encoding the field as levels.</summary>
         public double EncodeMs;
-        /// <summary>All together.</summary>
+        /// <summary>The whole frame.</summary>
         public double TotalMs;
     }
 
-    /// <summary>What is known of a hologram.</summary>
+    /// <summary>The metadata of a hologram.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct HologramInfo
     {
         /// <summary>The frame's timestamp.</summary>
         public ulong TimestampNs;
-        /// <summary>Pixels along x.</summary>
+        /// <summary>The width in pixels.</summary>
         public uint Width;
-        /// <summary>Pixels along y.</summary>
+        /// <summary>The height in pixels.</summary>
         public uint Height;
-        /// <summary>How many colours its levels have: 3, or 1 for a display of one laser.</summary>
+        /// <summary>The number of colours: 3, or 1 for a display with a single laser.</summary>
         public uint Colours;
-        /// <summary>The quality level that it was made at, 0 the best.</summary>
+        /// <summary>The quality level of the hologram; 0 is the best.</summary>
         public uint QualityLevel;
-        /// <summary>The amplitude that full light stands for.</summary>
+        /// <summary>The amplitude that full light represents.</summary>
         public float Scale;
-        /// <summary>Metres at the near end of the volume; NaN for normalized depth.</summary>
+        /// <summary>The depth in metres at the near end of the volume, or NaN for normalized depth.</summary>
         public float NearM;
-        /// <summary>Metres at the far end of the volume; NaN for normalized depth.</summary>
+        /// <summary>The depth in metres at the far end of the volume, or NaN for normalized depth.</summary>
         public float FarM;
-        /// <summary>The share of the depth sensor's pixels that had a usable reading.</summary>
+        /// <summary>The fraction of the depth sensor's pixels with a usable reading.</summary>
         public float ValidDepth;
-        /// <summary>How long each stage took.</summary>
+        /// <summary>The time of each stage.</summary>
         public FrameTimes Times;
     }
 
-    /// <summary>How the levels of the colours lie in images for a modulator's driver.</summary>
+    /// <summary>The layout of the colours' levels in images for a modulator's driver.</summary>
     public enum Layout : uint
     {
         /// <summary>One image, bytes red, green, blue.</summary>
@@ -57,23 +57,23 @@ namespace Phasefront
         Rgba = 1,
         /// <summary>One image, bytes blue, green, red, alpha 255.</summary>
         Bgra = 2,
-        /// <summary>An image for each colour, one after another; a byte a pixel.</summary>
+        /// <summary>One image per colour, one byte per pixel.</summary>
         Grey = 3,
     }
 
-    /// <summary>An image, row by row without gaps.</summary>
+    /// <summary>An image whose rows have no gaps.</summary>
     public sealed class Image
     {
-        /// <summary>Its bytes.</summary>
+        /// <summary>The bytes of the image.</summary>
         public byte[] Bytes { get; }
-        /// <summary>Pixels along x.</summary>
+        /// <summary>The width in pixels.</summary>
         public int Width { get; }
-        /// <summary>Pixels along y.</summary>
+        /// <summary>The height in pixels.</summary>
         public int Height { get; }
-        /// <summary>Bytes of a pixel.</summary>
+        /// <summary>The number of bytes per pixel.</summary>
         public int PixelBytes { get; }
 
-        // Takes what C gave, and ends it.
+        // Copies an image of the C interface and frees it.
         internal Image(IntPtr image)
         {
             try
@@ -90,21 +90,21 @@ namespace Phasefront
         }
     }
 
-    /// <summary>Numbers at each pixel of each colour of a hologram: amplitudes, or a field.</summary>
+    /// <summary>The amplitudes or the complex field of a hologram, for each pixel and colour.</summary>
     public sealed class Planes
     {
-        /// <summary>Planes row by row without gaps, one colour after another.</summary>
+        /// <summary>The values row by row without gaps, one colour after another.</summary>
         public float[] Values { get; }
-        /// <summary>Pixels along x.</summary>
+        /// <summary>The width in pixels.</summary>
         public int Width { get; }
-        /// <summary>Pixels along y.</summary>
+        /// <summary>The height in pixels.</summary>
         public int Height { get; }
-        /// <summary>How many planes there are: 3, or 1 of a display of one laser.</summary>
+        /// <summary>The number of planes: 3, or 1 for a display with a single laser.</summary>
         public int Colours { get; }
-        /// <summary>Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.</summary>
+        /// <summary>The numbers per pixel: 1 for an amplitude, 2 for a real and an imaginary part.</summary>
         public int Numbers { get; }
 
-        // Takes what C gave, and ends it.
+        // Copies planes of the C interface and frees them.
         internal Planes(IntPtr planes)
         {
             try
@@ -122,12 +122,13 @@ namespace Phasefront
         }
     }
 
-    /// <summary>The hologram of one frame: modulator levels of its colours. Dispose gives its memory back to its session.</summary>
+    /// <summary>The hologram of one frame: the modulator levels of its colours. Dispose returns its memory to the
+    /// session.</summary>
     public sealed class Hologram : NativeObject
     {
         internal Hologram(IntPtr handle) : base(handle) { }
 
-        /// <summary>What is known of it.</summary>
+        /// <summary>The metadata of the hologram.</summary>
         public HologramInfo Info
         {
             get
@@ -137,7 +138,8 @@ namespace Phasefront
             }
         }
 
-        /// <summary>The levels of one colour, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one laser.</summary>
+        /// <summary>Returns the levels of one colour, row by row without gaps: 0 is red or the single laser, 1 green, 2
+        /// blue.</summary>
         public byte[] Levels(int colour)
         {
             Check(Native.pf_hologram_levels(this, checked((uint)colour), out var levels, out var length));
@@ -147,37 +149,37 @@ namespace Phasefront
             return bytes;
         }
 
-        /// <summary>z of what is seen at (x, y), each 0 to 1 from the upper left corner, mm: where to focus.</summary>
+        /// <summary>Returns the z in mm of the scene point at (x, y), each 0 to 1 from the upper left corner.</summary>
         public double ZAt(double x, double y)
         {
             Check(Native.pf_hologram_z_at(this, x, y, out var zMm));
             return zMm;
         }
 
-        /// <summary>What an eye focused at z sees: red, green, blue, 255.</summary>
+        /// <summary>Returns the displayed image for an eye focused at z: red, green, blue, 255.</summary>
         public Image Preview(double zMm, int width, int height)
         {
             Check(Native.pf_hologram_preview(this, zMm, checked((uint)width), checked((uint)height), out var image));
             return new Image(image);
         }
 
-        /// <summary>What an eye focused at z sees of the whole hologram: amplitudes, of which 1 is white. Not for every
-        /// frame.</summary>
+        /// <summary>Returns the displayed image of the whole hologram for an eye focused at z, as amplitudes; 1 is
+        /// white. Too slow for every frame.</summary>
         public Planes Refocus(double zMm)
         {
             Check(Native.pf_hologram_refocus(this, zMm, out var planes));
             return new Planes(planes);
         }
 
-        /// <summary>The complex field that the levels make behind the aperture at z, 0 the midpoint, without the
-        /// carrier. Not for every frame.</summary>
+        /// <summary>Returns the complex field of the levels behind the aperture at z (0 is the midpoint), without the
+        /// carrier. Too slow for every frame.</summary>
         public Planes Field(double zMm = 0)
         {
             Check(Native.pf_hologram_field(this, zMm, out var planes));
             return new Planes(planes);
         }
 
-        /// <summary>Image <paramref name="number"/> of those that the modulator's driver takes.</summary>
+        /// <summary>Returns image <paramref name="number"/> of the images for the modulator's driver.</summary>
         public Image Output(Layout layout, int number = 0, bool flipX = false, bool flipY = false, int shiftX = 0, int shiftY = 0)
         {
             var placement = new NativePlacement
@@ -192,7 +194,7 @@ namespace Phasefront
             return new Image(image);
         }
 
-        /// <summary>Ends it.</summary>
+        /// <summary>Frees the hologram.</summary>
         protected override bool ReleaseHandle()
         {
             Native.pf_hologram_free(handle);

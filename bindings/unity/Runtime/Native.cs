@@ -1,4 +1,4 @@
-// The C interface as C# sees it: bindings/c/include/phasefront.h says what each call does.
+// Declares the C interface for C#. bindings/c/include/phasefront.h documents each call.
 using System;
 using System.Runtime.InteropServices;
 
@@ -100,7 +100,7 @@ namespace Phasefront
         public Native.OnClosed OnClosed;
     }
 
-    // IL2CPP looks for an attribute of this name on what native code calls back.
+    // IL2CPP looks for an attribute of this name on methods that native code calls.
     [AttributeUsage(AttributeTargets.Method)]
     internal sealed class MonoPInvokeCallbackAttribute : Attribute
     {

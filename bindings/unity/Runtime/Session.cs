@@ -4,21 +4,22 @@ using static Phasefront.PhasefrontException;
 
 namespace Phasefront
 {
-    /// <summary>How a session runs; fixed when it is made.</summary>
+    /// <summary>The running mode of a session, fixed when it is created.</summary>
     public enum RunningMode : uint
     {
-        /// <summary>Each frame is answered by itself.</summary>
+        /// <summary>Each frame is processed independently.</summary>
         Image = 0,
-        /// <summary>Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.</summary>
+        /// <summary>Frames are processed in order, and depth and brightness are smoothed over time. Timestamps must
+        /// increase.</summary>
         Video = 1,
-        /// <summary>Frames are submitted without waiting, and the listener hears what becomes of them.</summary>
+        /// <summary>Frames are submitted without waiting, and the listener receives the results.</summary>
         Live = 2,
     }
 
-    /// <summary>How hot the device is, as its system says.</summary>
+    /// <summary>The thermal state that the device's system reports.</summary>
     public enum Thermal : uint
     {
-        /// <summary>Not warm: nothing is limited.</summary>
+        /// <summary>Not warm: the session has no limits.</summary>
         Nominal = 0,
         /// <summary>Warm: frames may take a little less time.</summary>
         Fair = 1,
@@ -28,39 +29,39 @@ namespace Phasefront
         Critical = 3,
     }
 
-    /// <summary>Why a frame was not made into a hologram, without fault.</summary>
+    /// <summary>The reason why a frame was dropped without an error.</summary>
     public enum DropReason : uint
     {
-        /// <summary>It was not dropped.</summary>
+        /// <summary>The frame was not dropped.</summary>
         Not = 0,
-        /// <summary>A newer frame came while it waited.</summary>
+        /// <summary>A newer frame arrived while the frame waited.</summary>
         Superseded = 1,
-        /// <summary>It came sooner than the target rate asks for.</summary>
+        /// <summary>The frame arrived sooner than the target rate requires.</summary>
         AboveTargetRate = 2,
         /// <summary>The session was paused.</summary>
         Paused = 3,
-        /// <summary>The session was reset before it was done.</summary>
+        /// <summary>The session was reset before the frame was done.</summary>
         Reset = 4,
-        /// <summary>The session was closed before it was done.</summary>
+        /// <summary>The session was closed before the frame was done.</summary>
         Closed = 5,
-        /// <summary>For a reason that this version does not know.</summary>
+        /// <summary>A reason that this version does not know.</summary>
         Other = 6,
     }
 
-    /// <summary>Why a session changed its quality.</summary>
+    /// <summary>The reason why a session changed its quality level.</summary>
     public enum QualityReason : uint
     {
         /// <summary>Frames took longer than the target rate allows.</summary>
         TooSlow = 0,
-        /// <summary>There was room for more.</summary>
+        /// <summary>There was time for a better level.</summary>
         Room = 1,
         /// <summary>The device is hot.</summary>
         Thermal = 2,
-        /// <summary>The caller said so.</summary>
+        /// <summary>The caller requested the change.</summary>
         Asked = 3,
-        /// <summary>The quality level that was to be taken cannot be planned: the session stays where it was.</summary>
+        /// <summary>The new quality level cannot be planned, so the session keeps the old one.</summary>
         Refused = 4,
-        /// <summary>For a reason that this version does not know.</summary>
+        /// <summary>A reason that this version does not know.</summary>
         Other = 5,
     }
 
@@ -70,60 +71,61 @@ namespace Phasefront
     {
         /// <summary>The quality level before.</summary>
         public uint FromQualityLevel;
-        /// <summary>The quality level now; the one before where the step was refused.</summary>
+        /// <summary>The quality level now, equal to the level before if the step was refused.</summary>
         public uint ToQualityLevel;
-        /// <summary>Why.</summary>
+        /// <summary>The reason for the change.</summary>
         public QualityReason Reason;
     }
 
-    /// <summary>What a session has done so far.</summary>
+    /// <summary>The statistics of a session.</summary>
     [StructLayout(LayoutKind.Sequential, CharSet = CharSet.Ansi)]
     public struct Statistics
     {
-        /// <summary>Frames that were given to the session.</summary>
+        /// <summary>The frames that were submitted to the session.</summary>
         public ulong Submitted;
-        /// <summary>Frames that became holograms.</summary>
+        /// <summary>The frames that became holograms.</summary>
         public ulong Processed;
-        /// <summary>Frames that could not be processed.</summary>
+        /// <summary>The frames that could not be processed.</summary>
         public ulong Failed;
-        /// <summary>Frames that came late.</summary>
+        /// <summary>The frames that were refused because they were late.</summary>
         public ulong Refused;
-        /// <summary>Frames that were dropped.</summary>
+        /// <summary>The frames that were dropped.</summary>
         public ulong Dropped;
-        /// <summary>Frames that wait or are in flight.</summary>
+        /// <summary>The frames that wait or are in progress.</summary>
         public ulong Pending;
-        /// <summary>The quality level, 0 the best.</summary>
+        /// <summary>The quality level; 0 is the best.</summary>
         public uint QualityLevel;
-        /// <summary>Holograms a second, of late.</summary>
+        /// <summary>The recent rate in holograms per second.</summary>
         public double RateHz;
-        /// <summary>Mean times, of late.</summary>
+        /// <summary>The recent mean times.</summary>
         public FrameTimes Times;
-        /// <summary>What computes.</summary>
+        /// <summary>The device that computes.</summary>
         [MarshalAs(UnmanagedType.ByValTStr, SizeConst = 64)] public string Backend;
-        /// <summary>Why that.</summary>
+        /// <summary>The reason for this backend.</summary>
         [MarshalAs(UnmanagedType.ByValTStr, SizeConst = 256)] public string BackendWhy;
     }
 
     /// <summary>
-    /// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, not
-    /// Unity's main one. While it is busy no frame is processed. What it throws is counted.
+    /// Receives the events of a live session, one call after another, on the session's own thread and not on Unity's
+    /// main thread. The session processes no frame during a call. It counts the exceptions of the listener.
     /// </summary>
     public interface IListener
     {
-        /// <summary>A frame became a hologram, which is the listener's to dispose of.</summary>
+        /// <summary>A frame became a hologram. The listener must dispose of it.</summary>
         void OnProcessed(Hologram hologram);
         /// <summary>A frame was dropped.</summary>
         void OnDropped(ulong timestampNs, DropReason reason);
-        /// <summary>A frame could not be processed. The session goes on.</summary>
+        /// <summary>A frame could not be processed. The session continues.</summary>
         void OnFailed(ulong timestampNs, string message);
-        /// <summary>The frames after this one are made at another quality level.</summary>
+        /// <summary>The session processes the frames after this one at another quality level.</summary>
         void OnQualityChanged(ulong timestampNs, QualityChange change);
     }
 
-    /// <summary>A session: frames in, holograms out. Every call may come from any thread, at any moment.</summary>
+    /// <summary>A session that turns frames into holograms. Every method may be called from any thread at any
+    /// time.</summary>
     public sealed class Session : NativeObject
     {
-        // What native code calls lives as long as the process.
+        // Native code calls these delegates, so they live as long as the process.
         private static readonly Native.OnProcessed Processed = OnProcessed;
         private static readonly Native.OnDropped Dropped = OnDropped;
         private static readonly Native.OnFailed Failed = OnFailed;
@@ -140,7 +142,7 @@ namespace Phasefront
 
         private Session(IntPtr handle, Hearing hearing) : base(handle) => this.hearing = hearing;
 
-        /// <summary>An image or a video session, or with a listener a live one.</summary>
+        /// <summary>Opens an image or a video session, or with a listener a live session.</summary>
         public static Session Open(SessionOptions options, RunningMode mode, IListener listener = null)
         {
             if (listener == null)
@@ -149,7 +151,7 @@ namespace Phasefront
                 return new Session(still, null);
             }
             var hearing = new Hearing { Listener = listener };
-            // Native code holds it until OnClosed, which may come after this session's end.
+            // Native code holds the context until OnClosed, which may run after the session is disposed of.
             var context = GCHandle.Alloc(hearing);
             var native = new NativeListener
             {
@@ -166,7 +168,7 @@ namespace Phasefront
             return new Session(session, hearing);
         }
 
-        /// <summary>The hologram of a frame, in an image or a video session.</summary>
+        /// <summary>Returns the hologram of a frame, in an image or a video session.</summary>
         public Hologram Process(Frame frame)
         {
             return frame.Pinned(native =>
@@ -176,7 +178,8 @@ namespace Phasefront
             });
         }
 
-        /// <summary>Hands a frame to a live session, which copies it; whether it was dropped at once, and why.</summary>
+        /// <summary>Submits a frame to a live session, which copies it. Returns the reason if the frame was dropped at
+        /// once.</summary>
         public DropReason Submit(Frame frame)
         {
             return frame.Pinned(native =>
@@ -186,28 +189,29 @@ namespace Phasefront
             });
         }
 
-        /// <summary>Runs an empty frame through the stages, so that the first real one is as fast as the others.</summary>
+        /// <summary>Processes an empty frame, so that the first real frame is as fast as the later ones.</summary>
         public void WarmUp() => Check(Native.pf_session_warm_up(this));
 
-        /// <summary>Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.</summary>
+        /// <summary>Discards all earlier frames, including one in progress. The next frame may have any
+        /// timestamp.</summary>
         public void Reset() => Check(Native.pf_session_reset(this));
 
-        /// <summary>Takes no frames until Resume.</summary>
+        /// <summary>Stops accepting frames until Resume.</summary>
         public void Pause() => Check(Native.pf_session_pause(this));
 
-        /// <summary>Takes frames again.</summary>
+        /// <summary>Accepts frames again.</summary>
         public void Resume() => Check(Native.pf_session_resume(this));
 
-        /// <summary>Says how hot the device is.</summary>
+        /// <summary>Reports how hot the device is.</summary>
         public void SetThermal(Thermal thermal) => Check(Native.pf_session_set_thermal(this, thermal));
 
-        /// <summary>Stays at this quality level, 0 the best.</summary>
+        /// <summary>Fixes the quality level; 0 is the best.</summary>
         public void FixQualityLevel(int qualityLevel) => Check(Native.pf_session_fix_quality_level(this, checked((uint)qualityLevel)));
 
-        /// <summary>Changes the quality level by itself.</summary>
+        /// <summary>Lets the session change the quality level automatically.</summary>
         public void StepByItself() => Check(Native.pf_session_step_by_itself(this));
 
-        /// <summary>What the session has done so far. Never waits for a frame.</summary>
+        /// <summary>The session's statistics. Never blocks on a frame.</summary>
         public Statistics Statistics
         {
             get
@@ -217,12 +221,12 @@ namespace Phasefront
             }
         }
 
-        /// <summary>How often the listener threw.</summary>
+        /// <summary>The number of exceptions that the listener threw.</summary>
         public int ListenerFailures => hearing == null ? 0 : System.Threading.Volatile.Read(ref hearing.Failures);
 
         /// <summary>
-        /// Takes no more frames, waits until the listener has heard everything, and ends. Called by a listener it does
-        /// not wait: the listener hears the rest afterwards.
+        /// Stops accepting frames, waits until the listener has received all events, and frees the session. If a
+        /// listener calls it, it does not wait, and the listener receives the other events afterwards.
         /// </summary>
         protected override bool ReleaseHandle()
         {
@@ -230,7 +234,7 @@ namespace Phasefront
             return true;
         }
 
-        // No exception may go back into native code.
+        // No exception may propagate into native code.
         private static void Tell(IntPtr context, Action<IListener> call)
         {
             var hearing = (Hearing)GCHandle.FromIntPtr(context).Target;
@@ -266,7 +270,7 @@ namespace Phasefront
         private static void OnQualityChanged(IntPtr context, ulong timestampNs, QualityChange change) =>
             Tell(context, listener => listener.OnQualityChanged(timestampNs, change));
 
-        // The last call with this context.
+        // OnClosed is the last call with this context.
         [MonoPInvokeCallback(typeof(Native.OnClosed))]
         private static void OnClosed(IntPtr context) => GCHandle.FromIntPtr(context).Free();
     }

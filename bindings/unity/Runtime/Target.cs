@@ -4,24 +4,24 @@ using static Phasefront.PhasefrontException;
 
 namespace Phasefront
 {
-    /// <summary>An object of the native library; it ends with Dispose, or when nobody holds it.</summary>
+    /// <summary>An object of the native library. Dispose or the garbage collector frees it.</summary>
     public abstract class NativeObject : SafeHandle
     {
         internal NativeObject(IntPtr handle) : base(IntPtr.Zero, true) { SetHandle(handle); }
 
-        /// <summary>Whether it is none.</summary>
+        /// <summary>Whether the object has no handle.</summary>
         public override bool IsInvalid => handle == IntPtr.Zero;
     }
 
     /// <summary>
-    /// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
-    /// lasers' light, what corrects its optics. Immutable; one serves many sessions.
-    /// </summary>
+    /// The display that holograms are made for and, if it is calibrated, the response of its modulator, the light of
+    /// its lasers and the correction of its optics. Immutable. Many sessions can share it. </summary>
     public sealed class Target : NativeObject
     {
         private Target(IntPtr handle) : base(handle) { }
 
-        /// <summary>A display in TOML, as "width = 1920\npitch_um = 8.0"; what is left out has the default value.</summary>
+        /// <summary>Reads a display in TOML, such as "width = 1920\npitch_um = 8.0". Missing keys have default
+        /// values.</summary>
         public static Target FromToml(string toml)
         {
             Check(Native.pf_target_from_toml(Text.Write(toml), out var target));
@@ -29,7 +29,7 @@ namespace Phasefront
         }
 
         /// <summary>
-        /// A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+        /// Creates a display whose modulator was calibrated as a whole: the i-th of 256 levels has the phase 2πi/256.
         /// </summary>
         public static Target WithLookUpTable(string toml, byte[] levels)
         {
@@ -37,14 +37,15 @@ namespace Phasefront
             return new Target(target);
         }
 
-        /// <summary>The bytes of a calibration's file, as `phasefront calibrate pack` writes it.</summary>
+        /// <summary>Reads a target from the bytes of a calibration file that `phasefront calibrate pack`
+        /// wrote.</summary>
         public static Target FromBytes(byte[] file)
         {
             Check(Native.pf_target_from_bytes(file, (UIntPtr)file.Length, out var target));
             return new Target(target);
         }
 
-        /// <summary>Width and height of its modulator, pixels.</summary>
+        /// <summary>The width and height of the modulator in pixels.</summary>
         public (int Width, int Height) Size
         {
             get
@@ -54,7 +55,7 @@ namespace Phasefront
             }
         }
 
-        /// <summary>Ends it.</summary>
+        /// <summary>Frees the target.</summary>
         protected override bool ReleaseHandle()
         {
             Native.pf_target_free(handle);
@@ -62,26 +63,26 @@ namespace Phasefront
         }
     }
 
-    /// <summary>A hologram network or a pre-filter. Immutable; one serves many sessions.</summary>
+    /// <summary>A hologram network or a pre-filter. Immutable. Many sessions can share it.</summary>
     public sealed class Network : NativeObject
     {
         private Network(IntPtr handle) : base(handle) { }
 
-        /// <summary>A network in int8 that is bundled.</summary>
+        /// <summary>Returns a bundled int8 network.</summary>
         public static Network BuiltIn(string name = "rgbd-8")
         {
             Check(Native.pf_network_built_in(Text.Write(name), out var network));
             return new Network(network);
         }
 
-        /// <summary>The bytes of an ONNX file.</summary>
+        /// <summary>Reads a network from the bytes of an ONNX file.</summary>
         public static Network FromBytes(byte[] onnx)
         {
             Check(Native.pf_network_from_bytes(onnx, (UIntPtr)onnx.Length, out var network));
             return new Network(network);
         }
 
-        /// <summary>Ends it.</summary>
+        /// <summary>Frees the network.</summary>
         protected override bool ReleaseHandle()
         {
             Native.pf_network_free(handle);

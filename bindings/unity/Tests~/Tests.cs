@@ -1,5 +1,5 @@
-// The package's tests, which need no Unity: `Tests SUITE MODELS LEVELS VERSION` runs the conformance suite, whose
-// levels and views must be the bits that Rust left, and what a listener hears.
+// Tests the package without Unity. `Tests SUITE MODELS LEVELS VERSION` runs the conformance suite, whose levels and
+// views must match Rust bit for bit, and checks the events of a listener.
 using System;
 using System.Collections;
 using System.Collections.Generic;
@@ -291,7 +291,7 @@ internal static class Tests
         }
     }
 
-    // Ends its session at the first hologram, when others wait to be told as dropped.
+    // Disposes of its session at the first hologram, when other frames wait to be reported as dropped.
     private sealed class Closing : IListener
     {
         public readonly ManualResetEventSlim Begun = new ManualResetEventSlim(), Submitted = new ManualResetEventSlim();
@@ -304,7 +304,7 @@ internal static class Tests
             Begun.Set();
             Submitted.Wait();
             Session.Dispose();
-            // What is freed too early is gone then.
+            // Collects objects that are freed too early.
             GC.Collect();
             Told.Signal();
         }

@@ -1,7 +1,7 @@
 import Phasefront
 import SwiftUI
 
-/// Times every stage on the sample scene by one tap, keeps the record as a file of the app's, and shares it.
+/// Measures every stage on the sample scene, saves the record as a file and shares it.
 struct BenchmarkView: View {
     @StateObject private var bench = Bench()
     @Environment(\.dismiss) private var dismiss
@@ -37,7 +37,7 @@ final class Bench: ObservableObject {
         isRunning = true
         (lines, record) = ([], nil)
         UIDevice.current.isBatteryMonitoringEnabled = true
-        // A dark screen lets the processor sleep.
+        // The processor may sleep when the screen turns off.
         UIApplication.shared.isIdleTimerDisabled = true
         task = Task {
             do {
@@ -60,7 +60,7 @@ final class Bench: ObservableObject {
         let benchmark = Benchmark(
             runs: try Run.all(deep: Network.fromFile(path: deep)), scene: { scene.frame(0) },
             conditions: { await Self.conditions() })
-        // Frames are waited for: not on the main thread.
+        // Processing blocks, so it must not run on the main thread.
         let work = Task.detached {
             try await benchmark.outcomes { [weak self] line in await self?.say(line) }
         }
@@ -69,7 +69,7 @@ final class Bench: ObservableObject {
         } onCancel: {
             work.cancel()
         }
-        // What was broken off is no record.
+        // A cancelled run leaves no record.
         if Task.isCancelled { return nil }
         let record = Record(
             phasefront: try version(), device: Self.device(), begun: begun.formatted(.iso8601), runs: runs)

@@ -1,6 +1,6 @@
 import UIKit
 
-/// The modulator's levels on an external screen, pixel for pixel: the screen is the modulator's driver.
+/// Shows the modulator's levels on an external screen, pixel for pixel. The screen drives the modulator.
 @MainActor
 final class ExternalScreen {
     private var window: UIWindow?
@@ -20,7 +20,7 @@ final class ExternalScreen {
         CATransaction.commit()
     }
 
-    /// The window on the external screen, made when the screen comes.
+    /// Returns the window on the external screen, created when the screen is connected.
     private func connect() -> UIWindow? {
         let scenes = UIApplication.shared.connectedScenes.compactMap { $0 as? UIWindowScene }
         guard let scene = scenes.first(where: { $0.session.role == .windowExternalDisplayNonInteractive }) else {
@@ -31,7 +31,7 @@ final class ExternalScreen {
             let window = UIWindow(windowScene: scene)
             let controller = UIViewController()
             controller.view.backgroundColor = .black
-            // Neither filtered nor scaled: a level between two levels is another phase.
+            // Levels must not be filtered or scaled: a value between two levels is a different phase.
             layer.magnificationFilter = .nearest
             layer.minificationFilter = .nearest
             controller.view.layer.addSublayer(layer)

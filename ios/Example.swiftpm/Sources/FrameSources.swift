@@ -2,20 +2,20 @@ import ARKit
 import Phasefront
 import UIKit
 
-/// Where frames come from.
+/// A source of frames.
 @MainActor
 protocol FrameSource {
-    /// Submits frame after frame to `session`, until it is stopped.
+    /// Submits frames to `session` until `stop()`.
     func start(_ session: Phasefront.Session)
     func stop()
 }
 
-/// Colour and depth by ARKit, on devices with LiDAR.
+/// A source of colour and depth from ARKit, on devices with LiDAR.
 final class CameraSource: NSObject, FrameSource, ARSessionDelegate {
     static var isSupported: Bool { ARWorldTrackingConfiguration.supportsFrameSemantics(.smoothedSceneDepth) }
 
     private let camera = ARSession()
-    /// Written before the camera runs, read on its queue.
+    /// The session, written before the camera runs and read on its queue.
     nonisolated(unsafe) private var session: Phasefront.Session?
 
     func start(_ session: Phasefront.Session) {
@@ -38,7 +38,7 @@ final class CameraSource: NSObject, FrameSource, ARSessionDelegate {
     }
 }
 
-/// The project's sample scene, 30 times a second, seen through a window that moves over it: for devices without LiDAR.
+/// A source for devices without LiDAR: a window that moves over the project's sample scene, 30 times per second.
 final class SampleSource: FrameSource {
     private var task: Task<Void, Never>?
 
@@ -61,11 +61,11 @@ final class SampleSource: FrameSource {
     func stop() { task?.cancel() }
 }
 
-/// The project's sample scene, seven eighths of it.
+/// Seven eighths of the project's sample scene.
 struct SampleScene: Sendable {
     private let colour, depth: Pixels
 
-    /// Nil where the app's images cannot be read.
+    /// Reads the app's images. Fails if they cannot be read.
     init?() {
         guard let colour = pixels("scene_rgb", "jpg", channels: 4),
             let depth = pixels("scene_depth", "png", channels: 1)
@@ -73,7 +73,7 @@ struct SampleScene: Sendable {
         (self.colour, self.depth) = (colour, depth)
     }
 
-    /// The frame of now, through a window that is `step` pixels on its way to and fro.
+    /// Returns a frame with the current time, of a window that has moved `step` pixels to and fro.
     func frame(_ step: Int) -> Frame {
         let most = colour.width / 8
         let x = step / most % 2 == 0 ? step % most : most - 1 - step % most
@@ -93,7 +93,7 @@ private struct Pixels: Sendable {
     let width, height: Int
 }
 
-/// Seven eighths of `pixels`, from column `x` on.
+/// Returns seven eighths of `pixels`, starting at column `x`.
 private func window<Image>(
     _ pixels: Pixels, x: Int, channels: Int, _ make: (Int, Int, Plane) -> Image
 ) -> Image {
@@ -102,7 +102,7 @@ private func window<Image>(
     return make(pixels.width - pixels.width / 8, pixels.height - pixels.height / 8, plane)
 }
 
-/// The pixels of an image of the app: RGBA or grey.
+/// Returns the pixels of an image of the app: RGBA or grey.
 private func pixels(_ name: String, _ type: String, channels: Int) -> Pixels? {
     guard let path = Bundle.module.path(forResource: name, ofType: type),
         let image = UIImage(contentsOfFile: path)?.cgImage

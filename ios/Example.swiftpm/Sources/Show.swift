@@ -2,8 +2,8 @@ import ARKit
 import Phasefront
 import UIKit
 
-/// Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on,
-/// the levels on an external screen where there is one, and what it costs.
+/// Converts the camera or the sample scene to holograms. Shows the displayed image focused by the slider or a tap, the
+/// levels on an external screen if there is one, and statistics.
 @MainActor
 final class Show: ObservableObject {
     @Published var preview: CGImage?
@@ -40,7 +40,7 @@ final class Show: ObservableObject {
 
     private func show(_ hologram: Hologram, of session: Session) async throws {
         let (zMm, display, needsLevels) = (zMm, display, screen.isConnected)
-        // Some milliseconds of work: not on the main thread.
+        // Takes some milliseconds, so it must not run on the main thread.
         let images = try await Task.detached {
             let view = try hologram.preview(zMm: zMm, width: Int(display.width) / 2, height: Int(display.height) / 2)
             return (try view.cgImage(), needsLevels ? try hologram.output().cgImage(colourSpace: nil) : nil)
@@ -54,7 +54,7 @@ final class Show: ObservableObject {
             of.rateHz, of.dropped.total, of.submitted, of.backend, of.times.totalMs, of.times.methodMs)
     }
 
-    /// Focuses on what is seen at a point, each side of the picture 0...1.
+    /// Focuses on the scene point at (`x`, `y`) of the image, each 0...1.
     func focus(atX x: Double, y: Double) {
         if let z = try? latest?.z(atX: x, y: y) { zMm = z }
     }

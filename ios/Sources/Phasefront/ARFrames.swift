@@ -3,15 +3,15 @@
     import PhasefrontCore
 
     extension Session {
-        /// The hologram of what ARKit sees, in an image or a video session. The configuration needs
-        /// `frameSemantics.insert(.sceneDepth)` or `.smoothedSceneDepth`; ``Frame`` says what is thrown.
+        /// Returns the hologram of an ARKit frame, in an image or a video session. The configuration needs
+        /// `frameSemantics.insert(.sceneDepth)` or `.smoothedSceneDepth`. ``Frame`` lists the errors.
         ///
-        /// - Parameter orientation: how ARKit's picture, which is always that of the sensor, must be turned to stand upright.
+        /// - Parameter orientation: The rotation that brings ARKit's image, which is in sensor orientation, upright.
         public func process(_ frame: ARFrame, orientation: Orientation = .upright) throws -> Hologram {
             try withFrame(frame, orientation: orientation) { try process($0) }
         }
 
-        /// Hands what ARKit sees to a live stream; see ``submit(_:)``. The `ARFrame` is not kept.
+        /// Submits an ARKit frame to a live stream; see ``submit(_:)``. The session does not retain the `ARFrame`.
         @discardableResult
         public func submit(_ frame: ARFrame, orientation: Orientation = .upright) throws -> DropReason? {
             try withFrame(frame, orientation: orientation) { try submit($0) }

@@ -3,18 +3,20 @@
     import PhasefrontCore
 
     extension Session {
-        /// The hologram of a camera image and its depth, in an image or a video session. ``Frame`` says what is thrown.
+        /// Returns the hologram of a camera image and its depth, in an image or a video session. ``Frame`` lists the
+        /// errors.
         ///
         /// - Parameters:
-        ///   - depth: of the same moment and the same field of view; `AVCaptureDataOutputSynchronizer` brings both together.
-        ///   - orientation: how both must be turned to stand upright.
+        ///   - depth: Depth of the same moment and field of view; `AVCaptureDataOutputSynchronizer` pairs the two.
+        ///   - orientation: The rotation that brings both images upright.
         public func process(
             _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation = .upright
         ) throws -> Hologram {
             try withFrame(image, depth: depth, orientation: orientation) { try process($0) }
         }
 
-        /// Hands a camera image and its depth to a live stream; see ``submit(_:)``. The buffers are not kept.
+        /// Submits a camera image and its depth to a live stream; see ``submit(_:)``. The session does not retain the
+        /// buffers.
         @discardableResult
         public func submit(
             _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation = .upright

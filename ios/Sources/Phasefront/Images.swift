@@ -3,10 +3,10 @@
     import PhasefrontCore
 
     extension PixelImage {
-        /// The image for Core Graphics and UIKit, without a copy: it keeps this one alive. `colourSpace` is how its values are
-        /// meant: sRGB for previews; nil for device values that must reach a modulator unchanged.
+        /// Returns the image for Core Graphics and UIKit without a copy; the result retains this image. `colourSpace`
+        /// is sRGB for previews, or nil for device values that must reach a modulator unchanged.
         ///
-        /// - Throws: ``PhasefrontError/Setting(message:)`` for an image that is not of 4 bytes a pixel.
+        /// - Throws: ``PhasefrontError/Setting(message:)`` if the image does not have 4 bytes per pixel.
         public func cgImage(colourSpace: CGColorSpace? = CGColorSpace(name: CGColorSpace.sRGB)) throws -> CGImage {
             guard pixelBytes == 4 else {
                 throw PhasefrontError.Setting(

@@ -4,10 +4,10 @@
     import CoreMedia
     import CoreVideo
 
-    /// `body` with the image that lies in `buffer`, which is locked meanwhile: 32BGRA, 32RGBA, 420f or 420v, as cameras and
-    /// ARKit give it. Nothing is copied.
+    /// Calls `body` with the image in `buffer`, which stays locked during the call: 32BGRA, 32RGBA, 420f or 420v, the
+    /// formats of cameras and ARKit. Nothing is copied.
     ///
-    /// - Throws: ``PhasefrontError/Frame(message:)`` for another pixel format, which the message names.
+    /// - Throws: ``PhasefrontError/Frame(message:)`` for any other pixel format. The message names it.
     public func withColourImage<R>(_ buffer: CVPixelBuffer, _ body: (ColourImage) throws -> R) throws -> R {
         let format: ColourFormat
         var isVideoRange = false
@@ -38,11 +38,11 @@
         }
     }
 
-    /// `body` with the depth that lies in `buffer`, which is locked meanwhile: 16- or 32-bit floats of depth or disparity. The
-    /// format is the buffer's own, whatever it was expected to be. Nothing is copied.
+    /// Calls `body` with the depth in `buffer`, which stays locked during the call: 16- or 32-bit floats of depth or
+    /// disparity. The format is read from the buffer. Nothing is copied.
     ///
     /// - Parameter confidence: ARKit's confidence map of the same size.
-    /// - Throws: ``PhasefrontError/Frame(message:)`` for another pixel format, which the message names.
+    /// - Throws: ``PhasefrontError/Frame(message:)`` for any other pixel format. The message names it.
     public func withDepthImage<R>(
         _ buffer: CVPixelBuffer, confidence: CVPixelBuffer? = nil, _ body: (DepthImage) throws -> R
     ) throws -> R {
@@ -71,7 +71,7 @@
     }
 
     extension CMTime {
-        /// Nanoseconds, as ``Frame/timestampNs`` takes them.
+        /// The time in nanoseconds, for ``Frame/timestampNs``.
         public var phasefrontTimestampNs: UInt64 {
             let time = CMTimeConvertScale(self, timescale: 1_000_000_000, method: .roundTowardZero)
             return UInt64(max(0, time.value))
@@ -87,7 +87,7 @@
         return try body()
     }
 
-    /// Plane `index` of a locked buffer.
+    /// Returns plane `index` of a locked buffer.
     private func plane(_ index: Int, of buffer: CVPixelBuffer, pixelStride: Int) throws -> Plane {
         let isPlanar = CVPixelBufferIsPlanar(buffer)
         let address =

@@ -4,7 +4,7 @@
     import os
 
     extension Log {
-        /// Sends messages of `level` and above to the system's log, where Console and Xcode show them under the category
+        /// Sends messages of `level` and above to the system log. Console and Xcode show them under the category
         /// "phasefront".
         public static func sendToSystem(_ level: LogLevel = .info) throws {
             let logger = Logger(subsystem: Bundle.main.bundleIdentifier ?? "phasefront", category: "phasefront")
@@ -20,11 +20,11 @@
     }
 
     extension Trace {
-        /// Sends stages to Instruments, which shows them under os_signpost, in the category "phasefront".
+        /// Sends the stages to Instruments, which shows them under os_signpost in the category "phasefront".
         public static func sendToInstruments() throws {
             let log = OSLog(subsystem: Bundle.main.bundleIdentifier ?? "phasefront", category: "phasefront")
             try send { stage, begins in
-                // Stages of one thread have one identity.
+                // The stages of one thread share an identifier.
                 let id = OSSignpostID(log: log, object: Thread.current)
                 os_signpost(begins ? .begin : .end, log: log, name: stage.signpost, signpostID: id)
             }
@@ -32,7 +32,7 @@
     }
 
     extension Stage {
-        /// Signposts want names that are known when they are compiled.
+        /// The name of the signpost, which must be known at compile time.
         fileprivate var signpost: StaticString {
             switch self {
             case .frame: "frame"
@@ -50,7 +50,7 @@
     }
 
     extension Thermal {
-        /// What `ProcessInfo.processInfo.thermalState` says.
+        /// Converts `ProcessInfo.processInfo.thermalState`.
         public init(_ state: ProcessInfo.ThermalState) {
             self =
                 switch state {

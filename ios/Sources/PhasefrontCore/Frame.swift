@@ -1,20 +1,20 @@
 import Foundation
 
-/// One plane of an image in memory that the platform handed out. It is read while the call lasts that the frame is
-/// given to, and not kept.
+/// One plane of an image in memory that the platform owns. A session reads it only during the call that takes the
+/// frame.
 public struct Plane: Sendable {
-    /// The memory, from the first pixel of the first row on.
+    /// The memory, starting at the first pixel of the first row.
     public var bytes: Data
-    /// Where the pixels lie in it.
+    /// The strides of rows and pixels.
     public var info: PlaneInfo
 
-    /// A plane of rows `rowStride` bytes apart, pixels `pixelStride` bytes apart.
+    /// Creates a plane whose rows are `rowStride` bytes apart and whose pixels are `pixelStride` bytes apart.
     public init(bytes: Data, rowStride: Int, pixelStride: Int) {
         self.bytes = bytes
         info = PlaneInfo(rowStride: UInt32(clamping: rowStride), pixelStride: UInt32(clamping: pixelStride))
     }
 
-    /// A plane at `address`, which is not copied: the memory must stay as long as the plane is used.
+    /// Creates a plane at `address` without a copy. The memory must stay valid as long as the plane is used.
     public init(unsafeAddress address: UnsafeRawPointer, count: Int, rowStride: Int, pixelStride: Int) {
         let memory = UnsafeMutableRawPointer(mutating: address)
         self.init(
@@ -23,22 +23,22 @@ public struct Plane: Sendable {
     }
 }
 
-/// A colour image as a camera gives it.
+/// A colour image from a camera.
 public struct ColourImage: Sendable {
-    /// How it lies in memory.
+    /// The memory layout.
     public var format: ColourFormat
-    /// Pixels along x, as the sensor gives them.
+    /// The width in pixels, in the sensor's orientation.
     public var width: Int
-    /// Pixels along y.
+    /// The height in pixels.
     public var height: Int
-    /// Its planes, in the format's order.
+    /// The planes, in the order of the format.
     public var planes: [Plane]
-    /// The matrix of luma and chroma; other formats do not look at it.
+    /// The matrix of luma and chroma. RGB formats ignore it.
     public var matrix: YuvMatrix
-    /// Whether luma runs over 16...235 and chroma over 16...240; other formats do not look at it.
+    /// Whether luma spans 16...235 and chroma 16...240. RGB formats ignore it.
     public var videoRange: Bool
 
-    /// An image of planes that lie anywhere.
+    /// Creates an image of planes with any strides.
     public init(
         format: ColourFormat, width: Int, height: Int, planes: [Plane], matrix: YuvMatrix = .bt601,
         videoRange: Bool = false
@@ -51,7 +51,7 @@ public struct ColourImage: Sendable {
         self.videoRange = videoRange
     }
 
-    /// An image of one plane without gaps.
+    /// Creates an image of one plane without gaps.
     public init(format: ColourFormat, width: Int, height: Int, bytes: Data) {
         let pixel = format == .rgb ? 3 : 4
         self.init(
@@ -60,18 +60,18 @@ public struct ColourImage: Sendable {
     }
 }
 
-/// How sure a depth image's readings are.
+/// The confidence of each reading of a depth image.
 public struct ConfidenceMap: Sendable {
-    /// How it lies in memory.
+    /// The memory layout.
     public var format: ConfidenceFormat
-    /// Pixels along x: as many as the depth has.
+    /// The width in pixels, equal to that of the depth image.
     public var width: Int
-    /// Pixels along y: as many as the depth has.
+    /// The height in pixels, equal to that of the depth image.
     public var height: Int
-    /// Its plane.
+    /// The plane.
     public var plane: Plane
 
-    /// A map whose plane lies anywhere.
+    /// Creates a map whose plane has any strides.
     public init(format: ConfidenceFormat, width: Int, height: Int, plane: Plane) {
         self.format = format
         self.width = width
@@ -80,20 +80,20 @@ public struct ConfidenceMap: Sendable {
     }
 }
 
-/// A depth image as a sensor gives it.
+/// A depth image from a sensor.
 public struct DepthImage: Sendable {
-    /// How it lies in memory.
+    /// The memory layout.
     public var format: DepthFormat
-    /// Pixels along x, as the sensor gives them.
+    /// The width in pixels, in the sensor's orientation.
     public var width: Int
-    /// Pixels along y.
+    /// The height in pixels.
     public var height: Int
-    /// Its plane.
+    /// The plane.
     public var plane: Plane
-    /// How sure its readings are, where that is known.
+    /// The confidence of the readings, if known.
     public var confidence: ConfidenceMap?
 
-    /// An image whose plane lies anywhere.
+    /// Creates an image whose plane has any strides.
     public init(
         format: DepthFormat, width: Int, height: Int, plane: Plane, confidence: ConfidenceMap? = nil
     ) {
@@ -104,7 +104,7 @@ public struct DepthImage: Sendable {
         self.confidence = confidence
     }
 
-    /// An image of one plane without gaps.
+    /// Creates an image of one plane without gaps.
     public init(format: DepthFormat, width: Int, height: Int, bytes: Data) {
         let plane = Plane(bytes: bytes, rowStride: format.pixelBytes * width, pixelStride: format.pixelBytes)
         self.init(format: format, width: width, height: height, plane: plane)
@@ -112,7 +112,7 @@ public struct DepthImage: Sendable {
 }
 
 extension DepthFormat {
-    /// Bytes of a pixel.
+    /// The number of bytes per pixel.
     public var pixelBytes: Int {
         switch self {
         case .normalizedU8: 1
@@ -123,24 +123,24 @@ extension DepthFormat {
 }
 
 extension Orientation {
-    /// As the sensor gives it.
+    /// The orientation of an image that is already upright.
     public static let upright = Orientation(rotation: .upright, mirrored: false)
 }
 
-/// Colour and depth of one moment.
+/// A colour image and a depth image of the same moment.
 public struct Frame: Sendable {
-    /// When it was taken, in nanoseconds of any clock that runs forward.
+    /// The capture time in nanoseconds of any monotonic clock.
     public var timestampNs: UInt64
     /// The colour image.
     public var colour: ColourImage
     /// The depth image.
     public var depth: DepthImage
-    /// How both must be turned to stand upright.
+    /// The rotation that brings both images upright.
     public var orientation: Orientation
-    /// How the pixels of depth and colour correspond; nil where both show the same field of view.
+    /// The two cameras, if they are apart; nil if both images show the same field of view.
     public var cameras: Cameras?
 
-    /// A frame of both, upright and of one field of view unless it is said.
+    /// Creates a frame of both images. By default they are upright and share a field of view.
     public init(
         timestampNs: UInt64, colour: ColourImage, depth: DepthImage, orientation: Orientation = .upright,
         cameras: Cameras? = nil
@@ -170,7 +170,7 @@ public struct Frame: Sendable {
 
     var confidenceBytes: Data { depth.confidence?.plane.bytes ?? Data() }
 
-    /// The bytes of colour plane `index`; empty behind the last.
+    /// Returns the bytes of colour plane `index`, or no bytes if there is no such plane.
     func colourBytes(_ index: Int) -> Data {
         index < colour.planes.count ? colour.planes[index].bytes : Data()
     }

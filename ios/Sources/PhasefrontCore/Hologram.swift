@@ -2,21 +2,21 @@ import Foundation
 
 /// A colour of a hologram.
 public enum Colour: UInt32, CaseIterable, Sendable {
-    /// The red laser's.
+    /// The red laser.
     case red
-    /// The green laser's.
+    /// The green laser.
     case green
-    /// The blue laser's.
+    /// The blue laser.
     case blue
 
-    /// The one of a display of one laser.
+    /// The colour of a display with a single laser.
     public static let laser = Colour.red
 }
 
-/// The hologram of one frame: modulator levels of three colours, or of one laser, and what is known of them. Its memory
-/// goes back to the session when the last reference to it is gone.
+/// The hologram of one frame: modulator levels of three colours or of a single laser, with metadata. The session reuses
+/// its memory when the last reference to it is gone.
 public final class Hologram: Sendable {
-    /// What is known of it.
+    /// The metadata of the hologram.
     public let info: HologramInfo
     let raw: RawHologram
 
@@ -26,7 +26,7 @@ public final class Hologram: Sendable {
     }
 
     /// Reads the levels of `colour` in place: `info.width` × `info.height` bytes, row by row without gaps. The pointer
-    /// is valid in `body` only.
+    /// is valid only in `body`.
     public func withPlane<R>(_ colour: Colour, _ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
         let (address, count) = try (raw.planeAddress(colour: colour.rawValue), raw.planeLen())
         return try withExtendedLifetime(self) {
@@ -34,50 +34,52 @@ public final class Hologram: Sendable {
         }
     }
 
-    /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, in mm: where to focus
-    /// when it is tapped on.
+    /// Returns the z in mm of the scene point at (`x`, `y`) of the image, each 0 to 1 from the upper left corner. Use
+    /// it to focus on a tapped point.
     public func z(atX x: Double, y: Double) throws -> Double {
         try raw.zAt(x: x, y: y)
     }
 
-    /// What an eye focused at `zMm` sees: red, green, blue, alpha. Takes some milliseconds; not for the main thread.
+    /// Returns the displayed image for an eye focused at `zMm`: red, green, blue, alpha. It takes some milliseconds, so
+    /// do not call it on the main thread.
     public func preview(zMm: Double, width: Int, height: Int) throws -> PixelImage {
         try PixelImage(
             raw.preview(zMm: zMm, width: UInt32(clamping: width), height: UInt32(clamping: height)))
     }
 
-    /// What an eye focused at `zMm` sees of the whole hologram: amplitudes, of which 1 is white. Transforms all
-    /// of it; not for the main thread.
+    /// Returns the displayed image of the whole hologram for an eye focused at `zMm`, as amplitudes; 1 is white. It
+    /// transforms the whole hologram, so do not call it on the main thread.
     ///
-    /// - Throws: ``PhasefrontError/Setting(message:)`` for a z too far away.
+    /// - Throws: ``PhasefrontError/Setting(message:)`` if z is too far away.
     public func refocus(zMm: Double) throws -> Planes {
         try Planes(raw.refocus(zMm: zMm))
     }
 
-    /// The complex field that the levels make behind the aperture at `zMm`, 0 the midpoint, without the carrier: real
-    /// and imaginary part of each pixel. Transforms all of the hologram; not for the main thread.
+    /// Returns the complex field of the levels behind the aperture at `zMm` (0 is the midpoint), without the carrier:
+    /// the real and imaginary part of each pixel. It transforms the whole hologram, so do not call it on the main
+    /// thread.
     ///
-    /// - Throws: ``PhasefrontError/Setting(message:)`` for a z too far away.
+    /// - Throws: ``PhasefrontError/Setting(message:)`` if z is too far away.
     public func field(zMm: Double = 0) throws -> Planes {
         try Planes(raw.field(zMm: zMm))
     }
 
-    /// Image `index` of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
-    /// layouts but grey have one.
+    /// Returns image `index` of the images for the modulator's driver, at the modulator's resolution, with unchanged
+    /// levels. All layouts except grey have one image.
     public func output(_ placement: Placement = Placement(layout: .rgba), image index: Int = 0) throws -> PixelImage {
         try PixelImage(raw.output(placement: placement, image: UInt32(clamping: index)))
     }
 }
 
-/// Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
+/// The amplitudes or the complex field of a hologram, for each pixel and colour.
 public final class Planes: Sendable {
-    /// Pixels along x.
+    /// The width in pixels.
     public let width: Int
-    /// Pixels along y.
+    /// The height in pixels.
     public let height: Int
-    /// How many planes there are: 3, or 1 of a display of one laser.
+    /// The number of planes: 3, or 1 for a display with a single laser.
     public let colours: Int
-    /// Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.
+    /// The numbers per pixel: 1 for an amplitude, 2 for a real and an imaginary part.
     public let numbers: Int
     let raw: RawPlanes
 
@@ -89,10 +91,10 @@ public final class Planes: Sendable {
         numbers = try Int(raw.pixelBytes()) / MemoryLayout<Float>.size
     }
 
-    /// Reads the plane of `colour` in place: `height` rows of `width` pixels without gaps. The pointer is valid in
-    /// `body` only.
+    /// Reads the plane of `colour` in place: `height` rows of `width` pixels without gaps. The pointer is valid only in
+    /// `body`.
     ///
-    /// - Throws: ``PhasefrontError/Setting(message:)`` for a colour that it has not.
+    /// - Throws: ``PhasefrontError/Setting(message:)`` if there is no plane of this colour.
     public func withPlane<R>(_ colour: Colour, _ body: (UnsafeBufferPointer<Float>) throws -> R) throws -> R {
         let address = try raw.planeAddress(colour: colour.rawValue)
         return try withExtendedLifetime(self) {
@@ -102,13 +104,13 @@ public final class Planes: Sendable {
     }
 }
 
-/// An image, row by row without gaps.
+/// An image whose rows have no gaps.
 public final class PixelImage: Sendable {
-    /// Pixels along x.
+    /// The width in pixels.
     public let width: Int
-    /// Pixels along y.
+    /// The height in pixels.
     public let height: Int
-    /// Bytes of a pixel.
+    /// The number of bytes per pixel.
     public let pixelBytes: Int
     let raw: RawImage
 
@@ -119,7 +121,7 @@ public final class PixelImage: Sendable {
         pixelBytes = try Int(raw.pixelBytes())
     }
 
-    /// Reads the image in place. The pointer is valid in `body` only.
+    /// Reads the image in place. The pointer is valid only in `body`.
     public func withBytes<R>(_ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
         let (address, count) = try (raw.address(), raw.byteLen())
         return try withExtendedLifetime(self) {

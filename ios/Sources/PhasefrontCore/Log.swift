@@ -1,8 +1,8 @@
 import Foundation
 
-/// What the library has to say while it works.
+/// The log messages of the library.
 public enum Log {
-    /// Sends messages of `level` and above to `handler`, which is called on any thread; nil for silence.
+    /// Sends messages of `level` and above to `handler`, which may be called on any thread. nil turns them off.
     public static func send(_ level: LogLevel, to handler: (@Sendable (LogLevel, String) -> Void)?) throws {
         try setLogListener(level: level, listener: handler.map(Handler.init))
     }

@@ -1,8 +1,8 @@
 import Foundation
 
-/// The notices of what the library carries of others, Markdown: an app shows them where it shows its own.
+/// Returns the third-party notices of the library as Markdown. An app must show them with its own notices.
 ///
-/// - Throws: where the package's resources are not bundled with the app.
+/// - Throws: An error if the package's resources are not bundled with the app.
 public func thirdPartyNotices() throws -> String {
     guard let file = Bundle.module.url(forResource: "THIRD-PARTY", withExtension: "md") else {
         throw CocoaError(.fileReadNoSuchFile)

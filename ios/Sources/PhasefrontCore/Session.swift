@@ -1,7 +1,7 @@
 import Foundation
 
-/// Frames in, holograms out. Every call may come from any thread, at any moment. ``process(_:)``, ``warmUp()`` and
-/// ``close()`` wait for a frame: not for the main thread.
+/// A session that turns frames into holograms. Every method may be called from any thread at any time.
+/// ``process(_:)``, ``warmUp()`` and ``close()`` wait for a frame, so do not call them on the main thread.
 ///
 /// ```swift
 /// let session = try Session(SessionOptions(), mode: .image)
@@ -9,15 +9,15 @@ import Foundation
 /// try hologram.withPlane(.green) { levels in print(levels.count) }
 /// ```
 public final class Session: Sendable {
-    /// What becomes of the frames of a live stream; for one reader. Empty where a listener hears it, and in the other
-    /// running modes.
+    /// The events of a live stream, for one reader. Empty if the session has a listener, and in the other running
+    /// modes.
     public let events: SessionEvents
     private let raw: RawSession
 
-    /// A session that runs in `mode`. In a live stream `listener` is called on the session's own thread, one event
-    /// after another, and no frame is processed while it is busy; without one, read ``events``.
+    /// Creates a session that runs in `mode`. A live stream calls `listener` on its own thread, one event after
+    /// another, and processes no frame during the call. Without a listener, read ``events``.
     ///
-    /// - Throws: ``PhasefrontError``: options that cannot be meant or planned for.
+    /// - Throws: ``PhasefrontError`` if the options are invalid or cannot be planned for.
     public init(
         _ options: SessionOptions, mode: RunningMode, listener: (@Sendable (SessionEvent) -> Void)? = nil
     ) throws {
@@ -34,14 +34,14 @@ public final class Session: Sendable {
     }
 
     deinit {
-        // Nobody is left to tell what went wrong.
+        // Nothing is left to report an error to.
         try? close()
     }
 
-    /// The hologram of `frame`, in an image or a video session. Waits for it.
+    /// Returns the hologram of `frame`, in an image or a video session. Blocks until it is done.
     ///
-    /// - Throws: ``PhasefrontError``: a frame that is not usable or late, or a session that is a live stream, paused or
-    ///   closed. None of them harms the frames that follow.
+    /// - Throws: ``PhasefrontError`` if the frame is unusable or late, or if the session is a live stream, paused or
+    ///   closed. Later frames are not affected.
     public func process(_ frame: Frame) throws -> Hologram {
         try Hologram(
             raw.process(
@@ -49,11 +49,11 @@ public final class Session: Sendable {
                 depth: frame.depth.plane.bytes, confidence: frame.confidenceBytes, info: frame.info))
     }
 
-    /// Hands `frame` to a live stream, which copies it and goes on by itself: it never waits for a frame to be
-    /// processed. Gives why the frame was dropped, if it was at once; that is an event, too.
+    /// Submits `frame` to a live stream, which copies it. Never waits for a frame to be processed. Returns the reason
+    /// if the frame was dropped at once; that is also an event.
     ///
-    /// - Throws: ``PhasefrontError``: a frame that is not usable or late, or a session that is no live stream or is
-    ///   closed. None of them harms the frames that follow.
+    /// - Throws: ``PhasefrontError`` if the frame is unusable or late, or if the session is not a live stream or is
+    ///   closed. Later frames are not affected.
     @discardableResult
     public func submit(_ frame: Frame) throws -> DropReason? {
         try raw.submit(
@@ -61,60 +61,60 @@ public final class Session: Sendable {
             depth: frame.depth.plane.bytes, confidence: frame.confidenceBytes, info: frame.info)
     }
 
-    /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+    /// Processes an empty frame, so that the first real frame is as fast as the later ones. Blocks until it is done.
     public func warmUp() throws { try raw.warmUp() }
 
-    /// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
+    /// Discards all earlier frames, including one in progress. The next frame may have any timestamp.
     public func reset() throws { try raw.reset() }
 
-    /// Takes no frames until ``resume()``.
+    /// Stops accepting frames until ``resume()``.
     public func pause() throws { try raw.pause() }
 
-    /// Takes frames again.
+    /// Accepts frames again.
     public func resume() throws { try raw.resume() }
 
-    /// Says how hot the device is.
+    /// Reports how hot the device is.
     public func setThermal(_ thermal: Thermal) throws { try raw.setThermal(thermal: thermal) }
 
-    /// Allows or forbids changes of the quality level.
+    /// Sets whether the session may change its quality level.
     public func setQuality(_ quality: Quality) throws { try raw.setQuality(quality: quality) }
 
-    /// What the session has done so far; of a closed one, what it did. Never waits for a frame.
+    /// Returns the session's statistics, also after it is closed. Never blocks on a frame.
     public func statistics() throws -> Statistics { try raw.statistics() }
 
-    /// Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all
-    /// events have been told; called by the listener of a session, it returns at once. ``events`` ends behind the last.
+    /// Stops accepting frames and frees the memory. Returned holograms stay valid. Waits until all events are
+    /// delivered, unless a session's listener calls it; then it returns at once. ``events`` ends after the last event.
     /// Closing twice does nothing.
     public func close() throws { try raw.shutDown() }
 }
 
 extension SessionOptions {
-    /// The default options for `display`: holograms of its resolution by `method` and AA-DPM, or, without one, by the
-    /// network that is built in, by the plane sweep where that was not trained for it. Change what is not.
+    /// Creates the default options for `display`: holograms at its resolution by `method` and AA-DPM. Without a method,
+    /// the built-in network is used, or the plane sweep if that network was not trained for the display.
     ///
-    /// - Throws: ``PhasefrontError/Display(message:)`` for a display that cannot be.
+    /// - Throws: ``PhasefrontError/Display(message:)`` for an impossible display.
     public init(display: Display = Display(), method: Method? = nil) throws {
         try self.init(target: Target.ofDisplay(display: display), method: method)
     }
 
-    /// The same by `network`.
+    /// Creates the default options for `display` and `network`.
     public init(display: Display = Display(), network: Network) throws {
         try self.init(display: display, method: .trained(network: network))
     }
 
-    /// The same for `target`, a display that is calibrated.
+    /// Creates the default options for `target`, a calibrated display.
     public init(target: Target, method: Method? = nil) throws {
         self = try sessionOptions(target: target, method: method)
     }
 
-    /// The same for `target` by `network`.
+    /// Creates the default options for `target` and `network`.
     public init(target: Target, network: Network) throws {
         try self.init(target: target, method: .trained(network: network))
     }
 }
 
 extension PhasefrontError: LocalizedError, CustomStringConvertible {
-    /// The message: one line that names what is wrong and what would be right.
+    /// The error message: one line that names the problem and the remedy.
     public var message: String {
         switch self {
         case .Display(let message), .Frame(let message), .Timestamp(let message), .Setting(let message),
@@ -123,8 +123,8 @@ extension PhasefrontError: LocalizedError, CustomStringConvertible {
         }
     }
 
-    /// The message.
+    /// The error message, as ``message``.
     public var errorDescription: String? { message }
-    /// The message.
+    /// The error message, as ``message``.
     public var description: String { message }
 }

@@ -1,9 +1,9 @@
 import Foundation
 
-/// When the stages of frames begin and end.
+/// The begin and end of each stage of a frame.
 public enum Trace {
-    /// Calls `handler` with each stage that begins (true) or ends (false), on the thread that computes it, where stages
-    /// lie within one another; nil for silence. It must not call the library.
+    /// Calls `handler` with each stage that begins (true) or ends (false), on the thread that computes it. Stages on a
+    /// thread are nested. nil turns the calls off. The handler must not call the library.
     public static func send(to handler: (@Sendable (Stage, Bool) -> Void)?) throws {
         try setStageListener(listener: handler.map(Handler.init))
     }

@@ -3,7 +3,7 @@ import XCTest
 
 @testable import PhasefrontCore
 
-/// Measures what the way to the library and back costs: a camera frame in, three planes of 1080p out. `tests/border` runs it for
+/// Measures the cost of a call to the library: a camera frame in, three planes of 1080p out. `tests/border` runs it for
 /// many frames.
 final class BorderTests: XCTestCase {
     func testCost() throws {

@@ -3,7 +3,7 @@ import XCTest
 
 @testable import PhasefrontCore
 
-/// The conformance suite, run from Swift: the levels must be those of the suite, and Rust's to the bit.
+/// Runs the conformance suite from Swift: the levels must match the suite, and match Rust bit for bit.
 final class ConformanceTests: XCTestCase {
     private struct Suite: Decodable {
         let cases: [Case]
@@ -32,7 +32,7 @@ final class ConformanceTests: XCTestCase {
         let offset, length, row_stride, pixel_stride: Int
 
         func plane(_ frames: Data) -> Plane {
-            // A slice, whose indices do not begin at 0.
+            // A slice whose indices do not start at 0.
             Plane(bytes: frames[offset..<offset + length], rowStride: row_stride, pixelStride: pixel_stride)
         }
     }
@@ -115,7 +115,7 @@ final class ConformanceTests: XCTestCase {
         return try Target.withLookUpTable(display: display, levels: Data(levels))
     }
 
-    /// The levels of a case's frames; what is seen of them is put behind `seen`.
+    /// Returns the levels of a case's frames and appends their displayed images to `seen`.
     private func levels(_ one: Case, _ frames: Data, _ seen: inout Data) throws -> Data {
         var options = try SessionOptions(target: target(one), method: method(one.method))
         options.encoding = try encoding(one.encoding)
@@ -146,7 +146,7 @@ final class ConformanceTests: XCTestCase {
             let rust = URL(fileURLWithPath: rust)
             let levels = try Data(contentsOf: rust.appendingPathComponent("levels.bin"))
             XCTAssertEqual(got.reduce(Data(), +), levels, "not the bits that Rust has")
-            // Sines are the C library's, which need not be the one that Rust had.
+            // Sines come from the C library, which may differ from that of the Rust run.
             let apart = try zip(floats(seen), floats(Data(contentsOf: rust.appendingPathComponent("seen.bin"))))
                 .map { abs($0 - $1) }
             XCTAssertEqual(4 * apart.count, seen.count)

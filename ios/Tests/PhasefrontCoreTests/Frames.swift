@@ -7,7 +7,7 @@ let smallDisplay = Display(width: 64, height: 48)
 
 func options() throws -> SessionOptions { try SessionOptions(display: smallDisplay, network: network.get()) }
 
-/// RGBA of 64×48 with something in it.
+/// Returns an RGBA image of 64×48 pixels that is not uniform.
 func colourBytes() -> Data {
     var bytes = Data()
     for y in 0..<48 {
@@ -16,7 +16,7 @@ func colourBytes() -> Data {
     return bytes
 }
 
-/// Metres of 32×24: something before a wall.
+/// Returns 32×24 depths in metres: an object in front of a wall.
 func depthBytes(metres: Float = 0.5) -> Data {
     var bytes = Data()
     for y in 0..<24 {
@@ -45,7 +45,7 @@ extension Hologram {
 }
 
 extension Planes {
-    /// The numbers of all planes, in the order in which they lie.
+    /// The numbers of all planes, in memory order.
     func bytes() throws -> Data {
         try Colour.allCases.prefix(colours).reduce(into: Data()) { all, colour in
             try withPlane(colour) { all.append(Data(buffer: $0)) }

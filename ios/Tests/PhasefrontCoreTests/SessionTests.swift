@@ -5,7 +5,7 @@ import XCTest
 
 /// Tests sessions from Swift: threads, live streams, misuse and memory.
 final class SessionTests: XCTestCase {
-    /// The message of the `PhasefrontError` that `call` throws.
+    /// Returns the message of the `PhasefrontError` that `call` throws.
     private func message<T>(_ call: () throws -> T, line: UInt = #line) -> String {
         do {
             _ = try call()
@@ -365,7 +365,7 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual(heard.filter { !$0.1 }.map(\.0), [.colour, .depth, .method, .propagate, .encode, .frame])
     }
 
-    // Linux alone tells it so.
+    // Only Linux reports it this way.
     #if os(Linux)
         func testMemoryOfTenThousandFramesIsFlat() throws {
             func residentMb() throws -> Double {

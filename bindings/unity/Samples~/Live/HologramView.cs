@@ -1,5 +1,5 @@
-// Shows holograms of a camera's colour and depth textures on a screen that is the modulator: put it on an object with a
-// RawImage that fills the modulator's display, and call Submit for each frame.
+// Shows holograms of a camera's colour and depth textures on a screen that drives the modulator. Put it on an object
+// with a RawImage that fills the modulator's display, and call Submit for each frame.
 using System.Collections.Concurrent;
 using Phasefront;
 using UnityEngine;
@@ -38,7 +38,7 @@ public sealed class HologramView : MonoBehaviour, IListener
         while (made.TryDequeue(out var hologram))
             using (hologram)
             {
-                // Unity's first row is the lowest.
+                // The first row of a Unity texture is the lowest.
                 texture.LoadRawTextureData(hologram.Output(Layout.Rgba, flipY: true).Bytes);
                 texture.Apply();
             }

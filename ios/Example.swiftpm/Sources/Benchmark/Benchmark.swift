@@ -1,13 +1,13 @@
 import Foundation
 
-// Beside the app this is compiled on Linux too, where its tests run and only the core is.
+// This file is also compiled on Linux for its tests, where only the core is available.
 #if canImport(Phasefront)
     import Phasefront
 #else
     import PhasefrontCore
 #endif
 
-/// The stages of a frame, as a session times them.
+/// The stages of a frame that a session measures.
 enum Stage: String, CaseIterable, Codable, Sendable {
     case colour, depth, method, propagate, encode, total
 
@@ -23,11 +23,11 @@ enum Stage: String, CaseIterable, Codable, Sendable {
     }
 }
 
-/// Times of one stage, milliseconds: median, quartiles and ends, each one of the times.
+/// The times of one stage in milliseconds: minimum, quartiles and maximum, each a measured time.
 struct Spread: Codable, Equatable, Sendable {
     let least, lower, median, upper, most: Double
 
-    /// Of at least one time.
+    /// Computes the spread of at least one time.
     init(_ times: [Double]) {
         let sorted = times.sorted()
         let at = { (quarters: Int) in sorted[(sorted.count - 1) * quarters / 4] }
@@ -35,22 +35,22 @@ struct Spread: Codable, Equatable, Sendable {
     }
 }
 
-/// What is timed: frames by `method`, corrected by `localSteps` and nothing else, and the stage that the run is about;
-/// where one is nil, the default.
+/// A benchmark run: the method and the correction steps of its frames, and the stage that it measures. nil means the
+/// default; with steps, there is no other correction.
 struct Run: Sendable {
     let name: String
     let stage: Stage
     var method: Method?
     var localSteps: UInt32? = 0
 
-    /// Its options on `display`.
+    /// Returns the options of the run for `display`.
     func options(_ display: Display) throws -> SessionOptions {
         var options = try SessionOptions(display: display, method: method)
         if let localSteps { (options.darkThreshold, options.localSteps) = (0, localSteps) }
         return options
     }
 
-    /// Networks of 8, 15 and `deep`'s layers, the plane sweep, one step of correction, and the default.
+    /// Returns the runs: networks of 8, 15 and `deep`'s layers, the plane sweep, one correction step, and the default.
     static func all(deep: Network) throws -> [Run] {
         let shallow = try Method.trained(network: Network.builtIn(name: "rgbd-8"))
         return try [
@@ -64,16 +64,16 @@ struct Run: Sendable {
     }
 }
 
-/// What the system tells of heat and energy; what it does not know is left out.
+/// The thermal and power state of the device. Unknown values are nil.
 struct Conditions: Codable, Equatable, Sendable {
-    /// nominal, fair, serious or critical.
+    /// The thermal state: nominal, fair, serious or critical.
     var thermal: String?
     var batteryPercent: Double?
     var charging: Bool?
     var savesPower: Bool?
 }
 
-/// What was timed in one run, or why it was refused.
+/// The result of one run: its times, or the reason why it was refused.
 struct Outcome: Codable, Sendable {
     let name: String
     let stage: Stage
@@ -83,11 +83,11 @@ struct Outcome: Codable, Sendable {
     var frames: Int?
     var seconds: Double?
     var backend, why: String?
-    /// By the names of the stages.
+    /// The times by stage name.
     var stagesMs: [String: Spread]?
     var refused: String?
 
-    /// For the screen.
+    /// The line for the screen.
     var line: String {
         let size = "\(width)×\(height) \(name): "
         guard let of = stagesMs?[stage.rawValue] else { return size + (refused ?? "") }
@@ -95,21 +95,21 @@ struct Outcome: Codable, Sendable {
     }
 }
 
-/// What an app knows of its device.
+/// The description of the device.
 struct Device: Codable, Sendable {
     let model, system: String
     let cores: Int
 }
 
-/// What is kept and shared.
+/// The record that the app saves and shares.
 struct Record: Codable, Sendable {
     let phasefront: String
     let device: Device
-    /// ISO 8601.
+    /// The start time in ISO 8601.
     let begun: String
     let runs: [Outcome]
 
-    /// Its JSON, whose names are those of Android's record.
+    /// Returns the record as JSON with the same keys as on Android.
     func json() throws -> Data {
         let encoder = JSONEncoder()
         encoder.keyEncodingStrategy = .convertToSnakeCase
@@ -118,19 +118,19 @@ struct Record: Codable, Sendable {
     }
 }
 
-/// Times `runs` at every size of `displays`: two frames to warm up, then `frames` of them. `scene` gives the frame to
-/// time, and `conditions` what the system tells, which each run asks for before and behind it.
+/// Measures `runs` at every size of `displays`: two frames to warm up, then `frames` frames. `scene` returns the frame
+/// to process, and `conditions` the state of the device, which is read before and after each run.
 struct Benchmark: Sendable {
     let runs: [Run]
-    /// The modulator of the documents, and the size of the example app's holograms.
+    /// The modulator of the documentation, and the size of the example app's holograms.
     var displays = [Display(), Display(width: 960, height: 540)]
-    /// So many that the quartiles are times of frames.
+    /// With this count, each quartile is the time of one frame.
     var frames = 9
     let scene: @Sendable () throws -> Frame
     let conditions: @Sendable () async -> Conditions
 
-    /// What all runs gave; `told` hears the line of each. A run that is refused says why, and the others go on. Ends
-    /// early, with what there is, where its task is cancelled.
+    /// Returns the results of all runs and passes the line of each to `told`. A refused run records the reason, and the
+    /// others continue. Returns the results so far if the task is cancelled.
     func outcomes(_ told: @Sendable (String) async -> Void) async throws -> [Outcome] {
         var outcomes: [Outcome] = []
         for display in displays {

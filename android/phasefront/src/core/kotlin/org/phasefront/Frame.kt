@@ -3,14 +3,14 @@ package org.phasefront
 import java.nio.ByteBuffer
 
 /**
- * One plane of an image in memory that the platform handed out: the bytes of [buffer] from its position to its limit. It
- * must be a direct buffer, as the platform's are. It is read while the call lasts that the frame is given to, and not kept.
+ * One plane of an image in memory that the platform owns: the bytes of [buffer] from its position to its limit. It must
+ * be a direct buffer, as the platform's buffers are. A session reads it only during the call that takes the frame.
  */
 public class Plane(
     public val buffer: ByteBuffer,
-    /** Bytes from one row to the next. */
+    /** The bytes from one row to the next. */
     public val rowStride: Int,
-    /** Bytes from one pixel to the next in a row. */
+    /** The bytes from one pixel to the next in a row. */
     public val pixelStride: Int,
 ) {
     internal fun info(what: String): PlaneInfo {
@@ -20,34 +20,34 @@ public class Plane(
         return PlaneInfo(rowStride.toUInt(), pixelStride.toUInt())
     }
 
-    /** The bytes, in a buffer that begins with them. */
+    /** Returns the bytes in a buffer that begins with them. */
     internal fun bytes(what: String): ByteBuffer = buffer.direct {
         PhasefrontException.Frame("frame: $what is $it; a direct one is needed, from the camera or ByteBuffer.allocateDirect")
     }
 }
 
-/** The bytes from the position to the limit of a direct buffer, in a buffer that begins with them. */
+/** Returns the bytes of a direct buffer from its position to its limit, in a buffer that begins with them. */
 internal fun ByteBuffer.direct(refused: (String) -> PhasefrontException): ByteBuffer {
     if (!isDirect) throw refused("in a buffer on the Java heap")
-    // What is generated passes the address of a buffer's beginning, whatever its position.
+    // The generated code passes the address of the buffer's start and ignores the position.
     return slice()
 }
 
-/** A colour image as a camera gives it. */
+/** A colour image from a camera. */
 public class ColourImage(
     public val format: ColourFormat,
-    /** Pixels along x, as the sensor gives them. */
+    /** The width in pixels, in the sensor's orientation. */
     public val width: Int,
-    /** Pixels along y. */
+    /** The height in pixels. */
     public val height: Int,
-    /** Its planes, in the format's order. */
+    /** The planes, in the order of the format. */
     public val planes: List<Plane>,
-    /** The matrix of luma and chroma; other formats do not look at it. */
+    /** The matrix of luma and chroma. RGB formats ignore it. */
     public val matrix: YuvMatrix = YuvMatrix.BT601,
-    /** Whether luma runs over 16..235 and chroma over 16..240; other formats do not look at it. */
+    /** Whether luma spans 16..235 and chroma 16..240. RGB formats ignore it. */
     public val videoRange: Boolean = false,
 ) {
-    /** An image of one plane without gaps. */
+    /** Creates an image of one plane without gaps. */
     public constructor(format: ColourFormat, width: Int, height: Int, bytes: ByteBuffer) : this(
         format,
         width,
@@ -56,28 +56,28 @@ public class ColourImage(
     )
 }
 
-/** How sure a depth image's readings are. */
+/** The confidence of each reading of a depth image. */
 public class ConfidenceMap(
     public val format: ConfidenceFormat,
-    /** Pixels along x: as many as the depth has. */
+    /** The width in pixels, equal to that of the depth image. */
     public val width: Int,
-    /** Pixels along y: as many as the depth has. */
+    /** The height in pixels, equal to that of the depth image. */
     public val height: Int,
     public val plane: Plane,
 )
 
-/** A depth image as a sensor gives it. */
+/** A depth image from a sensor. */
 public class DepthImage(
     public val format: DepthFormat,
-    /** Pixels along x, as the sensor gives them. */
+    /** The width in pixels, in the sensor's orientation. */
     public val width: Int,
-    /** Pixels along y. */
+    /** The height in pixels. */
     public val height: Int,
     public val plane: Plane,
-    /** How sure its readings are, where that is known. */
+    /** The confidence of the readings, if known. */
     public val confidence: ConfidenceMap? = null,
 ) {
-    /** An image of one plane without gaps. */
+    /** Creates an image of one plane without gaps. */
     public constructor(format: DepthFormat, width: Int, height: Int, bytes: ByteBuffer) : this(
         format,
         width,
@@ -86,7 +86,7 @@ public class DepthImage(
     )
 }
 
-/** Bytes of a pixel. */
+/** The number of bytes per pixel. */
 public val DepthFormat.pixelBytes: Int
     get() = when (this) {
         DepthFormat.NORMALIZED_U8 -> 1
@@ -94,15 +94,15 @@ public val DepthFormat.pixelBytes: Int
         else -> 2
     }
 
-/** Colour and depth of one moment. */
+/** A colour image and a depth image of the same moment. */
 public class Frame(
-    /** When it was taken, in nanoseconds of any clock that runs forward. */
+    /** The capture time in nanoseconds of any monotonic clock. */
     public val timestampNs: Long,
     public val colour: ColourImage,
     public val depth: DepthImage,
-    /** How both must be turned to stand upright. */
+    /** The rotation that brings both images upright. */
     public val orientation: Orientation = Orientation(Rotation.UPRIGHT, false),
-    /** How the pixels of depth and colour correspond; null where both show the same field of view. */
+    /** The two cameras, if they are apart; null if both images show the same field of view. */
     public val cameras: Cameras? = null,
 ) {
     internal fun info(): FrameInfo = FrameInfo(
@@ -140,5 +140,5 @@ public class Frame(
     }
 }
 
-/** Memory of a plane that a frame has not. */
+/** The memory of a missing plane. */
 private val empty: ByteBuffer = ByteBuffer.allocateDirect(0)

@@ -7,33 +7,33 @@ import java.nio.FloatBuffer
 
 /** A colour of a hologram. */
 public enum class Colour {
-    /** The red laser's. */
+    /** The red laser. */
     RED,
 
-    /** The green laser's. */
+    /** The green laser. */
     GREEN,
 
-    /** The blue laser's. */
+    /** The blue laser. */
     BLUE,
     ;
 
     public companion object {
-        /** The one of a display of one laser. */
+        /** The colour of a display with a single laser. */
         public val LASER: Colour = RED
     }
 }
 
 /**
- * The hologram of one frame: modulator levels of three colours, or of one laser, and what is known of them. Close it, so
- * that its memory goes back to the session at once and not whenever garbage is collected.
+ * The hologram of one frame: modulator levels of three colours or of a single laser, with metadata. Close it to return
+ * its memory to the session at once instead of at the next garbage collection.
  */
 public class Hologram internal constructor(private val raw: RawHologram) : AutoCloseable {
-    /** What is known of it. */
+    /** The metadata of the hologram. */
     public val info: HologramInfo = raw.info()
 
     /**
-     * Reads the levels of [colour] in place: width × height bytes, row by row without gaps. The buffer is valid in [body]
-     * only, also while another thread closes the hologram.
+     * Reads the levels of [colour] in place: width × height bytes, row by row without gaps. The buffer is valid only in
+     * [body], even if another thread closes the hologram meanwhile.
      */
     public fun <R> usePlane(colour: Colour, body: (ByteBuffer) -> R): R = open {
         it.share().use { shared ->
@@ -42,12 +42,15 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     }
 
     /**
-     * z of what is seen at ([x], [y]) of the picture, each 0 to 1 from its upper left corner, in mm: where to focus when it
-     * is tapped on.
+     * Returns the z in mm of the scene point at ([x], [y]) of the image, each 0 to 1 from the upper left corner. Use it
+     * to focus on a tapped point.
      */
     public fun zAt(x: Double, y: Double): Double = open { it.zAt(x, y) }
 
-    /** What an eye focused at [zMm] sees: red, green, blue, alpha. Takes some milliseconds; not for the main thread. */
+    /**
+     * Returns the displayed image for an eye focused at [zMm]: red, green, blue, alpha. It takes some milliseconds, so
+     * do not call it on the main thread.
+     */
     public fun preview(zMm: Double, width: Int, height: Int): PixelImage {
         if (width < 1 || height < 1) {
             throw PhasefrontException.Setting("a preview of $width×$height is empty; each side must be at least 1")
@@ -56,31 +59,32 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     }
 
     /**
-     * What an eye focused at [zMm] sees of the whole hologram: amplitudes, of which 1 is white. Transforms all of it;
-     * not for the main thread.
+     * Returns the displayed image of the whole hologram for an eye focused at [zMm], as amplitudes; 1 is white. It
+     * transforms the whole hologram, so do not call it on the main thread.
      *
-     * @throws PhasefrontException.Setting for a z too far away.
+     * @throws PhasefrontException.Setting if z is too far away.
      */
     public fun refocus(zMm: Double): Planes = Planes(open { it.refocus(zMm) })
 
     /**
-     * The complex field that the levels make behind the aperture at [zMm], 0 the midpoint, without the carrier: real
-     * and imaginary part of each pixel. Transforms all of the hologram; not for the main thread.
+     * Returns the complex field of the levels behind the aperture at [zMm] (0 is the midpoint), without the carrier:
+     * the real and imaginary part of each pixel. It transforms the whole hologram, so do not call it on the main
+     * thread.
      *
-     * @throws PhasefrontException.Setting for a z too far away.
+     * @throws PhasefrontException.Setting if z is too far away.
      */
     public fun field(zMm: Double = 0.0): Planes = Planes(open { it.field(zMm) })
 
     /**
-     * Image [index] of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
-     * layouts but grey have one.
+     * Returns image [index] of the images for the modulator's driver, at the modulator's resolution, with unchanged
+     * levels. All layouts except grey have one image.
      */
     public fun output(placement: Placement = Placement(Layout.RGBA), index: Int = 0): PixelImage {
         if (index < 0) throw PhasefrontException.Setting("there is no image $index; the first is 0")
         return PixelImage(open { it.output(placement, index.toUInt()) })
     }
 
-    /** Gives the memory back. Closing twice does nothing. */
+    /** Frees the memory. Closing twice does nothing. */
     override fun close(): Unit = raw.destroy()
 
     private fun <R> open(call: (RawHologram) -> R): R {
@@ -89,25 +93,25 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     }
 }
 
-/** Numbers at each pixel of each colour of a hologram: amplitudes, or a field. Close it, as a hologram. */
+/** The amplitudes or the complex field of a hologram, for each pixel and colour. Close it as you close a hologram. */
 public class Planes internal constructor(private val raw: RawPlanes) : AutoCloseable {
-    /** Pixels along x. */
+    /** The width in pixels. */
     public val width: Int = raw.width().toInt()
 
-    /** Pixels along y. */
+    /** The height in pixels. */
     public val height: Int = raw.height().toInt()
 
-    /** How many planes there are: 3, or 1 of a display of one laser. */
+    /** The number of planes: 3, or 1 for a display with a single laser. */
     public val colours: Int = raw.colours().toInt()
 
-    /** Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part. */
+    /** The numbers per pixel: 1 for an amplitude, 2 for a real and an imaginary part. */
     public val numbers: Int = raw.pixelBytes().toInt() / Float.SIZE_BYTES
 
     /**
-     * Reads the plane of [colour] in place: [height] rows of [width] pixels without gaps. The buffer is valid in [body]
-     * only, also while another thread closes the planes.
+     * Reads the plane of [colour] in place: [height] rows of [width] pixels without gaps. The buffer is valid only in
+     * [body], even if another thread closes the planes meanwhile.
      *
-     * @throws PhasefrontException.Setting for a colour that it has not.
+     * @throws PhasefrontException.Setting if there is no plane of this colour.
      */
     public fun <R> usePlane(colour: Colour, body: (FloatBuffer) -> R): R {
         if (raw.uniffiIsDestroyed) {
@@ -120,28 +124,30 @@ public class Planes internal constructor(private val raw: RawPlanes) : AutoClose
         }
     }
 
-    /** Gives the memory back. Closing twice does nothing. */
+    /** Frees the memory. Closing twice does nothing. */
     override fun close(): Unit = raw.destroy()
 }
 
-/** An image, row by row without gaps. */
+/** An image whose rows have no gaps. */
 public class PixelImage internal constructor(private val raw: RawImage) : AutoCloseable {
     public val width: Int = raw.width().toInt()
     public val height: Int = raw.height().toInt()
 
-    /** Bytes of a pixel. */
+    /** The number of bytes per pixel. */
     public val pixelBytes: Int = raw.pixelBytes().toInt()
 
-    /** Reads the image in place. The buffer is valid in [body] only, also while another thread closes the image. */
+    /**
+     * Reads the image in place. The buffer is valid only in [body], even if another thread closes the image meanwhile.
+     */
     public fun <R> useBytes(body: (ByteBuffer) -> R): R {
         if (raw.uniffiIsDestroyed) throw PhasefrontException.Session("image: it is closed; read it before closing it")
         return raw.share().use { body(memory(it.address(), it.byteLen())) }
     }
 
-    /** Gives the memory back. Closing twice does nothing. */
+    /** Frees the memory. Closing twice does nothing. */
     override fun close(): Unit = raw.destroy()
 }
 
-/** The library's memory, read only. */
+/** Returns a read-only view of the library's memory. */
 private fun memory(address: ULong, len: ULong): ByteBuffer =
     Pointer(address.toLong()).getByteBuffer(0, len.toLong()).asReadOnlyBuffer()

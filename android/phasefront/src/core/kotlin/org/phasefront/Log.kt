@@ -1,8 +1,8 @@
 package org.phasefront
 
-/** What the library has to say while it works. */
+/** The log messages of the library. */
 public object Log {
-    /** Sends messages of [level] and above to [handler], which is called on any thread; null for silence. */
+    /** Sends messages of [level] and above to [handler], which may be called on any thread. null turns them off. */
     public fun send(level: LogLevel, handler: ((LogLevel, String) -> Unit)?) {
         setLogListener(level, handler?.let { Handler(it) })
     }

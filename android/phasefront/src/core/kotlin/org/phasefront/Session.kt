@@ -7,8 +7,8 @@ import kotlinx.coroutines.flow.Flow
 import kotlinx.coroutines.flow.flow
 
 /**
- * Frames in, holograms out. Every call may come from any thread, at any moment. [process], [warmUp] and [close] wait
- * for a frame: not for the main thread.
+ * A session that turns frames into holograms. Every method may be called from any thread at any time. [process],
+ * [warmUp] and [close] wait for a frame, so do not call them on the main thread.
  *
  * ```kotlin
  * Session(sessionOptions(), RunningMode.IMAGE).use { session ->
@@ -16,10 +16,10 @@ import kotlinx.coroutines.flow.flow
  * }
  * ```
  *
- * In a live stream [listener] is called on the session's own thread, one event after another, and no frame is processed
- * while it is busy; without one, read [events].
+ * A live stream calls [listener] on its own thread, one event after another, and processes no frame during the call.
+ * Without a listener, read [events].
  *
- * @throws PhasefrontException for options that cannot be meant or planned for.
+ * @throws PhasefrontException if the options are invalid or cannot be planned for.
  */
 public class Session(
     options: SessionOptions,
@@ -38,19 +38,19 @@ public class Session(
     }
 
     /**
-     * What becomes of the frames of a live stream; for one reader. Empty where a listener hears it, and in the other
-     * running modes. Two holograms wait for the reader at most: the oldest gives way to a newer one and is told as
-     * dropped, as [DropReason.UNREAD], so a slow reader falls behind by little and memory stays flat.
+     * The events of a live stream, for one reader. Empty if the session has a listener, and in the other running modes.
+     * At most two holograms wait in the queue. A newer one replaces the oldest, which is reported as dropped with
+     * [DropReason.UNREAD], so memory stays constant if the reader is slow.
      */
     public val events: Flow<SessionEvent> = flow {
         while (true) emit(queue.take() ?: break)
     }
 
     /**
-     * The hologram of [frame], in an image or a video session. Waits for it.
+     * Returns the hologram of [frame], in an image or a video session. Blocks until it is done.
      *
-     * @throws PhasefrontException for a frame that is not usable or late, or a session that is a live stream, paused or
-     * closed. None of them harms the frames that follow.
+     * @throws PhasefrontException if the frame is unusable or late, or if the session is a live stream, paused or
+     * closed. Later frames are not affected.
      */
     public fun process(frame: Frame): Hologram = Hologram(
         raw.process(
@@ -64,11 +64,11 @@ public class Session(
     )
 
     /**
-     * Hands [frame] to a live stream, which copies it and goes on by itself: it never waits for a frame to be
-     * processed. Gives why the frame was dropped, if it was at once; that is an event, too.
+     * Submits [frame] to a live stream, which copies it. Never waits for a frame to be processed. Returns the reason if
+     * the frame was dropped at once; that is also an event.
      *
-     * @throws PhasefrontException for a frame that is not usable or late, or a session that is no live stream or is
-     * closed. None of them harms the frames that follow.
+     * @throws PhasefrontException if the frame is unusable or late, or if the session is not a live stream or is
+     * closed. Later frames are not affected.
      */
     public fun submit(frame: Frame): DropReason? = raw.submit(
         frame.colourBytes(0),
@@ -79,67 +79,68 @@ public class Session(
         frame.info(),
     )
 
-    /** Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it. */
+    /** Processes an empty frame, so that the first real frame is as fast as the later ones. Blocks until it is done. */
     public fun warmUp(): Unit = raw.warmUp()
 
-    /** Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again. */
+    /** Discards all earlier frames, including one in progress. The next frame may have any timestamp. */
     public fun reset(): Unit = raw.reset()
 
-    /** Takes no frames until [resume]. */
+    /** Stops accepting frames until [resume]. */
     public fun pause(): Unit = raw.pause()
 
-    /** Takes frames again. */
+    /** Accepts frames again. */
     public fun resume(): Unit = raw.resume()
 
-    /** Says how hot the device is. */
+    /** Reports how hot the device is. */
     public fun setThermal(thermal: Thermal): Unit = raw.setThermal(thermal)
 
-    /** Allows or forbids changes of the quality level. */
+    /** Sets whether the session may change its quality level. */
     public fun setQuality(quality: Quality): Unit = raw.setQuality(quality)
 
-    /** What the session has done so far; of a closed one, what it did. Never waits for a frame. */
+    /** Returns the session's statistics, also after it is closed. Never blocks on a frame. */
     public fun statistics(): Statistics = raw.statistics()
 
     /**
-     * Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all
-     * events have been told; called by the listener of a session, it returns at once. [events] ends behind the last.
-     * Closing twice does nothing.
+     * Stops accepting frames and frees the memory. Returned holograms stay valid. Waits until all events are delivered,
+     * unless a session's listener calls it; then it returns at once. [events] ends after the last event. Closing twice
+     * does nothing.
      */
     override fun close(): Unit = raw.shutDown()
 }
 
-/** What becomes of the frames of a live stream, in the order in which it happened. */
+/** An event of a live stream. Events come in the order in which they happen. */
 public sealed interface SessionEvent {
-    /** A frame became a hologram, which is the receiver's to close. */
+    /** A frame became a hologram. The receiver must close it. */
     public class Processed(public val hologram: Hologram) : SessionEvent
 
     /** A frame was dropped. */
     public data class Dropped(val timestampNs: Long, val reason: DropReason) : SessionEvent
 
-    /** A frame could not be processed. The session goes on. */
+    /** A frame could not be processed. The session continues. */
     public data class Failed(val timestampNs: Long, val message: String) : SessionEvent
 
-    /** The frames after this one are made at another quality level. */
+    /** The session processes the frames after this one at another quality level. */
     public data class QualityChanged(val timestampNs: Long, val change: QualityChange) : SessionEvent
 }
 
 /**
- * The default options for [display]: holograms of its resolution by [method] and AA-DPM, or, without one, by the
- * network that is built in, by the plane sweep where that was not trained for it. Change what is not with `copy`.
+ * Returns the default options for [display]: holograms at its resolution by [method] and AA-DPM. Without a method, the
+ * built-in network is used, or the plane sweep if that network was not trained for the display. Change fields with
+ * `copy`.
  *
- * @throws PhasefrontException.Display for a display that cannot be.
+ * @throws PhasefrontException.Display for an impossible display.
  */
 public fun sessionOptions(display: Display = Display(), method: Method? = null): SessionOptions =
     Target.ofDisplay(display).use { sessionOptions(it, method) }
 
-/** The same by [network]. */
+/** Returns the default options for [display] and [network]. */
 public fun sessionOptions(display: Display = Display(), network: Network): SessionOptions =
     sessionOptions(display, Method.Trained(network))
 
-/** The same for [target], a display that is calibrated, by [network]. */
+/** Returns the default options for [target], a calibrated display, and [network]. */
 public fun sessionOptions(target: Target, network: Network): SessionOptions = sessionOptions(target, Method.Trained(network))
 
-/** Passes the library's calls on. */
+/** Forwards the library's callbacks. */
 private class Listener(
     private val tell: (SessionEvent) -> Unit,
     private val end: () -> Unit = {},
@@ -160,14 +161,16 @@ private class Listener(
 
     override fun onClosed() = attached(end)
 
-    /** Attaching the session's thread to the virtual machine is costly; without this, JNA would do it for every call. */
+    /**
+     * Keeps the session's thread attached to the virtual machine. Otherwise JNA attaches it, at a cost, for every call.
+     */
     private inline fun attached(call: () -> Unit) {
         Native.detach(false)
         call()
     }
 }
 
-/** Events that wait for their reader. */
+/** A queue of events for one reader. */
 internal class EventQueue {
     private val waiting = ArrayDeque<SessionEvent>()
     private var holograms = 0
@@ -191,7 +194,7 @@ internal class EventQueue {
         changed.trySend(Unit)
     }
 
-    /** The next event; null behind the last. */
+    /** Waits for the next event. Returns null after the last one. */
     suspend fun take(): SessionEvent? {
         while (true) {
             synchronized(waiting) {
@@ -205,7 +208,7 @@ internal class EventQueue {
         }
     }
 
-    /** No more events come; those that wait can still be read. */
+    /** Ends the events. Those in the queue can still be read. */
     fun finish() {
         synchronized(waiting) { finished = true }
         changed.close()

@@ -1,10 +1,10 @@
 package org.phasefront
 
-/** When the stages of frames begin and end. */
+/** The begin and end of each stage of a frame. */
 public object Trace {
     /**
-     * Calls [handler] with each stage that begins (true) or ends (false), on the thread that computes it, where stages lie
-     * within one another; null for silence. It must not call the library.
+     * Calls [handler] with each stage that begins (true) or ends (false), on the thread that computes it. Stages on a
+     * thread are nested. null turns the calls off. The handler must not call the library.
      */
     public fun send(handler: ((Stage, Boolean) -> Unit)?) {
         setStageListener(handler?.let { Handler(it) })

@@ -6,9 +6,10 @@ import android.hardware.HardwareBuffer
 import android.media.Image
 
 /**
- * A camera's picture in place: YUV_420_888, as Camera2 and ARCore give it. Keep the [Image] open while the frame is used.
+ * Returns a camera image without a copy. Its format is YUV_420_888, as from Camera2 and ARCore. Keep the [Image] open
+ * while the frame is used.
  *
- * @throws PhasefrontException.Frame for another format, which the message names.
+ * @throws PhasefrontException.Frame for any other format. The message names it.
  */
 public fun Image.toColourImage(matrix: YuvMatrix = YuvMatrix.BT601, videoRange: Boolean = false): ColourImage {
     if (format != ImageFormat.YUV_420_888) {
@@ -18,12 +19,12 @@ public fun Image.toColourImage(matrix: YuvMatrix = YuvMatrix.BT601, videoRange: 
 }
 
 /**
- * A depth image in place. The format is asked of the image: Camera2's and old ARCore's DEPTH16 has 13 bits of millimetres
- * and 3 of confidence, D_16 of ARCore's `acquireDepthImage16Bits` has 16 of millimetres. Keep the [Image] open while the
- * frame is used.
+ * Returns a depth image without a copy. The format is read from the image: DEPTH16 of Camera2 and old ARCore has 13
+ * bits of millimetres and 3 of confidence, and D_16 of ARCore's `acquireDepthImage16Bits` has 16 bits of millimetres.
+ * Keep the [Image] open while the frame is used.
  *
  * @param confidence the image of ARCore's `acquireRawDepthConfidenceImage`.
- * @throws PhasefrontException.Frame for another format, which the message names.
+ * @throws PhasefrontException.Frame for any other format. The message names it.
  */
 public fun Image.toDepthImage(confidence: Image? = null): DepthImage {
     val depthFormat = when (format) {
@@ -37,7 +38,10 @@ public fun Image.toDepthImage(confidence: Image? = null): DepthImage {
     return DepthImage(depthFormat, width, height, planes[0].toPlane(), map)
 }
 
-/** How a camera's picture must be turned, from `CameraCharacteristics.SENSOR_ORIENTATION` and the display's rotation. */
+/**
+ * Returns the rotation that brings a camera image upright, from `CameraCharacteristics.SENSOR_ORIENTATION` and the
+ * display's rotation.
+ */
 public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: Boolean): Orientation {
     val degrees = if (isFront) sensorDegrees + displayDegrees else sensorDegrees - displayDegrees
     val rotation = when (Math.floorMod(degrees, 360)) {
@@ -53,9 +57,10 @@ public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: B
 private fun Image.Plane.toPlane(): Plane = Plane(buffer, rowStride, pixelStride)
 
 /**
- * The image as a bitmap: a new one, or [to] where it has the size and configuration ARGB_8888.
+ * Copies the image into a bitmap: into [to] if it is mutable and has the same size and the configuration ARGB_8888,
+ * else into a new one.
  *
- * @throws PhasefrontException.Setting for an image that is not of 4 bytes a pixel.
+ * @throws PhasefrontException.Setting if the image does not have 4 bytes per pixel.
  */
 public fun PixelImage.toBitmap(to: Bitmap? = null): Bitmap {
     if (pixelBytes != 4) {

@@ -15,7 +15,7 @@ public fun Log.sendToLogcat(level: LogLevel = LogLevel.INFO) {
     }
 }
 
-/** Sends stages to Perfetto and Android Studio's profiler, as sections of this app's trace. */
+/** Sends the stages to Perfetto and Android Studio's profiler as sections of the app's trace. */
 public fun Trace.sendToSystem() {
     send { stage, begins ->
         when {
@@ -25,7 +25,7 @@ public fun Trace.sendToSystem() {
     }
 }
 
-/** What `PowerManager.currentThermalStatus` (API 29) says. */
+/** Converts `PowerManager.currentThermalStatus` (API 29). */
 public fun thermalOf(status: Int): Thermal = when (status) {
     PowerManager.THERMAL_STATUS_NONE -> Thermal.NOMINAL
     PowerManager.THERMAL_STATUS_LIGHT, PowerManager.THERMAL_STATUS_MODERATE -> Thermal.FAIR

@@ -12,7 +12,7 @@ import kotlin.test.assertTrue
 import org.json.JSONArray
 import org.json.JSONObject
 
-/** The conformance suite, run from Kotlin: the levels must be those of the suite, and Rust's to the bit. */
+/** Runs the conformance suite from Kotlin: the levels must match the suite, and match Rust bit for bit. */
 class ConformanceTest {
     private val folder = File(System.getProperty("phasefront.suite"))
     private val memory: ByteBuffer = folder.resolve("frames.bin").readBytes().let { direct(it.size).put(it).flip() }
@@ -20,7 +20,7 @@ class ConformanceTest {
     private fun JSONArray.objects(): List<JSONObject> = List(length()) { getJSONObject(it) }
 
     private fun plane(plane: JSONObject): Plane {
-        // Not sliced: the wrapper must see to positions itself.
+        // Not sliced, because the wrapper must handle positions itself.
         val bytes = memory.duplicate()
         bytes.position(plane.getInt("offset")).limit(plane.getInt("offset") + plane.getInt("length"))
         return Plane(bytes, plane.getInt("row_stride"), plane.getInt("pixel_stride"))
@@ -104,7 +104,7 @@ class ConformanceTest {
             ?: DepthRange.Percentiles,
     )
 
-    /** The levels of a case's frames; what is seen of them is written behind [seen]. */
+    /** Returns the levels of a case's frames and appends their displayed images to [seen]. */
     private fun levels(case: JSONObject, seen: ByteArrayOutputStream): ByteArray =
         Session(options(case), RunningMode.valueOf(case.getString("mode").uppercase())).use { session ->
             val all = ByteArrayOutputStream()

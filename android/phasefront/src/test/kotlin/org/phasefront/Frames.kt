@@ -4,7 +4,7 @@ import java.nio.ByteBuffer
 import java.nio.ByteOrder
 import kotlin.test.assertEquals
 
-/** A direct buffer of [size] bytes in little-endian order. */
+/** Returns a direct buffer of [size] bytes in little-endian order. */
 internal fun direct(size: Int): ByteBuffer = ByteBuffer.allocateDirect(size).order(ByteOrder.LITTLE_ENDIAN)
 
 internal val network: Network by lazy { Network.builtIn() }
@@ -12,7 +12,7 @@ internal val display: Display = Display(width = 64u, height = 48u)
 
 internal fun options(): SessionOptions = sessionOptions(display, network)
 
-/** RGBA of 64×48 with something in it. */
+/** Returns an RGBA image of 64×48 pixels that is not uniform. */
 internal fun colourBytes(): ByteBuffer {
     val bytes = direct(4 * 64 * 48)
     for (y in 0 until 48) {
@@ -23,7 +23,7 @@ internal fun colourBytes(): ByteBuffer {
     return bytes.flip().order(ByteOrder.LITTLE_ENDIAN)
 }
 
-/** Metres of 32×24: something before a wall. */
+/** Returns 32×24 depths in metres: an object in front of a wall. */
 internal fun depthBytes(metres: Float = 0.5f): ByteBuffer {
     val bytes = direct(4 * 32 * 24)
     for (y in 0 until 24) {
@@ -51,7 +51,7 @@ internal fun Hologram.levels(): ByteArray {
     return all
 }
 
-/** The numbers of all planes, in the order in which they lie. */
+/** The numbers of all planes, in memory order. */
 internal fun Planes.bytes(): ByteArray {
     val all = direct(Float.SIZE_BYTES * numbers * width * height * colours)
     for (colour in Colour.entries.take(colours)) {

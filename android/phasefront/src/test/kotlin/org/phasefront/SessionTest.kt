@@ -21,7 +21,7 @@ import kotlin.test.assertTrue
 import kotlinx.coroutines.flow.toList
 import kotlinx.coroutines.runBlocking
 
-/** Sessions from Kotlin: threads, live streams, misuse, memory. */
+/** Tests sessions from Kotlin: threads, live streams, misuse and memory. */
 class SessionTest {
     private fun <T> image(use: (Session) -> T): T = Session(options(), RunningMode.IMAGE).use(use)
 
@@ -39,7 +39,7 @@ class SessionTest {
         hologram.usePlane(Colour.GREEN) { plane ->
             assertTrue(plane.isDirect && plane.isReadOnly)
             assertEquals(64 * 48, plane.remaining())
-            // Closed by another thread while it is read.
+            // Another thread closes it during the read.
             thread { hologram.close() }.join()
             val bytes = ByteArray(64 * 48).also { plane.get(it) }
             assertContentEquals(before.copyOfRange(64 * 48, 2 * 64 * 48), bytes)
@@ -367,7 +367,7 @@ class SessionTest {
         val options = sessionOptions(target)
         assertEquals(display, options.target.display())
         fun levels(options: SessionOptions) = Session(options, RunningMode.IMAGE).use { it.process(still()).use { made -> made.levels() } }
-        // The table is that of equal steps.
+        // This table has equal steps.
         assertContentEquals(levels(sessionOptions(display)), levels(options))
     }
 
@@ -413,7 +413,7 @@ class SessionTest {
 
     @Test
     fun memoryOfTenThousandFramesIsFlat() {
-        // Linux alone has it, and the tests run there.
+        // Only Linux has this file, and the tests run there.
         val statm = File("/proc/self/statm")
         fun residentMb(): Double {
             System.gc()
@@ -429,7 +429,7 @@ class SessionTest {
             val before = residentMb()
             frames(9000)
             val growth = residentMb() - before
-            // Each frame's results are 15 KB: kept, they would be 138 MB.
+            // The results of each frame take 15 KB. All of them would take 138 MB.
             assertTrue(growth < 32, "grown by $growth MB")
             Reference.reachabilityFence(frame)
         }

@@ -14,7 +14,7 @@ import org.phasefront.SessionOptions
 import org.phasefront.sessionOptions
 import org.phasefront.version
 
-/** The stages of a frame, as a session times them. */
+/** The stages of a frame that a session measures. */
 enum class Stage(val ms: (FrameTimes) -> Double) {
     COLOUR(FrameTimes::colourMs),
     DEPTH(FrameTimes::depthMs),
@@ -24,18 +24,18 @@ enum class Stage(val ms: (FrameTimes) -> Double) {
     TOTAL(FrameTimes::totalMs),
     ;
 
-    /** Its name in a record. */
+    /** The name of the stage in a record. */
     val key: String = name.lowercase()
 }
 
-/** Times of one stage, milliseconds. */
+/** The times of one stage in milliseconds. */
 data class Spread(val least: Double, val lower: Double, val median: Double, val upper: Double, val most: Double) {
-    /** As a record has it. */
+    /** Returns the spread in the form of a record. */
     fun json(): JSONObject = JSONObject()
         .put("least", least).put("lower", lower).put("median", median).put("upper", upper).put("most", most)
 
     companion object {
-        /** Of [times], at least one: median, quartiles and ends, each one of the times. */
+        /** Computes the minimum, quartiles and maximum of at least one time; each is one of [times]. */
         fun of(times: List<Double>): Spread {
             val sorted = times.sorted()
             val at = { quarters: Int -> sorted[(sorted.size - 1) * quarters / 4] }
@@ -45,18 +45,21 @@ data class Spread(val least: Double, val lower: Double, val median: Double, val 
 }
 
 /**
- * What is timed: frames by [method], corrected by [localSteps] and nothing else, and the [stage] that the run is about;
- * where one is null, the default.
+ * A benchmark run: the [method] and the correction steps [localSteps] of its frames, and the [stage] that it measures.
+ * null means the default; with steps, there is no other correction.
  */
 class Run(val name: String, val stage: Stage, val method: Method? = null, val localSteps: UInt? = 0u) {
-    /** Its options on [display]. */
+    /** Returns the options of the run for [display]. */
     fun options(display: Display): SessionOptions {
         val defaults = sessionOptions(display, method)
         return if (localSteps == null) defaults else defaults.copy(darkThreshold = 0f, localSteps = localSteps)
     }
 
     companion object {
-        /** Networks of 8, 15 and [deep]'s layers, the plane sweep, one step of correction, and the default. */
+        /**
+         * Returns the runs: networks of 8, 15 and [deep]'s layers, the plane sweep, one correction step, and the
+         * default.
+         */
         fun all(deep: Network): List<Run> {
             val shallow = Method.Trained(Network.builtIn("rgbd-8"))
             return listOf(
@@ -71,12 +74,12 @@ class Run(val name: String, val stage: Stage, val method: Method? = null, val lo
     }
 }
 
-/** What was timed in one run, in words and for the record. */
+/** The result of one run, as a line and for the record. */
 class Outcome(val line: String, val json: JSONObject)
 
 /**
- * Times [runs] at every size of [displays]: two frames to warm up, then [frames] of them. [scene] gives the frame to
- * time, and [conditions] what the system tells of heat and energy, which each run asks for before and behind it.
+ * Measures [runs] at every size of [displays]: two frames to warm up, then [frames] frames. [scene] returns the frame
+ * to process, and [conditions] the thermal and power state, which is read before and after each run.
  */
 class Benchmark(
     private val runs: List<Run>,
@@ -86,9 +89,9 @@ class Benchmark(
     private val conditions: () -> JSONObject,
 ) {
     /**
-     * The record of all runs on [device], which is what the app knows of the phone; [told] hears the line of each. A
-     * run that is refused says why, and the others go on. Ends early, with what there is, where [isWanted] no longer
-     * holds.
+     * Returns the record of all runs on [device], the description of the phone, and passes the line of each run to
+     * [told]. A refused run records the reason, and the others continue. Returns the results so far once [isWanted] is
+     * false.
      */
     fun record(device: JSONObject, isWanted: () -> Boolean, told: (String) -> Unit): JSONObject {
         val outcomes = JSONArray()
@@ -116,7 +119,7 @@ class Benchmark(
         }
     }
 
-    /** Of each stage; what the frames took and ran on is put into [json]. */
+    /** Returns the times of each stage and adds the total time and the backend to [json]. */
     private fun spreads(run: Run, display: Display, json: JSONObject): Map<Stage, Spread> {
         return Session(run.options(display), RunningMode.IMAGE).use { session ->
             repeat(WARM) { session.process(scene()).close() }
@@ -132,10 +135,10 @@ class Benchmark(
     companion object {
         private const val WARM = 2
 
-        /** The modulator of the documents, and the size of the sample app's holograms. */
+        /** The modulator of the documentation, and the size of the sample app's holograms. */
         val DISPLAYS = listOf(Display(), Display(width = 960u, height = 540u))
 
-        /** So many that the quartiles are times of frames. */
+        /** With this count, each quartile is the time of one frame. */
         const val FRAMES = 9
     }
 }

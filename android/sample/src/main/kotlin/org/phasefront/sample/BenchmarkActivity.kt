@@ -21,19 +21,19 @@ import org.phasefront.PhasefrontException
 import org.phasefront.fromBytes
 import org.phasefront.thermalOf
 
-/** Times every stage on the sample scene by one tap, keeps the record as a file of the app's, and shares it. */
+/** Measures every stage on the sample scene, saves the record as a file and shares it. */
 class BenchmarkActivity : Activity() {
     private lateinit var start: Button
     private lateinit var share: Button
     private lateinit var lines: TextView
 
-    /** Written on the main thread, read on the benchmark's. */
+    /** Whether to continue, written on the main thread and read on the benchmark's thread. */
     @Volatile private var isWanted = false
     private var record: File? = null
 
     override fun onCreate(savedInstanceState: Bundle?) {
         super.onCreate(savedInstanceState)
-        // A dark screen lets the processor sleep.
+        // The processor may sleep when the screen turns off.
         window.addFlags(WindowManager.LayoutParams.FLAG_KEEP_SCREEN_ON)
         start = Button(this).apply {
             text = "Run the benchmark"
@@ -74,7 +74,7 @@ class BenchmarkActivity : Activity() {
         val runs = Run.all(Network.fromBytes(asset("rgbd-30-int8.onnx")))
         val benchmark = Benchmark(runs, Benchmark.DISPLAYS, Benchmark.FRAMES, { scene.frame(0) }, ::conditions)
         val record = benchmark.record(device(), { isWanted }, ::say).put("begun", begun.toString())
-        // What was broken off is no record.
+        // A cancelled run leaves no record.
         if (!isWanted) return null
         return folder().resolve("${begun.epochSecond}.json").apply { writeText(record.toString(2)) }
     }
@@ -93,7 +93,7 @@ class BenchmarkActivity : Activity() {
         return device
     }
 
-    /** What the system tells now; what it does not know is left out. */
+    /** Returns the current thermal and power state, without unknown values. */
     private fun conditions(): JSONObject {
         val battery = getSystemService(BatteryManager::class.java)
         val power = getSystemService(PowerManager::class.java)
@@ -122,7 +122,7 @@ class BenchmarkActivity : Activity() {
 
     private fun kept(): List<File> = folder().listFiles().orEmpty().toList()
 
-    /** Shows what may be shared. */
+    /** Shows the record that can be shared. */
     private fun show(file: File?) {
         record = file ?: record
         share.isEnabled = record != null

@@ -21,8 +21,8 @@ import org.phasefront.toColourImage
 import org.phasefront.toDepthImage
 
 /**
- * Colour and DEPTH16 of one camera, by Camera2. Few phones have such a camera ([find] says whether this one does); on others
- * ARCore's depth serves, whose images become frames by the same calls.
+ * A source of colour and DEPTH16 from one camera by Camera2. Few phones have this kind of camera; [find] looks for it.
+ * On other phones, use the depth images of ARCore with the same calls.
  */
 class CameraSource private constructor(
     private val manager: CameraManager,
@@ -41,7 +41,7 @@ class CameraSource private constructor(
     override fun start(onFrame: (Frame) -> Unit, onError: (String) -> Unit) {
         val sizes = manager.getCameraCharacteristics(id).get(CameraCharacteristics.SCALER_STREAM_CONFIGURATION_MAP)
         val depthSize = sizes?.getOutputSizes(ImageFormat.DEPTH16)?.maxByOrNull { it.width * it.height }
-        // Colour of the depth's field of view: the size nearest to 1080 lines among those of its aspect ratio.
+        // Colour with the depth's field of view: among sizes of its aspect ratio, the one nearest to 1080 lines.
         val colourSize = sizes?.getOutputSizes(ImageFormat.YUV_420_888)
             ?.filter { depthSize != null && abs(it.width * depthSize.height - it.height * depthSize.width) <= it.width }
             ?.minByOrNull { abs(it.height - 1080) }
@@ -106,7 +106,7 @@ class CameraSource private constructor(
         )
     }
 
-    /** Colour and depth that were taken within half a frame of each other are one frame. */
+    /** Pairs colour and depth that were captured within half a frame of each other. */
     private fun pair(onFrame: (Frame) -> Unit) {
         val colour = colour ?: return
         val depth = depth ?: return
@@ -133,7 +133,7 @@ class CameraSource private constructor(
     }
 
     companion object {
-        /** The first camera at the back that gives DEPTH16; null where there is none. */
+        /** Returns the first back camera with DEPTH16, or null. */
         fun find(context: Context, displayDegrees: Int): CameraSource? {
             val manager = context.getSystemService(CameraManager::class.java)
             for (id in manager.cameraIdList) {

@@ -2,8 +2,8 @@ package org.phasefront.sample
 
 import org.phasefront.Frame
 
-/** Where frames come from. */
+/** A source of frames. */
 interface FrameSource : AutoCloseable {
-    /** Calls [onFrame] with frame after frame, on a thread of its own, until it is closed. A frame is valid in the call only. */
+    /** Calls [onFrame] with each frame on its own thread until it is closed. A frame is valid only during the call. */
     fun start(onFrame: (Frame) -> Unit, onError: (String) -> Unit)
 }

@@ -32,8 +32,8 @@ import org.phasefront.thermalOf
 import org.phasefront.toBitmap
 
 /**
- * Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on,
- * the levels on an external screen where there is one, and what it costs.
+ * Converts the camera or the sample scene to holograms. Shows the displayed image focused by the slider or a tap, the
+ * levels on an external screen if there is one, and statistics.
  */
 class MainActivity : Activity() {
     private lateinit var preview: ImageView
@@ -44,10 +44,10 @@ class MainActivity : Activity() {
     private var output: PhaseOutput? = null
     private val hologramDisplay = Display(width = 960u, height = 540u)
 
-    /** Written on the main thread, read on the session's. */
+    /** The focus, written on the main thread and read on the session's thread. */
     @Volatile private var zMm = 0.0
 
-    /** The latest hologram, for taps; only the main thread touches it. */
+    /** The latest hologram, for taps. Only the main thread uses it. */
     private var latest: Hologram? = null
 
     override fun onCreate(savedInstanceState: Bundle?) {
@@ -73,7 +73,7 @@ class MainActivity : Activity() {
         statistics = TextView(this).apply { setPadding(24, 24, 24, 24) }
         val benchmark = Button(this).apply {
             text = "Benchmark"
-            // The session is closed meanwhile, so that nothing else computes.
+            // The session is closed during the benchmark, so that nothing else computes.
             setOnClickListener { startActivity(Intent(context, BenchmarkActivity::class.java)) }
         }
         setContentView(
@@ -124,7 +124,7 @@ class MainActivity : Activity() {
         }
     }
 
-    /** What becomes of frames, on the session's thread. */
+    /** Handles an event on the session's thread. */
     private fun heard(event: SessionEvent) {
         if (event !is SessionEvent.Processed) return
         val hologram = event.hologram
@@ -177,7 +177,7 @@ class MainActivity : Activity() {
         super.onStop()
         source?.close()
         source = null
-        // Closing waits for the listener, which only posts to this thread and so cannot wait for us.
+        // Closing waits for the listener, which only posts to this thread and therefore never blocks on it.
         session?.close()
         session = null
         output?.dismiss()

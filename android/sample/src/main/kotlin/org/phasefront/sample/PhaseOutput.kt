@@ -9,7 +9,7 @@ import android.os.Bundle
 import android.view.Display
 import android.view.View
 
-/** The modulator's levels on an external screen, pixel for pixel: the screen is the modulator's driver. */
+/** Shows the modulator's levels on an external screen, pixel for pixel. The screen drives the modulator. */
 class PhaseOutput(context: Context, display: Display) : Presentation(context, display) {
     private val view = LevelsView(getContext())
 
@@ -26,7 +26,7 @@ class PhaseOutput(context: Context, display: Display) : Presentation(context, di
     private class LevelsView(context: Context) : View(context) {
         var levels: Bitmap? = null
 
-        // Neither filtered nor scaled: a level between two levels is another phase.
+        // Levels must not be filtered or scaled: a value between two levels is a different phase.
         private val exact = Paint().apply {
             isFilterBitmap = false
             isDither = false

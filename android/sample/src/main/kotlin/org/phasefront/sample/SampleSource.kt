@@ -12,7 +12,7 @@ import org.phasefront.DepthImage
 import org.phasefront.Frame
 import org.phasefront.Plane
 
-/** The project's sample scene, 30 times a second, seen through a window that moves over it: for phones without depth. */
+/** A source for phones without depth: a window that moves over the project's sample scene, 30 times per second. */
 class SampleSource(private val assets: AssetManager) : FrameSource {
     @Volatile private var running = false
 
@@ -33,7 +33,7 @@ class SampleSource(private val assets: AssetManager) : FrameSource {
     }
 }
 
-/** The project's sample scene, seven eighths of it. */
+/** Seven eighths of the project's sample scene. */
 class SampleScene(assets: AssetManager) {
     private val colour = assets.bitmap("scene_rgb.jpg")
     private val depth = assets.bitmap("scene_depth.png")
@@ -44,7 +44,7 @@ class SampleScene(assets: AssetManager) {
         }
     }
 
-    /** The frame of now, through a window that is [step] pixels on its way to and fro. */
+    /** Returns a frame with the current time, of a window that has moved [step] pixels to and fro. */
     fun frame(step: Int): Frame {
         val margin = colour.width / 8
         val x = if (step / margin % 2 == 0) step % margin else margin - 1 - step % margin

@@ -45,7 +45,7 @@ class BenchmarkTest {
         val runs = Run.all(Network.fromFile(System.getProperty("phasefront.suite") + "/../../models/rgbd-30-int8.onnx"))
         val record = benchmark(runs, Display(width = 64u, height = 48u))
             .record(JSONObject().put("model", "a test"), { true }, lines::add)
-        // tests/kotlin makes a table of it.
+        // tests/kotlin converts it to a table.
         File(System.getProperty("phasefront.record")).writeText(record.toString())
         val read = JSONObject(record.toString())
         assertEquals(setOf("phasefront", "device", "runs"), read.keySet())
