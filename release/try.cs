@@ -1,4 +1,5 @@
-// Unity's package outside Unity: `Try COLOUR.ppm DEPTH.pgm WIDTH HEIGHT LEVELS` writes the levels of red of an RGB-D image.
+// Runs the Unity package without Unity: `Try COLOUR.ppm DEPTH.pgm WIDTH HEIGHT LEVELS` writes the red levels of an
+// RGB-D image.
 using System;
 using System.IO;
 using System.Linq;
@@ -24,7 +25,7 @@ internal static class Try
         return 0;
     }
 
-    /// The pixels of a Netpbm file are its end.
+    /// Reads the pixels of a Netpbm file, which are at its end.
     private static byte[] Last(string path, int count)
     {
         var all = File.ReadAllBytes(path);

@@ -1,4 +1,4 @@
-# Sourced by tests in shell: where they build, how they install, and the library as it ships.
+# Common functions: the build folders, installation and the released library. Shell tests source this file.
 # shellcheck shell=bash
 
 cache="${XDG_CACHE_HOME:-$HOME/.cache}/phasefront"
@@ -6,7 +6,7 @@ export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$cache/target}"
 mkdir -p "$cache"
 . "$(dirname "${BASH_SOURCE[0]}")/skip.sh"
 
-# Copies the tree to folder $1, with a history and what is not committed yet, or fails.
+# Copies the tree to folder $1, with history and uncommitted changes, or fails.
 copy_tree() {
     git clone --quiet . "$1" && git ls-files -z -m -o --exclude-standard | xargs -0 -r cp --parents -Pt "$1"
 }
@@ -16,7 +16,7 @@ as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
-# Installs Debian packages, or fails. Steps run side by side, and apt-get does not.
+# Installs Debian packages, or fails. Uses a lock, because steps run in parallel and apt-get cannot.
 install() {
     need apt-get || return 1
     (
@@ -26,9 +26,9 @@ install() {
     ) 9>"$cache/install.lock"
 }
 
-# Builds the whole workspace: a part of it alone has other features, with which tract is built again (never use -p). Runs the
-# conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`. Within tests/run
-# all this is there already.
+# Builds the whole workspace. A part of it has other features, which would build tract again, so never use -p. Runs the
+# conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`. In
+# tests/run all this exists already.
 build_library() {
     library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
     generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"

@@ -1,4 +1,4 @@
-"""Chromium without a screen, for the tests of pages."""
+"""Headless Chromium for tests of pages."""
 
 import base64
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 class Browser:
-    """Chromium over the pipe of its DevTools protocol: messages of JSON, each ended by a zero byte."""
+    """Chromium, controlled through the pipe of its DevTools protocol: JSON messages, each ended by a zero byte."""
 
     def __init__(self, chromium, profile, *flags):
         theirs_in, self.out = os.pipe()
@@ -99,7 +99,7 @@ class Browser:
 
 
 def chromium():
-    """Chromium's path. Installs it on Debian; ends the test where there is none."""
+    """Returns the path of Chromium. Installs it on Debian, and ends the test if there is none."""
     names = ["chromium", "chromium-browser", "google-chrome"]
     found = next(filter(None, map(shutil.which, names)), None)
     if not found:

@@ -1,25 +1,25 @@
-# Sourced by tests in shell: what they do where something is missing.
+# Functions for a missing dependency. Shell tests source this file.
 # shellcheck shell=bash
 
 expected_skips="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)/expected-skips"
 
 need() { command -v "$1" >/dev/null; }
 
-# Fails the test: $1 says what is missing and how to get it.
+# Fails the test. $1 names the missing dependency and how to get it.
 cannot() {
     echo "$1"
     exit 1
 }
 
-# Notes that the test, or a part of it, does not run because $1 is missing, for tests/run to report; $2 says more. Fails the
-# test where expected-skips does not name $1.
+# Records for tests/run that the test, or a part of it, does not run because $1 is missing. $2 adds details. Fails the
+# test if expected-skips does not name $1.
 skip_or_fail() {
     grep -q "^$1 |" "$expected_skips" || cannot "$1 is missing ($2), and tests/expected-skips does not name it"
     echo "skipped: $1: $2"
     [ -z "${PHASEFRONT_SKIPS:-}" ] || printf '%s\t%s\n' "$1" "$2" >>"$PHASEFRONT_SKIPS"
 }
 
-# Brings the Rust target $1. Ends the test without rustup.
+# Installs the Rust target $1. Ends the test without rustup.
 rust_target() {
     local library
     library="$(rustc --print sysroot)/lib/rustlib/$1/lib"
@@ -32,7 +32,7 @@ rust_target() {
     [ -d "$library" ] || cannot "rustup could not add the target $1"
 }
 
-# Brings the nightly toolchain. Ends the test without rustup.
+# Installs the nightly toolchain. Ends the test without rustup.
 rust_nightly() {
     need rustup || {
         skip_or_fail rustup 'this Rust has no nightly toolchain'

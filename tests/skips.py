@@ -1,5 +1,5 @@
-"""What tests in Python do where something is missing. As a program: checks that no test passes over by itself what is
-missing, and that tests/expected-skips names nothing that no test asks for.
+"""Functions of Python tests for a missing dependency. As a program, checks that no test skips on its own and that
+tests/expected-skips has no unused names.
 """
 
 import os
@@ -19,19 +19,19 @@ FORBIDDEN = re.compile(
     |Assert\.(?:Ignore|Inconclusive)|\b(?:exit|return)[ (]77\b""",
     re.VERBOSE,
 )
-# In Rust tests: to print something and leave.
+# In Rust tests: printing a message and returning.
 LEAVES = re.compile(r"println!\([^;]*\);\s*(?:return|continue)\b")
 
 
 def expected():
-    """Of each name the steps that may lack it and why, as the list has them."""
+    """Returns the steps of the list that may lack each name, with the reason."""
     rows = (line.split("|") for line in LIST.read_text("utf-8").splitlines() if line and not line.startswith("#"))
     return {name.strip(): ([step.strip() for step in steps.split(",")], why.strip()) for name, steps, why in rows}
 
 
 def or_fail(what, why):
-    """Notes that a test, or a part of it, does not run because `what` is missing, for tests/run to report. Raises
-    AssertionError where the list does not name it; `why` then says how to get it."""
+    """Records for tests/run that a test, or a part of it, does not run because `what` is missing. Raises AssertionError
+    if the list does not name it; `why` then explains how to get it."""
     assert what in expected(), f"{what} is missing ({why}), and tests/expected-skips does not name it"
     print(f"skipped: {what}: {why}")
     if path := os.environ.get("PHASEFRONT_SKIPS"):
@@ -40,7 +40,7 @@ def or_fail(what, why):
 
 
 def faults(name, text):
-    """The lines of a file that pass over what is missing by themselves."""
+    """Returns the lines of a file that skip on their own."""
     found = list(FORBIDDEN.finditer(text))
     if name.endswith(".rs") and "/tests/" in name:
         found += LEAVES.finditer(text)
@@ -51,7 +51,7 @@ def faults(name, text):
 def main():
     listed = subprocess.run(["git", "ls-files", "-z", "-c", "-o", "--exclude-standard"], cwd=ROOT, capture_output=True, check=True)
     names = sorted(set(listed.stdout.decode().strip("\0").split("\0")) - SHARED)
-    # A release is tried on one's own machine, and tells there what it did not try.
+    # release/try runs on a developer's machine and reports there what it did not try.
     names = [n for n in names if Path(n).suffix in ENDINGS and not n.startswith(("docs/", "release/")) and (ROOT / n).is_file()]
     texts = {name: (ROOT / name).read_text("utf-8", errors="replace") for name in names}
     wrong = [fault for name, text in texts.items() for fault in faults(name, text)]

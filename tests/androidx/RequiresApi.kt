@@ -1,4 +1,5 @@
-// By hand, for the type checks of `tests/kotlin`: the real one is on Google's Maven alone. Nothing here runs or ships.
+// A substitute for the type checks of `tests/kotlin`: the original is only on Google's Maven. It neither runs nor
+// ships.
 package androidx.annotation
 
 annotation class RequiresApi(val value: Int)

@@ -1,7 +1,7 @@
-"""Prints what the crate `phasefront` makes public, with what it takes from `phasefront-core` and `phasefront-gpu`.
+"""Prints the public items of the crate `phasefront`, with its re-exports of `phasefront-core` and `phasefront-gpu`.
 
-`stable.py TARGET` reads what `surface` has listed of each crate in TARGET, and rustdoc's JSON beside it. It fails where a
-public signature names a type that `phasefront` does not hand on, and where there are too many items.
+`stable.py TARGET` reads the lists of `surface` for each crate in TARGET, and the JSON of rustdoc. It fails if a public
+signature names a type that `phasefront` does not re-export, or if there are too many items.
 """
 
 import json
@@ -10,12 +10,12 @@ import sys
 from pathlib import Path
 
 
-# More would be hard to learn.
+# More items would be hard to learn.
 MOST = 60
 
 
 def exported(folder: Path) -> dict[str, str]:
-    """Where each item of another crate is found in `phasefront`, by its path there."""
+    """Returns the path in `phasefront` of each item of another crate, by its path in that crate."""
     index = json.loads((folder / "phasefront.json").read_text())["index"]
     inside = {}
     for item in index.values():
@@ -37,7 +37,7 @@ def exported(folder: Path) -> dict[str, str]:
 
 
 def defined(folder: Path, path: str) -> str:
-    """Where an item is defined that a crate's root hands on from one of its modules."""
+    """Returns the definition of an item that a crate's root re-exports from one of its modules."""
     crate, *rest = path.split("::")
     if len(rest) == 1:
         for item in json.loads((folder / f"{crate}.json").read_text())["index"].values():
@@ -49,15 +49,15 @@ def defined(folder: Path, path: str) -> str:
 
 def main(folder: Path) -> int:
     paths = exported(folder)
-    # The longest first, for one path may begin with another.
+    # Longest first, because a path may begin with another path.
     any_of = re.compile("|".join(rf"{re.escape(path)}\b" for path in sorted(paths, key=len, reverse=True)))
     lines = [line for line in (folder / "phasefront.txt").read_text().splitlines() if not line.startswith("pub use ")]
     for crate in ("phasefront_core", "phasefront_gpu"):
         for line in (folder / f"{crate}.txt").read_text().splitlines():
-            # What the line is about: the type of an implementation, or the first path.
+            # The subject of the line: the type of an implementation, or the first path.
             about = line.rsplit(" for ", 1)[-1] if line.startswith("impl") else line
             if re.match(rf"impl {crate}::", line) and " for " in line:
-                continue  # A trait that is not public either.
+                continue  # The trait is not public either.
             first = re.search(rf"{crate}::[\w:]+", re.sub(r"^impl<[^>]*> ", "", about))
             if first and any_of.match(first.group()):
                 lines.append(line)

@@ -19,11 +19,11 @@ import org.phasefront.Session
 import org.phasefront.sessionOptions
 import org.phasefront.thirdPartyNotices
 
-/** The sample scene to its hologram, with what the repository has. */
+/** Makes the hologram of the sample scene with the artefact from the repository. */
 class SampleTest {
     private fun image(name: String): BufferedImage = ImageIO.read(File(System.getProperty("samples"), name))
 
-    /** Calls [put] with each number of [image], row by row, and gives the buffer of [size] bytes that it fills. */
+    /** Calls [put] with each number of [image], row by row, and returns the filled buffer of [size] bytes. */
     private fun direct(image: BufferedImage, size: Int, put: ByteBuffer.(Int) -> Unit): ByteBuffer {
         val bytes = ByteBuffer.allocateDirect(size).order(ByteOrder.nativeOrder())
         for (y in 0 until image.height) {
@@ -44,7 +44,7 @@ class SampleTest {
             ColourImage(ColourFormat.RGB, colour.width, colour.height, rgb),
             DepthImage(DepthFormat.NORMALIZED_U16, depth.width, depth.height, Plane(d, 2 * depth.width, 2)),
         )
-        // The picture's sides are twelve times the view's.
+        // The sides of the image are twelve times those of the view.
         val (width, height) = 160 to 90
         val options = sessionOptions(Display(width = 480u, height = 270u))
         Session(options, RunningMode.IMAGE).use { session ->
