@@ -14,6 +14,10 @@
 //! let pipeline = Pipeline::new((48, 64), method, &target, &EncoderOptions::default())?;
 //!
 //! // A bright square in front of a dark wall.
+//! let inside = |y: usize, x: usize| (16..32).contains(&y) && (24..40).contains(&x);
+//! let rgb = Array3::from_shape_fn((3, 48, 64), |(_, y, x)| if inside(y, x) { 0.9 } else { 0.2 });
+//! let depth = Array2::from_shape_fn((48, 64), |(y, x)| if inside(y, x) { 0.1 } else { 0.8 });
+//! let frame = RgbdFrame::new(rgb, depth)?;
 //!
 //! // (3, 48, 64) levels, red first.
 //! let levels = pipeline.levels(&frame)?;
