@@ -11,6 +11,20 @@ const COMMAND: &str = match option_env!("CARGO_BIN_EXE_phasefront") {
     },
 };
 
+/// Makes a small hologram of [`Folder::with_frame`]'s frame; `-o` and what differs follow.
+#[allow(dead_code, reason = "not every test needs a hologram")]
+pub(crate) const SMALL_HOLOGRAM: [&str; 9] = [
+    "hologram",
+    "--rgb",
+    "rgb.png",
+    "--depth",
+    "depth.png",
+    "--method",
+    "sweep",
+    "--planes",
+    "8",
+];
+
 pub(crate) struct Folder(pub(crate) tempfile::TempDir);
 
 impl Folder {

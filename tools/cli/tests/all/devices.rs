@@ -2,7 +2,7 @@
 //! input.
 use crate::folder;
 
-use folder::Folder;
+use folder::{Folder, SMALL_HOLOGRAM};
 use phasefront::output::{ModulatorSpec, Packing};
 use phasefront_io::hologram::packed::Image;
 use phasefront_io::hologram::{self, Hologram};
@@ -44,19 +44,8 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
         };
         frame(&folder, (48, 32));
         let size = format!("{}x{}", size.0, size.1);
-        let made = [
-            "hologram",
-            "--rgb",
-            "rgb.png",
-            "--depth",
-            "depth.png",
-            "--method",
-            "sweep",
-            "--planes",
-            "8",
-        ];
         let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
-        folder.succeeds(&[&made[..], fit, &to].concat());
+        folder.succeeds(&[&SMALL_HOLOGRAM[..], fit, &to].concat());
         let frames = match folder.path("frame.png").exists() {
             true => vec!["frame.png"],
             false => vec!["frame-red.png", "frame-green.png", "frame-blue.png"],

@@ -2,28 +2,16 @@
 use crate::folder;
 use crate::ldi;
 
-use folder::Folder;
+use folder::{Folder, SMALL_HOLOGRAM};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-const SMALL: [&str; 9] = [
-    "hologram",
-    "--rgb",
-    "rgb.png",
-    "--depth",
-    "depth.png",
-    "--method",
-    "sweep",
-    "--planes",
-    "8",
-];
-
 /// Creates a folder with a small frame, `rgb.png` and `depth.png`, and its hologram, `h.png`, `h.npy` and `h.json`.
 fn folder() -> Folder {
     let folder = Folder::new().with_frame();
-    folder.succeeds(&with(&SMALL, &["--complex", "h.npy", "-o", "h.png"]));
+    folder.succeeds(&with(&SMALL_HOLOGRAM, &["--complex", "h.npy", "-o", "h.png"]));
     folder
 }
 
@@ -93,7 +81,7 @@ fn only_temporary_files_of_killed_runs_are_removed() {
     held.lock().unwrap();
     an_hour_old(&folder.path(".phasefront-held5678901.tmp"));
     fs::write(folder.path(".phasefront-new456789012.tmp"), "").unwrap();
-    folder.succeeds(&with(&SMALL, &["-o", "out.png"]));
+    folder.succeeds(&with(&SMALL_HOLOGRAM, &["-o", "out.png"]));
     folder.succeeds(&["refocus", "h.png", "--stack", "2", "-o", "stack"]);
     for name in left {
         assert!(!folder.path(name).exists(), "{name}");
@@ -124,7 +112,7 @@ fn pipes_and_links_with_names_of_temporary_files_are_left_alone() {
             .unwrap();
         assert!(touched.success());
     }
-    folder.succeeds(&with(&SMALL, &["-o", "out.png"]));
+    folder.succeeds(&with(&SMALL_HOLOGRAM, &["-o", "out.png"]));
     assert!(names.iter().all(|name| folder.path(name).exists()));
     assert!(folder.path("mine.txt").exists() && folder.path(".phasefront-link56789012.tmp").is_symlink());
 }
@@ -158,11 +146,11 @@ fn an_input_is_never_an_output() {
             capture,
         ],
         &["calibrate", "laser", "captures", "--overwrite", "-o", capture],
-        &with(&SMALL, &["-o", "rgb.png"]),
-        &with(&SMALL, &["-o", "depth.png"]),
-        &with(&SMALL, &["-o", "./sub/../rgb.png"]),
-        &with(&SMALL, &["-o", "hard.png"]),
-        &with(&SMALL, &["-o", "new.png", "--packed", "rgb.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "rgb.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "depth.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "./sub/../rgb.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "hard.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "new.png", "--packed", "rgb.png"]),
         &["hologram", "--ldi", "ldi", "--planes", "8", "-o", "ldi/layer_0.png"],
         &["refocus", "h.png", "--z-mm", "0", "-o", "h.png"],
         &["refocus", "h.npy", "--z-mm", "0", "-o", "v.png", "--trace", "h.json"],
@@ -200,18 +188,18 @@ fn a_link_stays_and_the_file_that_it_points_to_is_replaced() {
     std::os::unix::fs::symlink("rgb.png", folder.path("to_input.png")).unwrap();
     refuses(
         &folder,
-        &with(&SMALL, &["-o", "to_input.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "to_input.png"]),
         &["to_input.png", "is the input "],
     );
     std::os::unix::fs::symlink("nowhere.png", folder.path("to_nothing.png")).unwrap();
     refuses(
         &folder,
-        &with(&SMALL, &["-o", "to_nothing.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "to_nothing.png"]),
         &["to_nothing.png", "link"],
     );
     fs::write(folder.path("old.png"), "old").unwrap();
     std::os::unix::fs::symlink("old.png", folder.path("latest.png")).unwrap();
-    folder.succeeds(&with(&SMALL, &["-o", "latest.png"]));
+    folder.succeeds(&with(&SMALL_HOLOGRAM, &["-o", "latest.png"]));
     assert!(folder.path("latest.png").is_symlink());
     assert_eq!(
         fs::read(folder.path("old.png")).unwrap(),
@@ -223,20 +211,20 @@ fn a_link_stays_and_the_file_that_it_points_to_is_replaced() {
 fn two_outputs_never_have_one_name() {
     let folder = folder();
     let calls: &[&[&str]] = &[
-        &with(&SMALL, &["-o", "new.png", "--packed", "new.png"]),
-        &with(&SMALL, &["-o", "new.png", "--packed", "./new.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "new.png", "--packed", "new.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "new.png", "--packed", "./new.png"]),
         &with(
-            &SMALL,
+            &SMALL_HOLOGRAM,
             &["-o", "new.png", "--complex", "new.npy", "--trace", "new.json"],
         ),
-        &with(&SMALL, &["-o", "h.png", "--packed", "h.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "h.png", "--packed", "h.png"]),
     ];
     for call in calls {
         refuses(&folder, call, &["is an output already"]);
     }
     refuses(
         &folder,
-        &with(&SMALL, &["-o", "h.png", "--trace", "h.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "h.png", "--trace", "h.png"]),
         &["h.png", ".json"],
     );
 }
@@ -256,12 +244,12 @@ fn folders_and_special_files_are_never_replaced() {
     std::os::unix::fs::symlink("/dev/null", folder.path("null.json")).unwrap();
     refuses(
         &folder,
-        &with(&SMALL, &["-o", "folder.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "folder.png"]),
         &["folder.png", "is a folder"],
     );
     refuses(
         &folder,
-        &with(&SMALL, &["-o", "socket.png"]),
+        &with(&SMALL_HOLOGRAM, &["-o", "socket.png"]),
         &["socket.png", "regular file"],
     );
     for name in ["pipe.json", "null.json"] {
@@ -288,11 +276,11 @@ fn folders_and_special_files_are_never_replaced() {
 fn a_description_that_is_not_a_holograms_is_kept() {
     let folder = folder();
     fs::write(folder.path("notes.json"), r#"{"mine": true}"#).unwrap();
-    let call = with(&SMALL, &["--complex", "notes.npy", "-o", "new.png"]);
+    let call = with(&SMALL_HOLOGRAM, &["--complex", "notes.npy", "-o", "new.png"]);
     refuses(&folder, &call, &["notes.json", "another name"]);
     // The files of an earlier hologram are replaced.
     folder.succeeds(&with(
-        &SMALL,
+        &SMALL_HOLOGRAM,
         &["--complex", "h.npy", "-o", "new.png", "--offset-mm", "1"],
     ));
     assert!(
@@ -422,14 +410,18 @@ fn a_folder_that_is_filled_is_new_or_empty_or_overwritten() {
 #[test]
 fn names_that_begin_with_a_dash_or_hold_control_characters_are_names() {
     let folder = folder();
-    assert!(folder.succeeds(&with(&SMALL, &["-o=-x.png"])).starts_with("-x.png: "));
+    assert!(
+        folder
+            .succeeds(&with(&SMALL_HOLOGRAM, &["-o=-x.png"]))
+            .starts_with("-x.png: ")
+    );
     assert!(folder.path("-x.png").exists());
     if !cfg!(unix) {
         return;
     }
     let name = "a\n\u{1b}[31m\u{9b}b.png";
     let shown = "a\u{fffd}\u{fffd}[31m\u{fffd}b.png";
-    let said = folder.succeeds(&with(&SMALL, &["-o", name]));
+    let said = folder.succeeds(&with(&SMALL_HOLOGRAM, &["-o", name]));
     assert!(
         said.starts_with(&format!("{shown}: 48×32")) && said.lines().count() == 1,
         "{said:?}"
