@@ -43,7 +43,7 @@ def make(output, arguments, command="phasefront-lab"):
     try:
         status = subprocess.run(call, check=False).returncode
     except FileNotFoundError:
-        raise DataError(f"no command '{command}': build the lab (cargo build --release) and name it by --command") from None
+        raise DataError(f"no command '{command}': build it (cargo build --release) and give its path by --phasefront-lab") from None
     if status != 0:
         raise DataError(f"'{' '.join(call)}' ended with status {status}")
 

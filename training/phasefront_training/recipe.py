@@ -55,7 +55,7 @@ class Settings:
     """The settings of a run, which may differ between machines."""
 
     output: Path
-    phasefront: str  # the lab's command
+    phasefront: str  # path of the command phasefront-lab
     networks: tuple[str, ...]
     hours: float  # of training, all networks together
     scenes: int  # of each kind
@@ -79,14 +79,14 @@ def steps(settings: Settings) -> Iterator[Step]:
     chosen = {name: NETWORKS[name] for name in NETWORKS if name in settings.networks}
     for kind, seed in KINDS.items():
         scenes = ("--scenes", settings.scenes, "--size", settings.size, "--seed", seed, "--scenes-like", kind)
-        made = ("data", "--phasefront", settings.phasefront, "-o")
+        made = ("data", "--phasefront-lab", settings.phasefront, "-o")
         yield _step(f"data {kind}", *made, folder / kind, "--", *scenes, "--planes", settings.planes)
         if any(network.wide for network in chosen.values()):
             deep = ("--planes", 2 * settings.planes, "--display", folder / "deep.toml")
             yield _step(f"data {kind}{DEEP}", *made, folder / f"{kind}{DEEP}", "--", *scenes, *deep)
         if any(network.seeded for network in chosen.values()):
             more = ("--", "--planes", SEED_PLANES) + (("--refined", 3) if settings.size % 4 == 0 else ())
-            given = ("--data", folder / kind, "-o", folder / f"seeds-{kind}", "--phasefront", settings.phasefront)
+            given = ("--data", folder / kind, "-o", folder / f"seeds-{kind}", "--phasefront-lab", settings.phasefront)
             yield _step(f"seeds {kind}", "seeds", *given, *more)
     for name, network in chosen.items():
         yield from _of_network(settings, name, network)

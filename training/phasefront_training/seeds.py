@@ -25,7 +25,7 @@ FORMAT = "phasefront-seeds-1"
 
 
 def make(manifest, output, variants, arguments, command="phasefront-lab"):
-    """Makes or completes the seeds of a data set: `variants` depths per scene, then the fields by the lab's command."""
+    """Makes or completes the seeds of a data set: `variants` depths per scene, then the fields with `phasefront-lab seeds`."""
     output = Path(output)
     output.mkdir(parents=True, exist_ok=True)
     for number in range(manifest.table["scenes"]):
@@ -37,7 +37,7 @@ def make(manifest, output, variants, arguments, command="phasefront-lab"):
     try:
         status = subprocess.run(call, check=False).returncode
     except FileNotFoundError:
-        raise DataError(f"no command '{command}': build the lab (cargo build --release) and name it by --phasefront") from None
+        raise DataError(f"no command '{command}': build it (cargo build --release) and give its path by --phasefront-lab") from None
     if status != 0:
         raise DataError(f"'{' '.join(call)}' ended with status {status}")
 

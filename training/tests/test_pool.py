@@ -49,7 +49,7 @@ def test_kinds_come_in_their_shares_from_the_first_shard_on():
 
 def test_a_pool_is_made_shard_by_shard_and_goes_on_where_it_stopped(command, tmp_path):
     folder = tmp_path / "pool"
-    call = ["pool", "-o", str(folder), "--scenes", "160", "--phasefront", command, "--textures", "t", "--", "--size", "32"]
+    call = ["pool", "-o", str(folder), "--scenes", "160", "--phasefront-lab", command, "--textures", "t", "--", "--size", "32"]
     assert main(call) == 1
     assert sorted(path.name for path in folder.iterdir()) == ["shard_0000", "shard_0001", "shard_0002.part"]
     (folder / "mended").touch()
@@ -70,7 +70,7 @@ def test_a_pool_stays_within_its_share_of_the_disk(command, tmp_path):
     "more", [["--shares", "clouds=1"], ["--shares", "varied"], ["--shares", "varied=0"], ["--shard-scenes", "10"], ["--", "--seed", "3"]], ids=str
 )
 def test_wrong_pools_are_one_line(command, tmp_path, capsys, more):
-    assert main(["pool", "-o", str(tmp_path / "pool"), "--scenes", "160", "--phasefront", command, *more]) == 1
+    assert main(["pool", "-o", str(tmp_path / "pool"), "--scenes", "160", "--phasefront-lab", command, *more]) == 1
     told = capsys.readouterr().err
     assert told.startswith("error: ") and told.count("\n") == 1
 

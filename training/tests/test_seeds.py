@@ -24,7 +24,7 @@ def seeds_folder(data_folder, tmp_path):
     """Makes seeds by the command with a substitute for the lab: the seed is the truth, or half of it on simulated
     sensor depth. The single refined depth is 0.25 everywhere."""
     folder = tmp_path / "seeds"
-    main(["seeds", "--data", str(data_folder), "-o", str(folder), "--variants", "3", "--phasefront", "true"])
+    main(["seeds", "--data", str(data_folder), "-o", str(folder), "--variants", "3", "--phasefront-lab", "true"])
     for i in range(8):
         truth = np.load(data_folder / f"pair_{i:06d}.npz")["hologram"]
         np.save(folder / f"seed_{i:06d}.npy", np.stack([stored(truth)] + [stored(truth / 2)] * 3))

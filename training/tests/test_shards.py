@@ -51,7 +51,7 @@ def test_every_pair_is_made_once(cluster, command, tmp_path):
 
 def test_the_command_counts_shards_by_the_cluster(cluster, command, tmp_path):
     out = tmp_path / "set"
-    call = ["shards", "-o", str(out), "--phasefront", command, "--cpus", "2", "--", "--scenes", "9", "--seed", "1"]
+    call = ["shards", "-o", str(out), "--phasefront-lab", command, "--cpus", "2", "--", "--scenes", "9", "--seed", "1"]
     assert main(call) == 0
     assert [json.loads(path.read_text())[1:] for path in sorted(out.iterdir())] == [[4, "2"]] * 9
 
