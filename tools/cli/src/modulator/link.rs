@@ -38,7 +38,7 @@ pub enum Range {
     Full,
     /// 16 to 235: full levels on a limited link.
     Limited,
-    /// 16 to 235 arrive as 0 to 255 and the levels beyond are lost: limited levels were taken for full ones.
+    /// 16 to 235 arrive as 0 to 255 and the levels beyond are lost: full levels were taken for limited ones.
     Expanded,
     /// Another range.
     Other,
@@ -113,7 +113,7 @@ impl Reading {
                 faults.push("limited range: levels 0 to 255 arrive as 16 to 235; set the driver's output to full range".into());
             }
             Range::Expanded => faults.push(
-                "limited range taken for full: levels under 16 and over 235 are lost; set the driver's output to full range"
+                "full range taken for limited: levels under 16 and over 235 are lost; set the driver's output to full range"
                     .into(),
             ),
             Range::Other => faults.push(format!(
@@ -317,6 +317,7 @@ mod tests {
         assert!(reading.grey_error[1] == 0.0 && reading.colour_error[1] == 0.0);
     }
 
+    /// Checks both faults: a source that sends limited levels, and a screen that expects them.
     #[test]
     fn limited_range_is_found_both_ways() {
         let squeezed = through(|p| p.map(|v| 16.0 + v * 219.0 / 255.0));
@@ -331,7 +332,7 @@ mod tests {
         let reading = read(&clipped, SIZE);
         assert_eq!(reading.range, Range::Expanded);
         assert!(
-            reading.faults.len() == 1 && reading.faults[0].contains("taken for full"),
+            reading.faults.len() == 1 && reading.faults[0].starts_with("full range taken for limited:"),
             "{:?}",
             reading.faults
         );
