@@ -72,8 +72,9 @@ pub use {ndarray, num_complex};
 pub mod input;
 pub mod output {
     //! Converts levels to the images that a modulator takes, and back; data of commercially available modulators.
+    pub use phasefront_core::display::levels::Levels;
     pub use phasefront_core::output::modulator::{ModulatorSpec, Packing};
-    pub use phasefront_core::output::{BitPlanes, Cells, Layout, Levels, Output, Placement};
+    pub use phasefront_core::output::{BitPlanes, Cells, Layout, Output, Placement};
 }
 pub mod session;
 pub mod target {

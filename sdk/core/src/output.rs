@@ -14,6 +14,7 @@ mod split;
 pub use cells::{BitPlanes, Cells};
 pub use split::Split;
 
+use crate::display::levels::Levels;
 use crate::display::response::Response;
 use crate::display::response::per_pixel::PerPixel;
 use crate::display::target::Target;
@@ -42,15 +43,6 @@ pub enum Layout {
     /// One image for each colour, whose red, green and blue bytes share the bits of one level.
     #[doc(hidden)]
     Split(Split),
-}
-
-/// A hologram's levels, (C, H, W).
-#[derive(Debug, Clone, Copy)]
-pub enum Levels<'a> {
-    /// Levels of up to 8 bits, as the planned response produces them.
-    Bytes(&'a [u8]),
-    /// Levels of 9 or 10 bits.
-    Words(&'a [u16]),
 }
 
 impl Layout {

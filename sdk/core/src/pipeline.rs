@@ -3,6 +3,7 @@
 
 pub mod display_plan;
 
+use crate::display::levels::LevelsMut;
 use crate::display::target::Target;
 use crate::encode::EncoderOptions;
 use crate::encode::brightness::Past;
@@ -135,8 +136,7 @@ impl Pipeline {
     }
 
     /// Works like [`Self::field`] for a frame that `follows` the previous one.
-    #[doc(hidden)]
-    pub fn field_after(
+    fn field_after(
         &self,
         follows: bool,
         frame: &RgbdFrame,
@@ -160,48 +160,14 @@ impl Pipeline {
     /// # Panics
     /// Panics if `field` or `levels` does not have C·H·W values.
     #[doc(hidden)]
-    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut PipelineScratch) -> Modulation {
-        self.modulate_after(None, field, levels, scratch)
-    }
-
-    /// Calls [`DisplayPlan::modulate_after`].
-    #[doc(hidden)]
-    pub fn modulate_after(
+    pub fn modulate(
         &self,
         past: Option<Past>,
         field: &mut [Complex32],
-        levels: &mut [u8],
+        levels: LevelsMut<'_>,
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        self.display.modulate_after(past, field, levels, &mut scratch.display)
-    }
-
-    /// Calls [`DisplayPlan::modulate_words_after`].
-    #[doc(hidden)]
-    pub fn modulate_words_after(
-        &self,
-        past: Option<Past>,
-        field: &mut [Complex32],
-        phases: &mut [f32],
-        words: &mut [u16],
-        scratch: &mut PipelineScratch,
-    ) -> Modulation {
-        (self.display).modulate_words_after(past, field, phases, words, &mut scratch.display)
-    }
-
-    /// Calls [`DisplayPlan::modulate_words`].
-    ///
-    /// # Panics
-    /// Panics if `field`, `phases` or `words` does not have C·H·W values.
-    #[doc(hidden)]
-    pub fn modulate_words(
-        &self,
-        field: &mut [Complex32],
-        phases: &mut [f32],
-        words: &mut [u16],
-        scratch: &mut PipelineScratch,
-    ) -> Modulation {
-        (self.display).modulate_words(field, phases, words, &mut scratch.display)
+        self.display.modulate(past, field, levels, &mut scratch.display)
     }
 
     /// Writes the levels of `frame` into `levels`, (C, H, W). The first call with a scratch allocates its field; later
@@ -213,10 +179,22 @@ impl Pipeline {
     /// # Panics
     /// Panics if `levels` does not have C·H·W values.
     pub fn process(&self, frame: &RgbdFrame, levels: &mut [u8], scratch: &mut PipelineScratch) -> Result<FrameReport> {
+        self.process_after(None, frame, LevelsMut::Bytes(levels), scratch)
+    }
+
+    /// Works like [`Self::process`] for a frame that follows another if there is a `past`, and for words too.
+    #[doc(hidden)]
+    pub fn process_after(
+        &self,
+        past: Option<Past>,
+        frame: &RgbdFrame,
+        levels: LevelsMut<'_>,
+        scratch: &mut PipelineScratch,
+    ) -> Result<FrameReport> {
         let mut field = std::mem::take(&mut scratch.field);
         let (height, width) = self.shape();
         field.resize(self.colours() * height * width, Complex32::ZERO);
-        let report = self.process_in(&mut field, frame, levels, scratch);
+        let report = self.process_in(&mut field, past, frame, levels, scratch);
         scratch.field = field;
         report
     }
@@ -224,12 +202,13 @@ impl Pipeline {
     fn process_in(
         &self,
         field: &mut [Complex32],
+        past: Option<Past>,
         frame: &RgbdFrame,
-        levels: &mut [u8],
+        levels: LevelsMut<'_>,
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
-        let (method, propagate) = self.field(frame, field, scratch)?;
-        let modulation = self.modulate(field, levels, scratch);
+        let (method, propagate) = self.field_after(past.is_some(), frame, field, scratch)?;
+        let modulation = self.modulate(past, field, levels, scratch);
         Ok(FrameReport {
             scale: modulation.scale,
             times: FrameTimes {
@@ -315,7 +294,8 @@ mod tests {
             let untouched = Complex32::new(1.5, -2.5);
             let run = |scratch: &mut PipelineScratch| {
                 let (mut field, mut levels) = (vec![untouched; values], vec![77; values]);
-                pipeline.process_in(&mut field, &frame, &mut levels, scratch).unwrap();
+                let out = LevelsMut::Bytes(&mut levels);
+                pipeline.process_in(&mut field, None, &frame, out, scratch).unwrap();
                 (field, levels)
             };
             let whole = run(&mut pipeline.scratch());

@@ -14,6 +14,7 @@ use num_complex::Complex32;
 use phasefront_core::depth::refine::Refiner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::display::panel::Flatness;
 use phasefront_core::display::panel::Panel;
 use phasefront_core::display::registration::Registration;
@@ -165,7 +166,7 @@ fn hot_calls_allocate_nothing() {
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
-                    plan.modulate(&mut field, &mut levels, &mut scratch);
+                    plan.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), &mut scratch);
                 };
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
@@ -174,7 +175,7 @@ fn hot_calls_allocate_nothing() {
             let mut scratch = plan.scratch();
             let frame = || {
                 plan.propagate(&mut field, &mut scratch);
-                plan.modulate(&mut field, &mut levels, &mut scratch);
+                plan.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), &mut scratch);
             };
             assert_eq!(count(frame), 0, "a calibrated display");
             one_laser(&swept, seeded.clone());

@@ -2,13 +2,13 @@
 //! module falls back from the GPU to the CPU.
 
 mod brightness;
-mod frame_io;
+mod frame_input;
 mod on_cpu;
 #[cfg(feature = "gpu")]
 mod on_gpu;
 
 pub(super) use brightness::BrightnessTracker;
-pub(super) use frame_io::{FrameInput, LevelsOut};
+pub(super) use frame_input::FrameInput;
 pub(super) use on_cpu::OnCpu;
 #[cfg(feature = "gpu")]
 pub use on_gpu::GpuOptions;
@@ -16,9 +16,10 @@ pub use on_gpu::GpuOptions;
 use super::SessionOptions;
 use super::quality::{Backend, QualityLevel};
 use super::statistics::BackendReport;
-use frame_io::Encoded;
 #[cfg(feature = "gpu")]
 use on_gpu::{Failure, OnGpu};
+use phasefront_core::display::levels::LevelsMut;
+use phasefront_core::pipeline::FrameReport;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 
@@ -138,19 +139,22 @@ impl Engine {
         context: &mut LevelContext<'_>,
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
-        out: LevelsOut<'_>,
-    ) -> Result<Encoded> {
+        levels: LevelsMut<'_>,
+    ) -> Result<FrameReport> {
         match &mut self.processor {
             Processor::Cpu(cpu) => {
                 let past = brightness.past(input.elapsed);
-                let made = cpu.process(input.rgbd, past, out)?;
+                let made = cpu.process(past, input.rgbd, levels)?;
                 brightness.set_scale(made.scale);
                 Ok(made)
             }
             #[cfg(feature = "gpu")]
             Processor::Gpu(gpu) => {
+                let LevelsMut::Bytes(bytes) = levels else {
+                    unreachable!("a GPU refuses a display of more than 8 bits");
+                };
                 let before = gpu.openings();
-                let made = gpu.process(input, brightness, out.levels);
+                let made = gpu.process(input, brightness, bytes);
                 if gpu.openings() != before {
                     context.gpu.device = gpu.device().cloned();
                     self.report_is_new = true;
@@ -166,7 +170,7 @@ impl Engine {
                         let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
                         self.processor = Processor::Cpu(Box::new(cpu));
                         self.report_is_new = true;
-                        self.process(context, input, brightness, out)
+                        self.process(context, input, brightness, LevelsMut::Bytes(bytes))
                     }
                 }
             }

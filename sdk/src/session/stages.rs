@@ -3,9 +3,9 @@
 
 use super::SessionOptions;
 use super::engine::BrightnessTracker;
+use super::engine::FrameInput;
 use super::engine::OnCpu;
 use super::engine::{Engine, GpuState, LevelContext};
-use super::engine::{FrameInput, LevelsOut};
 use super::hologram::{Hologram, Pool, Viewer};
 use super::live::guarded;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
@@ -13,6 +13,7 @@ use super::statistics::BackendReport;
 use super::threads::Threads;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::{DepthReport, DepthStream};
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
 use phasefront_core::pipeline::FrameTimes;
 use phasefront_core::runtime::cancel::Cancel;
@@ -218,10 +219,7 @@ impl Stages {
                     elapsed: None,
                 },
                 &mut brightness,
-                LevelsOut {
-                    levels: &mut levels.values,
-                    words: None,
-                },
+                LevelsMut::Bytes(&mut levels.values),
             )
         });
         self.plan = Some(plan);
@@ -319,7 +317,7 @@ impl Stages {
         let mut words = (display.bits() > 8).then(|| words.take(values));
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
-        let (report, scale) = pool.install(|| -> Result<_> {
+        let (report, encoded) = pool.install(|| -> Result<_> {
             let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
             let report = plan.take_in(frame, elapsed, &mut times)?;
             given_up(cancel)?;
@@ -340,16 +338,19 @@ impl Stages {
                     elapsed,
                 },
                 brightness,
-                LevelsOut {
-                    levels: &mut levels.values,
-                    words: words.as_mut().map(|words| &mut words.values[..]),
+                match &mut words {
+                    None => LevelsMut::Bytes(&mut levels.values),
+                    Some(words) => LevelsMut::Words(&mut words.values),
                 },
             )?;
             given_up(cancel)?;
-            times.method = encoded.method;
-            times.propagate = encoded.propagate;
-            times.encode = encoded.encode;
-            Ok((report, encoded.scale))
+            if let Some(words) = &words {
+                let below = display.bits() - 8;
+                for (level, word) in levels.values.iter_mut().zip(&words.values) {
+                    *level = (*word >> below) as u8;
+                }
+            }
+            Ok((report, encoded))
         })?;
         Ok(Hologram {
             timestamp_ns: frame.timestamp_ns,
@@ -357,8 +358,12 @@ impl Stages {
             levels,
             words,
             depth: depths,
-            scale,
-            times,
+            scale: encoded.scale,
+            times: FrameTimes {
+                colour: times.colour,
+                depth: times.depth,
+                ..encoded.times
+            },
             range_m: report.range_m,
             valid_depth: report.valid,
             quality_level: level_control.quality_level(),

@@ -14,6 +14,7 @@ use phasefront::{
     Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, SessionOptions, Sweep, Target,
     VideoSession,
 };
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::display::panel::Flatness;
 use phasefront_core::display::panel::Panel;
 use phasefront_core::display::registration::Registration;
@@ -99,7 +100,7 @@ fn made(frame: &RgbdFrame, method: Method, target: &Target, options: &EncoderOpt
     let mut scratch = pipeline.scratch();
     pipeline.field(frame, &mut field, &mut scratch).unwrap();
     let kept = field.clone();
-    pipeline.modulate(&mut field, &mut levels, &mut scratch);
+    pipeline.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), &mut scratch);
     (kept, levels)
 }
 
@@ -356,10 +357,9 @@ fn levels_of_ten_bits_are_made_for_one_laser() {
         let (colours, options) = (display.colours(), options(Encoding::ANTI_ALIAS, 0));
         let plan = Pipeline::new((H, W), method, &display.into(), &options).unwrap();
         let mut scratch = plan.scratch();
-        let mut field = vec![Complex32::ZERO; colours * SIZE];
-        let (mut phases, mut words) = (vec![0.0; colours * SIZE], vec![0; colours * SIZE]);
-        plan.field(&rgbd(colours), &mut field, &mut scratch).unwrap();
-        plan.modulate_words(&mut field, &mut phases, &mut words, &mut scratch);
+        let mut words = vec![0; colours * SIZE];
+        let out = LevelsMut::Words(&mut words);
+        plan.process_after(None, &rgbd(colours), out, &mut scratch).unwrap();
         words
     };
     assert!(words(ONE) == words(THREE)[..SIZE]);

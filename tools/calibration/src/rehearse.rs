@@ -15,6 +15,7 @@ use ndarray::{Array2, Array3, Axis, s, stack};
 use num_complex::Complex32;
 use phasefront::target::{Aberration, Response};
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::optics::zernike::Coefficients;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::dice::Dice;
@@ -448,8 +449,9 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
     let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
     let mut levels = Array3::zeros((3, h, w));
     plan.modulate(
+        None,
         field.as_slice_mut().expect("standard layout"),
-        levels.as_slice_mut().expect("standard layout"),
+        LevelsMut::Bytes(levels.as_slice_mut().expect("standard layout")),
         &mut plan.scratch(),
     );
     let plane = levels.index_axis(Axis(0), colour);

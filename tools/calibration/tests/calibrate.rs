@@ -11,13 +11,14 @@ use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_calibration::curves::lut::{self, Curves, Problem, Refusal, What};
 use phasefront_calibration::rehearse;
 use phasefront_calibration::simulated_display::{self, SimulatedDisplay};
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::optics::zernike::Aberrations;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_exact::corrected::{self, Correction};
 use phasefront_exact::sm_lbm;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::display::calibration::AberrationFile;
-use phasefront_io::hologram::{Hologram, HologramInfo};
+use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::metrics;
 use std::f64::consts::TAU;
@@ -295,8 +296,9 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
         let mut scratch = plan.scratch();
         plan.propagate(field.as_slice_mut().unwrap(), &mut scratch);
         let modulation = plan.modulate(
+            None,
             field.as_slice_mut().unwrap(),
-            levels.as_slice_mut().unwrap(),
+            LevelsMut::Bytes(levels.as_slice_mut().unwrap()),
             &mut scratch,
         );
         let info = HologramInfo {
@@ -313,7 +315,9 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let info = encoded(&options, &plain, false).1;
     let truth = Hologram::Complex(plain.clone(), info).views(&z_m).unwrap();
     let quality = |(levels, info): (Array3<u8>, HologramInfo), file: &DisplayFile| -> f64 {
-        let views = Hologram::PhaseOnly(levels, info).views_on(file, &z_m).unwrap();
+        let views = Hologram::Levels(Levels::Bytes(levels), info)
+            .views_on(file, &z_m)
+            .unwrap();
         // The comparison excludes the border, where the cylinder spreads light out of the frame.
         let inner = ndarray::s![.., 16..h - 16, 16..w - 16];
         let psnr = (views.iter().zip(&truth)).map(|(view, truth)| {

@@ -7,6 +7,7 @@ pub mod random;
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::method::network::Precision;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::{Error, Result};
@@ -212,10 +213,11 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
         if let Some((scratch, plan)) = &mut by_table {
             // The encoder's filter changes the field.
             let mut field = field.clone();
-            let modulation = plan.modulate(&mut field, &mut levels, scratch);
+            let modulation = plan.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), scratch);
             times.table_encode.push(ms(modulation.encode));
         }
-        let encode = pipeline.modulate(&mut field, &mut levels, &mut scratch).encode;
+        let out = LevelsMut::Bytes(&mut levels);
+        let encode = pipeline.modulate(None, &mut field, out, &mut scratch).encode;
         for (stage, time) in [(name, method), ("propagate", propagate), ("encode", encode)] {
             times.stages.entry(stage).or_default().push(ms(time));
         }

@@ -10,7 +10,7 @@ use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::asm::{self, Padding, Propagator};
 use phasefront_core::optics::reference::propagate;
 use phasefront_gpu::{Device, Job, probe};
-use phasefront_io::hologram::{Hologram, HologramInfo};
+use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::{Error, Result, metrics};
 use phasefront_models::{Precision, network};
 use serde::Serialize;
@@ -310,7 +310,7 @@ fn frame() -> Result<Check> {
         levels_turns: None,
         calibrated: Vec::new(),
     };
-    let seen = Hologram::PhaseOnly(levels, info).views(&[0.0])?;
+    let seen = Hologram::Levels(Levels::Bytes(levels), info).views(&[0.0])?;
     let shown_db = metrics::compare(seen[0].view(), rgb.view())?.psnr_overall;
     let says = format!("what a hologram shows is {shown_db:.1} dB from its picture; {SHOWN_DB} are right");
     Ok(Check::new("whole frame", shown_db >= SHOWN_DB, says))

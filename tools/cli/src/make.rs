@@ -5,7 +5,6 @@ mod cpu;
 mod gpu;
 mod judged;
 mod layers;
-mod levels;
 mod request;
 
 pub(crate) use judged::{Judged, judge};
@@ -18,8 +17,9 @@ use num_complex::Complex32;
 use phasefront::RgbdFrame;
 use phasefront_command::flags::sweep_for;
 use phasefront_core::depth::sharpness;
+use phasefront_core::method::network::Engine;
 use phasefront_io::display::DisplayFile;
-use phasefront_io::hologram::{self, HologramInfo};
+use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};
 use phasefront_models::default_network;
@@ -82,9 +82,7 @@ impl HologramRequest {
 pub(crate) struct HologramResult {
     pub(crate) method: &'static str,
     pub(crate) field: Option<Array3<Complex32>>,
-    pub(crate) levels: Array3<u8>,
-    /// The full levels if they have over 8 bits. `levels` then holds their upper 8 bits.
-    pub(crate) words: Option<Array3<u16>>,
+    pub(crate) levels: Levels,
     pub(crate) encoder: Encoder,
     pub(crate) scale: f32,
     /// The stages and their times. The last stage is the encoder.
@@ -93,13 +91,20 @@ pub(crate) struct HologramResult {
 }
 
 impl HologramResult {
-    /// Returns the hologram with all bits of its levels.
-    pub(crate) fn hologram(&self, info: HologramInfo) -> hologram::Hologram {
-        match &self.words {
-            Some(words) => hologram::Hologram::Words(words.clone(), info),
-            None => hologram::Hologram::PhaseOnly(self.levels.clone(), info),
-        }
+    /// Returns the hologram of the levels.
+    pub(crate) fn hologram(&self, info: HologramInfo) -> Hologram {
+        Hologram::Levels(self.levels.clone(), info)
     }
+}
+
+/// Makes a stack of `shape` from `values`.
+fn stack(values: Vec<Complex32>, shape: (usize, usize, usize)) -> Array3<Complex32> {
+    Array3::from_shape_vec(shape, values).expect("a stack of the frame's shape")
+}
+
+/// Describes the engine of a network and why it was chosen.
+fn described(engine: &Engine) -> String {
+    format!("{} ({})", engine.name, engine.why)
 }
 
 /// Returns the metadata for files of the levels and of the field.

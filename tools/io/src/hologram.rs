@@ -11,12 +11,13 @@ use crate::output::{self, Pending, has_extension};
 use crate::picture::{PngShape, interleaved, open_image, write_png_of};
 use crate::{Error, Result};
 use image::DynamicImage;
-use ndarray::{Array3, ArrayView3, Ix3};
+use ndarray::{Array3, ArrayView3, CowArray, Ix3};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::output::ModulatorSpec;
 use phasefront::target::Response;
+use phasefront_core::display::levels::{self, LevelsMut};
 use phasefront_core::runtime::file;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -136,6 +137,16 @@ pub enum Levels {
 }
 
 impl Levels {
+    /// Returns levels 0 for a hologram of (H, W) pixels on `display`.
+    pub fn zeros(display: &Display, (height, width): (usize, usize)) -> Self {
+        let shape = (display.colours(), height, width);
+        if display.bits() <= 8 {
+            Levels::Bytes(Array3::zeros(shape))
+        } else {
+            Levels::Words(Array3::zeros(shape))
+        }
+    }
+
     /// Returns the shape, (C, H, W).
     pub fn dim(&self) -> (usize, usize, usize) {
         match self {
@@ -144,11 +155,42 @@ impl Levels {
         }
     }
 
-    /// Combines the levels with `info` into a hologram.
-    pub fn hologram(self, info: HologramInfo) -> Hologram {
+    /// Returns the levels in memory.
+    pub fn view(&self) -> levels::Levels<'_> {
         match self {
-            Levels::Bytes(levels) => Hologram::PhaseOnly(levels, info),
-            Levels::Words(levels) => Hologram::Words(levels, info),
+            Levels::Bytes(levels) => levels::Levels::Bytes(levels.as_slice().expect("standard layout")),
+            Levels::Words(levels) => levels::Levels::Words(levels.as_slice().expect("standard layout")),
+        }
+    }
+
+    /// Returns the memory of the levels.
+    pub fn view_mut(&mut self) -> LevelsMut<'_> {
+        match self {
+            Levels::Bytes(levels) => LevelsMut::Bytes(levels.as_slice_mut().expect("standard layout")),
+            Levels::Words(levels) => LevelsMut::Words(levels.as_slice_mut().expect("standard layout")),
+        }
+    }
+
+    /// Returns the upper 8 bits of levels of `bits` bits.
+    pub fn upper(&self, bits: u32) -> CowArray<'_, u8, Ix3> {
+        match self {
+            Levels::Bytes(levels) => levels.view().into(),
+            Levels::Words(levels) => levels.mapv(|level| (level >> bits.saturating_sub(8)) as u8).into(),
+        }
+    }
+
+    /// Writes the levels as a PNG with `texts`: RGB or, for one laser, grey, with 8 or 16 bits.
+    fn write(&self, path: &Path, texts: &[(&str, String)]) -> Result<()> {
+        let (colours, height, width) = self.dim();
+        let shape = PngShape::of_levels(colours, height, width);
+        match self {
+            Levels::Bytes(levels) => write_png_of(path, shape, &interleaved(levels.view(), |v| v), texts),
+            Levels::Words(levels) => {
+                let words = levels.view().permuted_axes([1, 2, 0]);
+                let bytes: Vec<u8> = words.iter().flat_map(|level| level.to_be_bytes()).collect();
+                let depth = png::BitDepth::Sixteen;
+                write_png_of(path, PngShape { depth, ..shape }, &bytes, texts)
+            }
         }
     }
 }
@@ -156,46 +198,10 @@ impl Levels {
 /// A hologram as stored in a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hologram {
-    /// Modulator levels of up to 8 bits, (C, H, W).
-    PhaseOnly(Array3<u8>, HologramInfo),
-    /// Modulator levels of more than 8 bits, (C, H, W).
-    Words(Array3<u16>, HologramInfo),
+    /// Modulator levels.
+    Levels(Levels, HologramInfo),
     /// A complex field, (C, H, W).
     Complex(Array3<Complex32>, HologramInfo),
-}
-
-/// Writes a phase-only hologram, (C, H, W), as an 8-bit PNG of levels that contains `info`: RGB, or grey for one laser.
-///
-/// # Errors
-/// Returns an error if the file cannot be written.
-pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &HologramInfo) -> Result<()> {
-    write_bytes(path, levels, &[info.chunk(path)?])
-}
-
-fn write_bytes(path: &Path, levels: ArrayView3<'_, u8>, texts: &[(&str, String)]) -> Result<()> {
-    let (colours, height, width) = levels.dim();
-    let shape = PngShape::of_levels(colours, height, width);
-    write_png_of(path, shape, &interleaved(levels, |v| v), texts)
-}
-
-/// Writes a phase-only hologram of more than 8 bits, (C, H, W), as a 16-bit PNG of levels that contains `info`: RGB, or
-/// grey for one laser.
-///
-/// # Errors
-/// Returns an error if the file cannot be written.
-pub fn write_words(path: &Path, levels: ArrayView3<'_, u16>, info: &HologramInfo) -> Result<()> {
-    write_words_of(path, levels, &[info.chunk(path)?])
-}
-
-fn write_words_of(path: &Path, levels: ArrayView3<'_, u16>, texts: &[(&str, String)]) -> Result<()> {
-    let (colours, height, width) = levels.dim();
-    let words = levels.permuted_axes([1, 2, 0]);
-    let bytes: Vec<u8> = words.iter().flat_map(|level| level.to_be_bytes()).collect();
-    let shape = PngShape {
-        depth: png::BitDepth::Sixteen,
-        ..PngShape::of_levels(colours, height, width)
-    };
-    write_png_of(path, shape, &bytes, texts)
 }
 
 /// Writes `hologram` in the file format of its kind.
@@ -204,8 +210,7 @@ fn write_words_of(path: &Path, levels: ArrayView3<'_, u16>, texts: &[(&str, Stri
 /// Returns an error if the file cannot be written.
 pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
     match hologram {
-        Hologram::PhaseOnly(levels, info) => write_phase_only(path, levels.view(), info),
-        Hologram::Words(levels, info) => write_words(path, levels.view(), info),
+        Hologram::Levels(levels, info) => levels.write(path, &[info.chunk(path)?]),
         Hologram::Complex(field, info) => write_complex(path, field.view(), info),
     }
 }
@@ -217,8 +222,7 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
 pub fn write_made_of(path: &Path, hologram: &Hologram, made_of: &str) -> Result<()> {
     let texts = [hologram.info().chunk(path)?, (MADE_OF_CHUNK, made_of.to_owned())];
     match hologram {
-        Hologram::PhaseOnly(levels, _) => write_bytes(path, levels.view(), &texts),
-        Hologram::Words(levels, _) => write_words_of(path, levels.view(), &texts),
+        Hologram::Levels(levels, _) => levels.write(path, &texts),
         Hologram::Complex(..) => Err(Error::file(path, "a complex field is no PNG")),
     }
 }
@@ -295,7 +299,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
         )
     })?;
     levels_of(open_image(path)?, &info)
-        .map(|levels| levels.hologram(info))
+        .map(|levels| Hologram::Levels(levels, info))
         .map_err(|why| Error::file(path, why))
 }
 

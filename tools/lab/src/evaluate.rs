@@ -13,6 +13,7 @@ use crate::study::refined_depth::{self, SENSOR_FAULTS};
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
 use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::method::network::InputKind;
 use phasefront_core::method::seeded::SeededPlan;
 use phasefront_core::method::sweep::SweepPlan;
@@ -357,7 +358,7 @@ impl Viewer {
                 }
                 modulator.propagate(&mut values, &mut scratch);
                 let mut levels = vec![0; values.len()];
-                let modulation = modulator.modulate(&mut values, &mut levels, &mut scratch);
+                let modulation = modulator.modulate(None, &mut values, LevelsMut::Bytes(&mut levels), &mut scratch);
                 if shown.ceiling > 0 {
                     self.lift(field, target, modulation.scale, shown.ceiling, &mut levels)?;
                 }

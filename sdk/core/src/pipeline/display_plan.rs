@@ -3,6 +3,7 @@
 //!
 //! This module does not depend on how the midpoint hologram was made.
 
+use crate::display::levels::LevelsMut;
 use crate::display::panel::PanelPlan;
 use crate::display::registration::RegistrationPlan;
 use crate::display::response;
@@ -43,7 +44,7 @@ pub struct DisplayScratch {
     moved: Vec<Complex32>,
     encoder: EncoderScratch,
     midpoint: Option<MidpointScratch>,
-    /// Phases in memory before they are converted to levels.
+    /// Phases in memory before they are converted to levels. Empty if the encoder writes levels directly.
     phases: Vec<f32>,
     percentile: Percentile,
     cancel: Cancel,
@@ -134,13 +135,19 @@ impl DisplayPlan {
                 Some(_) => vec![Complex32::ZERO; self.height * self.width],
             },
             midpoint: self.midpoint.as_ref().map(MidpointSteps::scratch),
-            phases: match self.midpoint.is_some() || self.panel.is_some() {
-                true => vec![0.0; self.colours * self.height * self.width],
-                false => Vec::new(),
+            phases: if self.needs_phases() || self.bits > 8 {
+                vec![0.0; self.colours * self.height * self.width]
+            } else {
+                Vec::new()
             },
             percentile: Percentile::default(),
             cancel: Cancel::default(),
         }
+    }
+
+    /// Returns whether bytes are made from phases in memory rather than directly from the field.
+    fn needs_phases(&self) -> bool {
+        self.midpoint.is_some() || self.panel.is_some()
     }
 
     /// Propagates `field`, (C, H, W), to the modulator in place. Allocates nothing.
@@ -165,70 +172,40 @@ impl DisplayPlan {
     }
 
     /// Encodes a field at the modulator, (C, H, W), into `levels`. Afterwards the contents of `field` are unspecified.
-    /// Allocates nothing.
+    /// For a frame that follows another, smoothed brightness starts from its `past`, and the steps at the midpoint
+    /// continue from its result. Allocates nothing.
     ///
     /// # Panics
-    /// Panics if `field` or `levels` does not have C·H·W values.
-    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut DisplayScratch) -> Modulation {
-        self.modulate_after(None, field, levels, scratch)
-    }
-
-    /// Works like [`Self::modulate`] for a frame that follows another. Smoothed brightness starts from `past`, and the
-    /// steps at the midpoint continue from the result of the previous frame.
-    pub fn modulate_after(
+    /// Panics if `field` or `levels` does not have C·H·W values, or if `levels` are words and the display has up to 8
+    /// bits.
+    pub fn modulate(
         &self,
         past: Option<Past>,
         field: &mut [Complex32],
-        levels: &mut [u8],
+        levels: LevelsMut<'_>,
         scratch: &mut DisplayScratch,
     ) -> Modulation {
         let stage = stage!("encode");
-        if scratch.phases.is_empty() {
-            let scale = self.brightness.scale(field, past, &mut scratch.percentile);
-            let scale = (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder);
-            return Modulation {
-                scale,
-                encode: stage.end(),
-            };
-        }
-        let mut phases = std::mem::take(&mut scratch.phases);
-        let scale = self.phases(past, field, &mut phases, scratch);
-        if !(self.panel.as_ref()).is_some_and(|panel| panel.levels(&phases, levels)) {
-            self.encoder.levels(&phases, levels);
-        }
-        scratch.phases = phases;
-        Modulation {
-            scale,
-            encode: stage.end(),
-        }
-    }
-
-    /// Works like [`Self::modulate`] for levels that have more bits than a byte. Afterwards `phases` holds the phases.
-    ///
-    /// # Panics
-    /// Panics if `field`, `phases` or `words` does not have C·H·W values.
-    pub fn modulate_words(
-        &self,
-        field: &mut [Complex32],
-        phases: &mut [f32],
-        words: &mut [u16],
-        scratch: &mut DisplayScratch,
-    ) -> Modulation {
-        self.modulate_words_after(None, field, phases, words, scratch)
-    }
-
-    /// Works like [`Self::modulate_words`] for a frame that follows another, as in [`Self::modulate_after`].
-    pub fn modulate_words_after(
-        &self,
-        past: Option<Past>,
-        field: &mut [Complex32],
-        phases: &mut [f32],
-        words: &mut [u16],
-        scratch: &mut DisplayScratch,
-    ) -> Modulation {
-        let stage = stage!("encode");
-        let scale = self.phases(past, field, phases, scratch);
-        response::linear_words(phases, self.bits, words);
+        let scale = match levels {
+            LevelsMut::Bytes(levels) if !self.needs_phases() => {
+                let scale = self.brightness.scale(field, past, &mut scratch.percentile);
+                (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder)
+            }
+            levels => {
+                let mut phases = std::mem::take(&mut scratch.phases);
+                let scale = self.phases(past, field, &mut phases, scratch);
+                match levels {
+                    LevelsMut::Bytes(levels) => {
+                        if !(self.panel.as_ref()).is_some_and(|panel| panel.levels(&phases, levels)) {
+                            self.encoder.levels(&phases, levels);
+                        }
+                    }
+                    LevelsMut::Words(words) => response::linear_words(&phases, self.bits, words),
+                }
+                scratch.phases = phases;
+                scale
+            }
+        };
         Modulation {
             scale,
             encode: stage.end(),

@@ -224,6 +224,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::display::Display;
+    use crate::display::levels::LevelsMut;
     use crate::encode::brightness::Brightness;
     use crate::encode::{EncoderOptions, Encoding};
     use crate::optics::aperture::Opening;
@@ -256,7 +257,7 @@ mod tests {
         let mut scratch = home.scratch();
         home.propagate(&mut field, &mut scratch);
         let mut levels = vec![0; 3 * height * width];
-        let modulation = home.modulate(&mut field, &mut levels, &mut scratch);
+        let modulation = home.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), &mut scratch);
         (levels, modulation.scale)
     }
 

@@ -4,6 +4,7 @@
 //! hologram passes the Fourier aperture on the way, as its light does.
 
 use crate::display::Display;
+use crate::display::levels::Levels;
 use crate::display::panel::PanelPlan;
 use crate::display::response::Response;
 use crate::display::target::Target;
@@ -11,7 +12,6 @@ use crate::optics::aperture::{Aperture, Opening};
 use crate::optics::asm::{self, Padding, Transfer};
 use crate::optics::fft::{Fft2, Scratch};
 use crate::optics::zernike::Aberration;
-use crate::output::Levels;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;

@@ -5,6 +5,7 @@ use crate::reference;
 use ndarray::{Array2, Array3};
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::Encoder;
@@ -315,7 +316,8 @@ fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
         };
         let plan = DisplayPlan::new(shape, &target, &options).unwrap();
         let mut levels = vec![0; 3 * h * w];
-        plan.modulate(&mut field.clone(), &mut levels, &mut plan.scratch());
+        let out = LevelsMut::Bytes(&mut levels);
+        plan.modulate(None, &mut field.clone(), out, &mut plan.scratch());
         levels
     };
     let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();

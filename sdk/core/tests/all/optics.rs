@@ -6,6 +6,7 @@ use ndarray::{Array2, Array3};
 use network_models::Model;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::display::panel::Flatness;
 use phasefront_core::display::panel::Panel;
 use phasefront_core::display::response::Response;
@@ -326,7 +327,8 @@ fn deep_encoding(input: &'static str) {
     let mut scratch = encoder.scratch();
     let scale = encoder.encode_levels(&mut filtered, None, &mut expected, &mut scratch);
     let mut levels = vec![0; 3 * h * w];
-    let modulation = modulator.modulate(&mut field, &mut levels, &mut modulator.scratch());
+    let out = LevelsMut::Bytes(&mut levels);
+    let modulation = modulator.modulate(None, &mut field, out, &mut modulator.scratch());
     assert_eq!((modulation.scale, levels), (scale, expected));
 
     let why = |display: &Display, network| plan(display, network).err().unwrap().to_string();
@@ -404,7 +406,8 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
     let mut filtered = field.clone();
     let mut levels = vec![0; 3 * h * w];
-    plan.modulate(&mut field, &mut levels, &mut plan.scratch());
+    let out = LevelsMut::Bytes(&mut levels);
+    plan.modulate(None, &mut field, out, &mut plan.scratch());
     let filter = AntiAlias::new(0.7, 3).unwrap();
     for plane in filtered.chunks_exact_mut(h * w) {
         filter.filter(plane, w);
@@ -443,11 +446,11 @@ fn a_panel_adds_its_phases_after_the_encoder() {
             let (mut field, mut scratch) = (field.clone(), plan.scratch());
             let mut words = vec![0; 3 * h * w];
             if bits > 8 {
-                plan.modulate_words(&mut field, &mut vec![0.0; 3 * h * w], &mut words, &mut scratch);
+                plan.modulate(None, &mut field, LevelsMut::Words(&mut words), &mut scratch);
                 return words;
             }
             let mut levels = vec![0; 3 * h * w];
-            plan.modulate(&mut field, &mut levels, &mut scratch);
+            plan.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), &mut scratch);
             levels.into_iter().map(u16::from).collect()
         });
         let count = 1u16 << bits;

@@ -142,6 +142,7 @@ mod tests {
     use num_complex::Complex32;
     use phasefront_core::display::Display;
     use phasefront_core::display::illumination::Illumination;
+    use phasefront_core::display::levels::LevelsMut;
     use phasefront_core::display::response::Response;
     use phasefront_core::display::target::Target;
     use phasefront_core::encode::EncoderOptions;
@@ -211,7 +212,8 @@ mod tests {
                 let words = device.read(&buffers[0].levels, 4 * area).unwrap();
                 let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);
                 let mut levels = vec![0; 3 * area];
-                twin.modulate_after(past, &mut values.clone(), &mut levels, &mut scratch);
+                let out = LevelsMut::Bytes(&mut levels);
+                twin.modulate(past, &mut values.clone(), out, &mut scratch);
                 let apart = levels.iter().enumerate().map(|(at, level)| {
                     let other = (words[at % area] >> (8 * (at / area))) as u8;
                     level.wrapping_sub(other).min(other.wrapping_sub(*level))

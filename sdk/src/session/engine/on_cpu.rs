@@ -1,13 +1,12 @@
 //! Computes a quality level on the CPU, from amplitudes and depth to levels.
 
 use crate::session::SessionOptions;
-use crate::session::engine::frame_io::{Encoded, LevelsOut};
 use crate::session::quality::QualityLevel;
 use crate::session::statistics::BackendReport;
-use num_complex::Complex32;
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::frame::RgbdFrame;
-use phasefront_core::pipeline::{Pipeline, PipelineScratch};
+use phasefront_core::pipeline::{FrameReport, Pipeline, PipelineScratch};
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 
@@ -15,10 +14,6 @@ use phasefront_core::runtime::error::Result;
 pub(in crate::session) struct OnCpu {
     pipeline: Pipeline,
     scratch: PipelineScratch,
-    field: Vec<Complex32>,
-    bits: u32,
-    /// The phases for a display with more than 8 bits; otherwise empty.
-    phases: Vec<f32>,
 }
 
 impl OnCpu {
@@ -27,22 +22,10 @@ impl OnCpu {
         quality_level: &QualityLevel,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let (height, width) = (quality_level.height, quality_level.width);
         let pipeline = Self::plan(options, quality_level)?;
-        let display = &options.target.display;
-        let (bits, values) = (display.bits(), display.colours() * height * width);
         let mut scratch = pipeline.scratch();
         scratch.set_cancel(cancel);
-        Ok(OnCpu {
-            scratch,
-            pipeline,
-            field: vec![Complex32::ZERO; values],
-            bits,
-            phases: match bits {
-                0..=8 => Vec::new(),
-                _ => vec![0.0; values],
-            },
-        })
+        Ok(OnCpu { pipeline, scratch })
     }
 
     /// Checks whether `quality_level` can be planned, using less memory than [`Self::new`].
@@ -72,34 +55,10 @@ impl OnCpu {
     /// Computes the levels of `frame`, which follows another frame if there is a `past`.
     pub(in crate::session) fn process(
         &mut self,
-        frame: &RgbdFrame,
         past: Option<Past>,
-        out: LevelsOut<'_>,
-    ) -> Result<Encoded> {
-        let OnCpu {
-            pipeline,
-            scratch,
-            field,
-            bits,
-            phases,
-        } = self;
-        let follows = past.is_some();
-        let (method, propagate) = pipeline.field_after(follows, frame, field, scratch)?;
-        let modulation = match out.words {
-            None => pipeline.modulate_after(past, field, out.levels, scratch),
-            Some(words) => {
-                let modulation = pipeline.modulate_words_after(past, field, phases, words, scratch);
-                for (level, word) in out.levels.iter_mut().zip(words) {
-                    *level = (*word >> (*bits - 8)) as u8;
-                }
-                modulation
-            }
-        };
-        Ok(Encoded {
-            scale: modulation.scale,
-            method,
-            propagate,
-            encode: modulation.encode,
-        })
+        frame: &RgbdFrame,
+        levels: LevelsMut<'_>,
+    ) -> Result<FrameReport> {
+        self.pipeline.process_after(past, frame, levels, &mut self.scratch)
     }
 }

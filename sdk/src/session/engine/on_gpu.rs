@@ -2,9 +2,10 @@
 
 use crate::session::SessionOptions;
 use crate::session::engine::brightness::BrightnessTracker;
-use crate::session::engine::frame_io::{Encoded, FrameInput};
+use crate::session::engine::frame_input::FrameInput;
 use crate::session::quality::QualityLevel;
 use crate::session::statistics::BackendReport;
+use phasefront_core::pipeline::{FrameReport, FrameTimes};
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
 use phasefront_gpu::{
@@ -102,7 +103,7 @@ impl OnGpu {
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
-    ) -> Result<Encoded, Failure> {
+    ) -> Result<FrameReport, Failure> {
         let stage = stage!("gpu");
         let frame = self.submit(input, brightness)?;
         self.collect(frame, stage, brightness, levels)
@@ -138,19 +139,22 @@ impl OnGpu {
         stage: Stage,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
-    ) -> Result<Encoded, Failure> {
+    ) -> Result<FrameReport, Failure> {
         let report = self.0.collect(frame, levels).map_err(|why| match why {
             GpuError::Core(why) => Failure::Frame(why),
             why => Failure::Frame(Error::Lost(format!("{why}, and this frame with it"))),
         })?;
         brightness.set_scale(report.scale);
         let times = report.times.unwrap_or_default();
-        Ok(Encoded {
+        Ok(FrameReport {
             scale: report.scale,
-            // Includes the transfers to and from the GPU, and all stages if there are no time stamps.
-            method: stage.end().saturating_sub(times.propagate + times.encode),
-            propagate: times.propagate,
-            encode: times.encode,
+            times: FrameTimes {
+                // Includes the transfers to and from the GPU, and all stages if there are no time stamps.
+                method: stage.end().saturating_sub(times.propagate + times.encode),
+                propagate: times.propagate,
+                encode: times.encode,
+                ..FrameTimes::default()
+            },
         })
     }
 }

@@ -12,7 +12,7 @@ use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, sweep_for};
 use phasefront_command::terminal;
 use phasefront_io::display::DisplayFile;
-use phasefront_io::hologram::{self, HologramInfo, packed};
+use phasefront_io::hologram::{self, Hologram, HologramInfo, Levels, packed};
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
@@ -142,7 +142,8 @@ impl MultiplexCommand {
                 levels_turns: display.target.panel.levels_turns.clone(),
                 calibrated: display.calibrated(true),
             };
-            hologram::write_phase_only(&path(n), map.levels.view(), &info)?;
+            let levels = Levels::Bytes(map.levels.clone());
+            hologram::write_hologram(&path(n), &Hologram::Levels(levels, info))?;
         }
         // With --overwrite: further maps of a longer earlier run do not belong to these.
         for left in (maps.len()..).map(path).take_while(|path| path.is_file()) {

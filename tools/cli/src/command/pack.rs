@@ -5,7 +5,7 @@ use phasefront::output::Packing;
 use phasefront_command::flags::{DisplayFlags, parse_size};
 use phasefront_command::terminal;
 use phasefront_io::display::DisplayFile;
-use phasefront_io::hologram::{self, Hologram, HologramInfo, packed};
+use phasefront_io::hologram::{self, Hologram, HologramInfo, Levels, packed};
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
@@ -70,7 +70,7 @@ impl Pack {
         for path in &self.holograms {
             let hologram = hologram::read_hologram(path)?;
             hologram.check_display(display).map_err(|e| Error::file(path, e))?;
-            let Hologram::PhaseOnly(levels, _) = hologram else {
+            let Hologram::Levels(Levels::Bytes(levels), _) = hologram else {
                 return Err(Error::file(path, "is no hologram of levels of up to 8 bits"));
             };
             maps.push(levels.index_axis(ndarray::Axis(0), colour).to_owned());
@@ -124,10 +124,10 @@ impl Unpack {
             calibrated: display.calibrated(true),
         };
         let levels = match modulator.bits() {
-            0..=8 => hologram::Levels::Bytes(levels.mapv(|level| level as u8)),
-            _ => hologram::Levels::Words(levels),
+            0..=8 => Levels::Bytes(levels.mapv(|level| level as u8)),
+            _ => Levels::Words(levels),
         };
-        hologram::write_hologram(&self.output, &levels.hologram(info))?;
+        hologram::write_hologram(&self.output, &Hologram::Levels(levels, info))?;
         let text = format!("{}: {width}×{height}", terminal::name(&self.output));
         terminal::print(
             json,

@@ -177,7 +177,7 @@ impl View {
         );
         figures.extend(judged_figures(&judged));
         let title = self.request.source().map_or("hologram".into(), |path| self.title(path));
-        let phase = Some(Phase::new(made.levels.view())?);
+        let phase = Some(Phase::new(made.levels.upper(file.target.display.bits()).view())?);
         let shown = made.hologram(levels);
         let wave = Hologram::Complex(made.field.expect("kept for this"), field);
         Ok(Parts {
@@ -209,12 +209,7 @@ impl View {
         let z_m = self.z_m(&hologram.info().display, STILL_VIEWS);
         let bar = progress_bar(z_m.len() as u64, "views");
         let phase = match &hologram {
-            Hologram::PhaseOnly(levels, _) => Some(Phase::new(levels.view())?),
-            // A page shows the upper 8 bits of finer levels.
-            Hologram::Words(levels, info) => {
-                let below = info.display.bits().saturating_sub(8);
-                Some(Phase::new(levels.mapv(|level| (level >> below) as u8).view())?)
-            }
+            Hologram::Levels(levels, info) => Some(Phase::new(levels.upper(info.display.bits()).view())?),
             Hologram::Complex(..) => None,
         };
         let shown = views(&hologram, &file, &z_m, &bar).map_err(|e| Error::file(path, e))?;
@@ -251,7 +246,7 @@ impl View {
             )
         })?;
         let first = hologram::read_hologram(first)?;
-        let Hologram::PhaseOnly(levels, info) = &first else {
+        let Hologram::Levels(levels, info) = &first else {
             return Err(Error::file(dir, "holds no phases"));
         };
         let file = self.display_of(info)?;
@@ -272,7 +267,7 @@ impl View {
             title: self.title(dir),
             shown,
             field: Vec::new(),
-            phase: Some(Phase::new(levels.view())?),
+            phase: Some(Phase::new(levels.upper(info.display.bits()).view())?),
             depth: None,
             z_m,
             shape: first.shape(),

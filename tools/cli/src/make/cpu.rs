@@ -1,13 +1,13 @@
 //! The core's methods for RGB-D images, on the CPU.
 
-use super::levels::{Out, described, levels_by, stack};
-use super::{HologramRequest, HologramResult};
+use super::{HologramRequest, HologramResult, described, stack};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Pipeline, RgbdFrame};
 use phasefront_io::Result;
 use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram::Levels;
 
 impl HologramRequest {
     pub(super) fn on_cpu(
@@ -29,16 +29,13 @@ impl HologramRequest {
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
         // The encoder filters the field in place, so keep a copy if it is requested.
         let kept = self.keeps_field.then(|| values.to_vec());
-        let (levels, words, modulation) = levels_by(&target.display, (height, width), |out| match out {
-            Out::Bytes(bytes) => pipeline.modulate(values, bytes, &mut scratch),
-            Out::Words(phases, words) => pipeline.modulate_words(values, phases, words, &mut scratch),
-        });
+        let mut levels = Levels::zeros(&target.display, (height, width));
+        let modulation = pipeline.modulate(None, values, levels.view_mut(), &mut scratch);
         let engine = pipeline.method().engine();
         Ok(HologramResult {
             method: stage,
             field: kept.map(|values| stack(values, shape)),
             levels,
-            words,
             encoder,
             scale: modulation.scale,
             stages: vec![

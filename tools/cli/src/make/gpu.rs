@@ -7,6 +7,7 @@ use phasefront::RgbdFrame;
 use phasefront_cli::gpu;
 use phasefront_gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
 use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram::Levels;
 use phasefront_io::{Error, Result};
 use std::sync::Arc;
 
@@ -40,8 +41,7 @@ impl HologramRequest {
         Ok(HologramResult {
             method: stage,
             field: None,
-            levels,
-            words: None,
+            levels: Levels::Bytes(levels),
             encoder,
             scale: report.scale,
             stages: vec![

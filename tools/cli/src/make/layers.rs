@@ -1,7 +1,6 @@
 //! The methods for layered depth images, on the CPU.
 
-use super::levels::{Out, described, levels_by, stack};
-use super::{HologramRequest, HologramResult, Method};
+use super::{HologramRequest, HologramResult, Method, described, stack};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -15,6 +14,7 @@ use phasefront_exact::corrected::{self, Correction, spatial};
 use phasefront_exact::{point_based, sm_lbm};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::display::calibration::AberrationFile;
+use phasefront_io::hologram::Levels;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use std::sync::Arc;
@@ -62,15 +62,12 @@ impl HologramRequest {
         modulator.propagate(values, &mut scratch);
         let propagate = waved.elapsed();
         let kept = self.keeps_field.then(|| values.to_vec());
-        let (levels, words, modulation) = levels_by(display, (height, width), |out| match out {
-            Out::Bytes(bytes) => modulator.modulate(values, bytes, &mut scratch),
-            Out::Words(phases, words) => modulator.modulate_words(values, phases, words, &mut scratch),
-        });
+        let mut levels = Levels::zeros(display, (height, width));
+        let modulation = modulator.modulate(None, values, levels.view_mut(), &mut scratch);
         Ok(HologramResult {
             method: stage,
             field: kept.map(|values| stack(values, shape)),
             levels,
-            words,
             encoder,
             scale: modulation.scale,
             stages: vec![

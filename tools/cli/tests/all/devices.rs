@@ -5,7 +5,7 @@ use crate::folder;
 use folder::{Folder, SMALL_HOLOGRAM};
 use phasefront::output::{ModulatorSpec, Packing};
 use phasefront_io::hologram::packed::Image;
-use phasefront_io::hologram::{self, Hologram};
+use phasefront_io::hologram::{self, Hologram, Levels};
 use phasefront_io::picture;
 use std::fs;
 use std::path::Path;
@@ -23,8 +23,8 @@ fn frame(folder: &Folder, (width, height): (u32, u32)) {
 
 fn levels(path: &Path) -> Vec<u16> {
     match hologram::read_hologram(path).unwrap() {
-        Hologram::PhaseOnly(levels, _) => levels.iter().map(|level| u16::from(*level)).collect(),
-        Hologram::Words(levels, _) => levels.iter().copied().collect(),
+        Hologram::Levels(Levels::Bytes(levels), _) => levels.iter().map(|level| u16::from(*level)).collect(),
+        Hologram::Levels(Levels::Words(levels), _) => levels.iter().copied().collect(),
         Hologram::Complex(..) => panic!("levels were written"),
     }
 }

@@ -12,7 +12,7 @@ use phasefront::Display;
 use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_core::depth::DepthUnit;
 use phasefront_io::frame::{self, DepthOptions};
-use phasefront_io::hologram::{self, HologramInfo};
+use phasefront_io::hologram::{self, Hologram, HologramInfo, Levels};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::picture::{self, depth_map};
 use std::fs;
@@ -551,9 +551,12 @@ fn info(scale: Option<f32>) -> HologramInfo {
 fn holograms_that_say_what_cannot_be_are_refused() {
     let folder = Folder::new();
     let path = folder.path("h.png");
-    let levels = Array3::<u8>::zeros((3, 8, 8));
+    let write = |level: u8, info: &HologramInfo| {
+        let levels = Levels::Bytes(Array3::from_elem((3, 8, 8), level));
+        hologram::write_hologram(&path, &Hologram::Levels(levels, info.clone())).unwrap();
+    };
     let refused = |info: &HologramInfo, word: &str| {
-        hologram::write_phase_only(&path, levels.view(), info).unwrap();
+        write(0, info);
         let why = hologram::read_hologram(&path).unwrap_err().to_string();
         assert!(why.contains("h.png") && why.contains(word), "{why}");
     };
@@ -577,11 +580,11 @@ fn holograms_that_say_what_cannot_be_are_refused() {
         display: Display::from_toml("bits = 4").unwrap(),
         ..info(Some(1.0))
     };
-    hologram::write_phase_only(&path, Array3::from_elem((3, 8, 8), 16u8).view(), &few_bits).unwrap();
+    write(16, &few_bits);
     let why = hologram::read_hologram(&path).unwrap_err().to_string();
     assert!(why.contains("a level of 16, over the 4 bits"), "{why}");
     for scale in [None, Some(1.1)] {
-        hologram::write_phase_only(&path, levels.view(), &info(scale)).unwrap();
+        write(0, &info(scale));
         hologram::read_hologram(&path).unwrap();
     }
     let field = folder.path("f.npy");

@@ -9,7 +9,7 @@ use phasefront::{Display, Target};
 use phasefront_cli::viewer;
 use phasefront_io::display::calibration;
 use phasefront_io::hologram::packed::{Image, Kind};
-use phasefront_io::hologram::{self, Hologram};
+use phasefront_io::hologram::{self, Hologram, Levels};
 use phasefront_io::{metrics, picture};
 use serde_json::Value;
 use std::fs;
@@ -55,8 +55,8 @@ fn json(text: &str) -> Value {
 
 fn levels(folder: &Folder, name: &str) -> Array3<u16> {
     match hologram::read_hologram(&folder.path(name)).unwrap() {
-        Hologram::PhaseOnly(levels, _) => levels.mapv(u16::from),
-        Hologram::Words(levels, _) => levels,
+        Hologram::Levels(Levels::Bytes(levels), _) => levels.mapv(u16::from),
+        Hologram::Levels(Levels::Words(levels), _) => levels,
         Hologram::Complex(..) => panic!("levels were written"),
     }
 }

@@ -96,7 +96,7 @@ fn a_folder_becomes_phase_maps_previews_and_statistics() {
     assert_eq!(written, report);
     for index in 0..4 {
         let path = out.join(format!("phase_{index:06}.png"));
-        let Hologram::PhaseOnly(levels, info) = hologram::read_hologram(&path).unwrap() else {
+        let Hologram::Levels(levels, info) = hologram::read_hologram(&path).unwrap() else {
             panic!("a phase map");
         };
         assert_eq!(levels.dim(), (3, HEIGHT as usize, WIDTH as usize));

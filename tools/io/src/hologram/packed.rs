@@ -156,16 +156,12 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     hologram.check_display(display)?;
     let shape = hologram.shape();
     let colours = display.device.display.colours();
-    let levels = match hologram {
-        Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
-        Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),
-        Hologram::Complex(..) => {
-            return Err(Error::Input(
-                "a complex hologram has no levels; give the PNG of `phasefront hologram`".into(),
-            ));
-        }
+    let Hologram::Levels(levels, _) = hologram else {
+        return Err(Error::Input(
+            "a complex hologram has no levels; give the PNG of `phasefront hologram`".into(),
+        ));
     };
-    match (&display.device.packing, levels) {
+    match (&display.device.packing, levels.view()) {
         (Packing::Images(layout), levels) => {
             let output = output(display, shape, *layout)?;
             (0..layout.images(colours))

@@ -7,7 +7,6 @@ use crate::{Error, Result};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::output::Levels;
 use phasefront::target::Aberration;
 use phasefront_core::optics::aperture::Opening;
 use phasefront_core::optics::asm::Propagator;
@@ -49,8 +48,7 @@ impl Hologram {
     /// Returns the height and width, (H, W).
     pub fn shape(&self) -> (usize, usize) {
         let (_, height, width) = match self {
-            Hologram::PhaseOnly(levels, _) => levels.dim(),
-            Hologram::Words(levels, _) => levels.dim(),
+            Hologram::Levels(levels, _) => levels.dim(),
             Hologram::Complex(field, _) => field.dim(),
         };
         (height, width)
@@ -59,7 +57,7 @@ impl Hologram {
     /// Returns the info stored with the hologram.
     pub fn info(&self) -> &HologramInfo {
         match self {
-            Hologram::PhaseOnly(_, info) | Hologram::Words(_, info) | Hologram::Complex(_, info) => info,
+            Hologram::Levels(_, info) | Hologram::Complex(_, info) => info,
         }
     }
 
@@ -124,9 +122,11 @@ impl Hologram {
         self.check_display(file)?;
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
-            _ => {
+            Hologram::Levels(levels, _) => {
                 let opening = Opening::centred(file.target.display.aperture_radius());
-                (self.shown(file)?, Some(opening))
+                let field = shown_field(levels.view(), info.scale.unwrap_or(1.0), &file.target, shape)?;
+                let field = Array3::from_shape_vec(levels.dim(), field).expect("a value for each level");
+                (field, Some(opening))
             }
         };
         if let Some(AberrationFile::Uniform(all)) = &file.aberration
@@ -148,20 +148,6 @@ impl Hologram {
                     .expect("a view of the hologram's shape")
             })
             .collect())
-    }
-
-    /// Computes the field that the hologram's levels produce behind the modulator of `file`.
-    fn shown(&self, file: &DisplayFile) -> Result<Array3<Complex32>> {
-        let (height, width) = self.shape();
-        let info = self.info();
-        let levels = match self {
-            Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
-            Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),
-            Hologram::Complex(..) => unreachable!("a complex hologram has no levels"),
-        };
-        let field = shown_field(levels, info.scale.unwrap_or(1.0), &file.target, (height, width))?;
-        let shape = (info.display.colours(), height, width);
-        Ok(Array3::from_shape_vec(shape, field).expect("a value for each level"))
     }
 }
 

@@ -4,13 +4,14 @@ use num_complex::Complex32;
 use phasefront::target::Aberration;
 use phasefront::{Brightness, Display, EncoderOptions, Encoding};
 use phasefront_command::networks::{self, Precision};
+use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::optics::aperture::Opening;
 use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_core::optics::zernike::Aberrations;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_exact::sm_lbm;
 use phasefront_io::display::calibration::AberrationFile;
-use phasefront_io::hologram::{Hologram, HologramInfo};
+use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::{metrics, picture};
 use phasefront_lab::dataset::{self, Manifest};
 use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown, Viewer};
@@ -318,8 +319,9 @@ fn encoded_fields_are_judged_as_their_files_look() {
         let mut field = pair.hologram.clone();
         let mut levels = Array3::zeros((3, SIZE, SIZE));
         let modulation = modulator.modulate(
+            None,
             field.as_slice_mut().unwrap(),
-            levels.as_slice_mut().unwrap(),
+            LevelsMut::Bytes(levels.as_slice_mut().unwrap()),
             &mut modulator.scratch(),
         );
         let info = HologramInfo {
@@ -330,7 +332,10 @@ fn encoded_fields_are_judged_as_their_files_look() {
             lut: None,
             levels_turns: None,
         };
-        let view = Hologram::PhaseOnly(levels, info).views(&[0.0]).unwrap().remove(0);
+        let view = Hologram::Levels(Levels::Bytes(levels), info)
+            .views(&[0.0])
+            .unwrap()
+            .remove(0);
         let truth = pair.hologram.mapv(|v| v.norm());
         let direct = metrics::compare(view.view(), truth.view()).unwrap();
         let ours = row.scenes[0].1;

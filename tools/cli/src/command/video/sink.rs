@@ -1,11 +1,11 @@
 //! Writes the output of a run, or continues that of an earlier run.
 
 use crate::record::{Before, Claim, RunRecord, already, names_of};
-use ndarray::{Array3, ArrayView3};
+use ndarray::Array3;
 use phasefront::Hologram;
 use phasefront_io::film::video::VideoFrame;
 use phasefront_io::film::{self, Quality};
-use phasefront_io::hologram::{self, HologramInfo};
+use phasefront_io::hologram::{self, HologramInfo, Levels};
 use phasefront_io::{Error, Result, output, picture};
 use std::path::{Path, PathBuf};
 
@@ -138,17 +138,12 @@ impl Sink {
             ..self.info.clone()
         };
         let path = self.phase(folder, index);
+        let levels = Array3::from_shape_vec(shape, hologram.levels().to_vec());
+        let levels = Levels::Bytes(levels.map_err(|e| Error::Input(e.to_string()))?);
+        let hologram = hologram::Hologram::Levels(levels, info);
         match frame {
-            None => {
-                let levels = ArrayView3::from_shape(shape, hologram.levels());
-                hologram::write_phase_only(&path, levels.map_err(|e| Error::Input(e.to_string()))?, &info)
-            }
-            Some(frame) => {
-                let levels = Array3::from_shape_vec(shape, hologram.levels().to_vec());
-                let levels = levels.map_err(|e| Error::Input(e.to_string()))?;
-                let made_of = self.made_of(frame);
-                hologram::write_made_of(&path, &hologram::Hologram::PhaseOnly(levels, info), &made_of)
-            }
+            None => hologram::write_hologram(&path, &hologram),
+            Some(frame) => hologram::write_made_of(&path, &hologram, &self.made_of(frame)),
         }
     }
 
