@@ -18,13 +18,17 @@ pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     })
 }
 
+/// Returns the depth of the front layer, (H, W). Pixels without a surface are farthest.
+pub fn visible_depth(ldi: &Ldi) -> Array2<f32> {
+    ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d })
+}
+
 /// Returns the front layer as a frame for `display`. Pixels without a surface are black and farthest.
 ///
 /// # Errors
 /// Returns an error if the layer's values are not valid for a frame.
 pub fn visible_frame(ldi: &Ldi, display: &Display) -> Result<RgbdFrame> {
-    let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
-    Ok(RgbdFrame::new(visible_rgb(ldi), depth)?.for_display(display))
+    Ok(RgbdFrame::new(visible_rgb(ldi), visible_depth(ldi))?.for_display(display))
 }
 
 /// Returns `frame` with the hidden surfaces that the sweep finds.

@@ -33,7 +33,7 @@ pub(crate) enum Command {
     Dataset(dataset::Dataset),
     Seeds(seeds::Seeds),
     Occlusion(occlusion::Occlusion),
-    Evaluate(evaluate::Evaluate),
+    Evaluate(Box<evaluate::Evaluate>),
     Study(study::Study),
 }
 

@@ -81,6 +81,8 @@ pub enum Look {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         textures: Option<String>,
     },
+    /// Scenes that are hard for every method: [`scene::hard_scene`].
+    Hard,
 }
 
 impl Look {
@@ -103,7 +105,7 @@ impl Look {
     /// Checks whether `textures` are the photographs that this look names.
     fn names(&self, textures: &[Texture]) -> bool {
         match self {
-            Self::Objects => textures.is_empty(),
+            Self::Objects | Self::Hard => textures.is_empty(),
             Self::Photographs { textures: named } | Self::Varied { textures: named } => *named == fingerprint(textures),
         }
     }
@@ -114,6 +116,7 @@ impl Look {
             Self::Objects => scene::random_scene(seed, size, size),
             Self::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
             Self::Varied { .. } => scene::varied_scene(seed, size, size, textures),
+            Self::Hard => scene::hard_scene(seed, size, size),
         }
     }
 }

@@ -9,11 +9,12 @@ mod ceiling;
 
 use crate::dataset::{self, Manifest};
 use crate::evaluate::ceiling::Ceiling;
-use crate::study::refined_depth::{self, SENSOR_FAULTS};
+use crate::sensor::Sensor;
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
 use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
 use phasefront_core::display::levels::LevelsMut;
+use phasefront_core::method::MethodPlan;
 use phasefront_core::method::network::InputKind;
 use phasefront_core::method::seeded::SeededPlan;
 use phasefront_core::method::sweep::SweepPlan;
@@ -22,7 +23,7 @@ use phasefront_core::pipeline::display_plan::{DisplayPlan, remove_mean_phase};
 use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use phasefront_exact::point_based::{self, Occlusion};
 use phasefront_exact::sm_lbm;
-use phasefront_exact::truth::{Figures, filled, judge, visible_frame};
+use phasefront_exact::truth::{Figures, filled, judge, visible_depth, visible_frame, visible_rgb};
 use phasefront_io::dice::Dice;
 use phasefront_io::display::calibration::{self, AberrationFile};
 use phasefront_io::hologram::AberratedOptics;
@@ -112,6 +113,21 @@ impl<'a> Method<'a> {
     pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
         let (plan, display) = (SweepPlan::new(size, size, display, sweep, 0.0)?, display.clone());
         Ok(Self::new("sweep", move |ldi| {
+            let mut field = Array3::zeros((display.colours(), size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?;
+            Ok(field)
+        }))
+    }
+
+    /// Chooses the plane sweep or the network for each scene by its depth, as [`phasefront::Method::Auto`] does.
+    ///
+    /// # Errors
+    /// Returns an error if one of the methods cannot be planned.
+    pub fn auto(size: usize, display: &Display, sweep: Sweep, network: Arc<Network>) -> Result<Self> {
+        let method = phasefront::Method::Auto(sweep, network);
+        let (plan, display) = (MethodPlan::new(size, size, method, display)?, display.clone());
+        Ok(Self::new("auto", move |ldi| {
             let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
             plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?;
@@ -268,6 +284,10 @@ pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
 pub struct Row {
     /// The name of the [`Method`].
     pub method: String,
+    /// The sensor whose depth the method received. `None` is the true depth.
+    pub sensor: Option<Sensor>,
+    /// The mean share of pixels whose depth was wrong by more than [`WRONG`].
+    pub wrong_depth: f64,
     /// The name of the [`Shown`].
     pub shown: String,
     /// The means over the scenes.
@@ -422,31 +442,33 @@ pub struct Seen {
     pub light: f64,
 }
 
-/// The depth that methods receive. Sensor and refined depth come from a simulated sensor with all faults of
-/// [`SENSOR_FAULTS`] and have no hidden layers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Depth {
-    /// Depth as rendered
-    Rendered,
-    /// Simulated sensor depth, enlarged
-    Sensor,
-    /// Simulated sensor depth, refined by the core
-    Refined,
+/// The difference from the true depth, as a fraction of the volume, above which a pixel's depth is wrong.
+pub const WRONG: f32 = 0.03;
+
+/// A scene with the depth that methods receive.
+struct Sensed<'a> {
+    scene: Cow<'a, Ldi>,
+    /// The share of pixels whose depth is wrong by more than [`WRONG`].
+    wrong: f64,
 }
 
-impl Depth {
-    /// Returns the scene `ldi` with depth of this kind. `seed` selects the sensor's faults.
-    fn of(self, ldi: &Ldi, seed: u64) -> Result<Cow<'_, Ldi>> {
-        if self == Depth::Rendered {
-            return Ok(Cow::Borrowed(ldi));
-        }
-        let (rgb, rendered) = refined_depth::front(ldi);
-        let readings = refined_depth::simulate_sensor(rendered.view(), &SENSOR_FAULTS[SENSOR_FAULTS.len() - 1], seed);
-        let depth = match self {
-            Depth::Refined => refined_depth::refine(&readings, &rgb)?,
-            _ => refined_depth::enlarge(&readings)?,
+impl<'a> Sensed<'a> {
+    /// Returns the scene `ldi` with its true depth or, without hidden layers, with the depth that a session makes of a
+    /// `sensor`'s reading. `seed` selects the reading.
+    fn new(ldi: &'a Ldi, sensor: Option<Sensor>, seed: u64) -> Result<Self> {
+        let Some(sensor) = sensor else {
+            return Ok(Sensed {
+                scene: Cow::Borrowed(ldi),
+                wrong: 0.0,
+            });
         };
-        Ok(Cow::Owned(Ldi::new(vec![LdiLayer { rgb, depth }])?))
+        let (rgb, truth) = (visible_rgb(ldi), visible_depth(ldi));
+        let depth = sensor.read(truth.view(), seed).session_depth(&rgb)?;
+        let wrong = depth.iter().zip(&truth).filter(|(a, b)| (**a - **b).abs() > WRONG);
+        Ok(Sensed {
+            wrong: wrong.count() as f64 / truth.len() as f64,
+            scene: Cow::Owned(Ldi::new(vec![LdiLayer { rgb, depth }])?),
+        })
     }
 }
 
@@ -457,15 +479,18 @@ pub struct Sample {
     pub scenes: Vec<usize>,
     /// The seed of the random depths in the focal stacks.
     pub seed: u64,
-    /// The depth that methods receive.
-    pub depth: Depth,
+    /// The sensors whose depth methods receive after the true depth.
+    pub sensors: Vec<Sensor>,
     /// The number of pixels at the border of each scene that do not count. At an offset, light from outside enters a
     /// small frame, and no modulator of that size sends this light.
     pub margin: usize,
 }
 
-/// Evaluates each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`. The rows are in
-/// that order, with the ways of a method together. `done` is called after each scene.
+/// Evaluates each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`, on the true depth and
+/// on that of each sensor. The rows are in that order: a depth's methods together, and a method's ways. `done` is called
+/// after each scene.
+///
+/// A method with hidden layers as input has them only with the true depth.
 ///
 /// # Errors
 /// Returns an error if there are no scenes, if the margin leaves no pixels, if a pair cannot be read, or if a method
@@ -481,16 +506,9 @@ pub fn evaluate(
     let Sample {
         scenes,
         seed,
-        depth,
+        sensors,
         margin,
     } = sample;
-    if *depth != Depth::Rendered && !manifest.size.is_multiple_of(refined_depth::RATIO) {
-        return Err(phasefront_io::Error::Input(format!(
-            "scenes of {} px have no sensor's depth; their sides must be multiples of {}",
-            manifest.size,
-            refined_depth::RATIO
-        )));
-    }
     if 2 * margin >= manifest.size {
         return Err(phasefront_io::Error::Input(format!(
             "a margin of {margin} px leaves nothing of scenes of {} px",
@@ -505,38 +523,47 @@ pub fn evaluate(
     }
     let viewer = Viewer::new(manifest)?;
     let each: Vec<_> = methods.iter().map(|method| (method, ways(method, shown))).collect();
+    let depths: Vec<Option<Sensor>> = std::iter::once(None).chain(sensors.iter().copied().map(Some)).collect();
     let of_scenes = scenes
         .par_iter()
         .map(|&index| {
             let pair = dataset::read_pair(manifest, dir, index)?;
-            let depths = stack_depths(&pair.ldi.layers[0].depth, (seed << 32) + index as u64);
+            let at = stack_depths(&pair.ldi.layers[0].depth, (seed << 32) + index as u64);
             let mut z_m = vec![0.0];
-            z_m.extend(depths.iter().map(|d| manifest.display.z_of_depth(*d)));
+            z_m.extend(at.iter().map(|d| manifest.display.z_of_depth(*d)));
             let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
             let mut figures = Vec::new();
-            let scene = depth.of(&pair.ldi, (seed << 32) + index as u64)?;
-            for (method, ways) in &each {
-                let field = (method.field)(&scene)?;
-                for shown in ways {
-                    let seen = viewer.views(&field, shown, &z_m)?;
-                    figures.push(Figures {
-                        light: seen.light,
-                        ..judge(&seen.views, &truth, *margin)?
-                    });
+            for sensor in &depths {
+                let Sensed { scene, wrong } = Sensed::new(&pair.ldi, *sensor, (seed << 32) + index as u64)?;
+                for (method, ways) in &each {
+                    let field = (method.field)(&scene)?;
+                    for shown in ways {
+                        let seen = viewer.views(&field, shown, &z_m)?;
+                        let judged = Figures {
+                            light: seen.light,
+                            ..judge(&seen.views, &truth, *margin)?
+                        };
+                        figures.push((judged, wrong));
+                    }
                 }
             }
             done();
             Ok(figures)
         })
         .collect::<Result<Vec<_>>>()?;
-    let rows = (each.iter()).flat_map(|(method, ways)| ways.iter().map(move |shown| (method, shown)));
+    let rows = depths.iter().flat_map(|sensor| {
+        let ways = (each.iter()).flat_map(|(method, ways)| ways.iter().map(move |shown| (method, shown)));
+        ways.map(move |(method, shown)| (sensor, method, shown))
+    });
     Ok(rows
         .enumerate()
-        .map(|(way, (method, shown))| {
-            let each = || of_scenes.iter().map(|figures| figures[way]);
+        .map(|(row, (sensor, method, shown))| {
+            let each = || of_scenes.iter().map(|figures| figures[row].0);
             let mean = |figure: fn(Figures) -> f64| each().map(figure).sum::<f64>() / scenes.len() as f64;
             Row {
                 method: method.name.clone(),
+                sensor: *sensor,
+                wrong_depth: of_scenes.iter().map(|figures| figures[row].1).sum::<f64>() / scenes.len() as f64,
                 shown: shown.name.clone(),
                 mean: Figures {
                     amplitude_psnr: mean(|f| f.amplitude_psnr),

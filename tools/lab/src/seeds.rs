@@ -8,7 +8,7 @@
 //! `seeds.json`, which records the sweep and R, to the folder.
 
 use crate::dataset::{self, Manifest};
-use crate::study::refined_depth::{RATIO, SensorFaults, refine, simulate_sensor};
+use crate::sensor::coarse::{Coarse, Sampling};
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, Ix3, concatenate, s};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
@@ -37,8 +37,8 @@ const MOST_SHIFT: usize = 3;
 /// that have no seeds yet, and `refined` more depths of each scene. `made` is called for each scene that is done.
 ///
 /// # Errors
-/// Returns an error if the depths differ in shape from the scenes, if a sensor's readings do not divide the scenes, if
-/// the folder has seeds of another sweep, or if it cannot be written.
+/// Returns an error if the depths differ in shape from the scenes, if the folder has seeds of another sweep, or if it
+/// cannot be written.
 pub fn make(
     manifest: &Manifest,
     data: &Path,
@@ -52,15 +52,6 @@ pub fn make(
         "format": FORMAT, "scale": SCALE, "planes": sweep.planes, "taps": sweep.taps,
         "hidden_layers": sweep.hidden_layers, "between_planes": sweep.between_planes, "refined": refined,
     });
-    if refined > 0 && !manifest.size.is_multiple_of(RATIO) {
-        return Err(Error::file(
-            data,
-            format!(
-                "scenes are {0}×{0}; refined depth takes a multiple of {RATIO}",
-                manifest.size
-            ),
-        ));
-    }
     match file::read(&place, file::MOST_TEXT) {
         Ok(bytes) => {
             if serde_json::from_slice::<serde_json::Value>(&bytes).ok() != Some(description) {
@@ -117,13 +108,15 @@ fn refined_depths(depth: ArrayView2<'_, u16>, colour: &Array3<f32>, index: usize
     for (variant, mut to) in all.outer_iter_mut().enumerate() {
         let seed = ((index as u64) << 32) + variant as u64;
         let mut dice = Dice::new(seed);
-        let how = SensorFaults {
-            name: "drawn",
-            noise: dice.range(0.0, MOST_NOISE) as f32,
-            shift: dice.integer(0, MOST_SHIFT),
+        let noise = dice.range(0.0, MOST_NOISE) as f32;
+        let sensor = Coarse {
+            ratio: 4.0,
+            sampling: Sampling::Mean,
+            shift: [dice.integer(0, MOST_SHIFT) as isize; 2],
+            noise,
             holes: dice.chance(0.5),
         };
-        let refined = refine(&simulate_sensor(depth.view(), &how, seed), colour)?;
+        let refined = sensor.read(depth.view(), seed).session_depth(colour)?;
         to.zip_mut_with(&refined, |to, d| *to = (d * 65535.0).round() as u16);
     }
     Ok(all)

@@ -4,7 +4,6 @@
 
 pub mod flicker;
 pub mod occlusion;
-pub mod refined_depth;
 pub mod sweep_parts;
 
 use crate::scene;

@@ -10,7 +10,8 @@ use phasefront_core::method::sweep::MAX_HIDDEN_LAYERS;
 use phasefront_core::optics::aperture::Opening;
 use phasefront_io::{Error, Result, output};
 use phasefront_lab::dataset::Manifest;
-use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown};
+use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown};
+use phasefront_lab::sensor::Sensor;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -75,9 +76,8 @@ pub(crate) struct Evaluate {
         requires = "encoder"
     )]
     look_shift: f64,
-    /// Depth that methods receive
-    #[arg(long, value_enum, default_value_t = Depth::Rendered)]
-    depth: Depth,
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = parse_sensor, help = sensor_help())]
+    sensor: Vec<Sensors>,
     /// Split of the data set
     #[arg(long, value_enum, default_value_t = Split::Test)]
     split: Split,
@@ -122,6 +122,8 @@ enum MethodName {
     Filled,
     /// The plane sweep of the visible layer
     Sweep,
+    /// The plane sweep if the depth is clean, otherwise the bundled network of 8 layers
+    Auto,
     /// SM-LBM of all layers
     Layers,
     /// A sub-hologram for each visible point (Maimone et al.)
@@ -133,6 +135,34 @@ enum Split {
     Train,
     Validation,
     Test,
+    /// All three
+    All,
+}
+
+/// One value of --sensor.
+#[derive(Clone)]
+struct Sensors(Vec<Sensor>);
+
+fn parse_sensor(text: &str) -> std::result::Result<Sensors, String> {
+    match text {
+        "all" => Ok(Sensors(Sensor::value_variants().to_vec())),
+        name => Sensor::from_str(name, false).map(|sensor| Sensors(vec![sensor])),
+    }
+}
+
+fn sensor_help() -> String {
+    let names: Vec<String> = Sensor::value_variants().iter().map(|sensor| name_of(*sensor)).collect();
+    format!(
+        "Simulated sensors whose depth methods receive as well, treated as in sessions, separated by commas: all, {}",
+        names.join(", ")
+    )
+}
+
+/// Returns the name of a sensor on the command line.
+fn name_of(sensor: Sensor) -> String {
+    sensor
+        .to_possible_value()
+        .map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 impl Evaluate {
@@ -145,6 +175,7 @@ impl Evaluate {
             Split::Train => ("train", manifest.splits.train),
             Split::Validation => ("validation", manifest.splits.validation),
             Split::Test => ("test", manifest.splits.test),
+            Split::All => ("all", [0, manifest.scenes]),
         };
         let scenes: Vec<usize> = (start..end).take(self.scenes.unwrap_or(usize::MAX)).collect();
         self.check_flags()?;
@@ -154,7 +185,7 @@ impl Evaluate {
         let sample = Sample {
             scenes,
             seed: self.seed,
-            depth: self.depth,
+            sensors: self.sensor.iter().flat_map(|sensors| sensors.0.clone()).collect(),
             margin: self.margin,
         };
         let rows = evaluate::evaluate(&manifest, &self.data, &sample, &methods, &shown, &|| bar.inc(1))?;
@@ -183,7 +214,7 @@ impl Evaluate {
             "data": self.data, "split": split, "scenes": scenes.len(), "size": manifest.size,
             "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
             "offset_mm": self.offset_mm, "bits": self.bits, "margin": self.margin,
-            "look_radius": self.look_radius, "look_shift": self.look_shift, "depth": self.depth.to_possible_value().map(|v| v.get_name().to_owned()),
+            "look_radius": self.look_radius, "look_shift": self.look_shift,
             "focal_stack": {
                 "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
             },
@@ -196,20 +227,26 @@ impl Evaluate {
     /// Returns an error for flags that none of the methods uses.
     fn check_flags(&self) -> Result<()> {
         let has = |wanted: &[MethodName]| self.method.iter().any(|method| wanted.contains(method));
-        let sweep = has(&[MethodName::Sweep]);
+        let sweep = has(&[MethodName::Sweep, MethodName::Auto]);
         let planes = self.method.iter().any(|method| *method != MethodName::Rgb);
-        let networks = self.pair || self.network.iter().any(|name| networks::is_bundled(name));
+        let networks =
+            self.pair || has(&[MethodName::Auto]) || self.network.iter().any(|name| networks::is_bundled(name));
         let cases = [
             (
                 "--precision",
                 self.precision.is_some(),
                 networks,
-                "a bundled --network or --pair",
+                "a bundled --network, --pair or --method auto",
             ),
             ("--planes", self.planes.is_some(), planes, "a --method of waves"),
-            ("--taps", self.taps.is_some(), sweep, "--method sweep"),
-            ("--hidden-layers", self.hidden_layers.is_some(), sweep, "--method sweep"),
-            ("--tile", self.tile.is_some(), sweep, "--method sweep"),
+            ("--taps", self.taps.is_some(), sweep, "--method sweep or auto"),
+            (
+                "--hidden-layers",
+                self.hidden_layers.is_some(),
+                sweep,
+                "--method sweep or auto",
+            ),
+            ("--tile", self.tile.is_some(), sweep, "--method sweep or auto"),
         ];
         check_used(&cases)
     }
@@ -277,6 +314,10 @@ impl Evaluate {
                     MethodName::Visible => Method::visible(display, planes),
                     MethodName::Filled => Method::filled(display, planes),
                     MethodName::Sweep => Method::sweep(manifest.size, display, self.sweep(display))?,
+                    MethodName::Auto => {
+                        let network = networks::network("8", self.precision.map(PrecisionName::precision))?;
+                        Method::auto(manifest.size, display, self.sweep(display), network)?
+                    }
                     MethodName::Layers => Method::layers(display, planes),
                     MethodName::Points => Method::points(display, planes),
                 })
@@ -317,20 +358,18 @@ fn file_stem(name: &str) -> String {
 }
 
 fn table(rows: &[Row], scenes: usize, split: &str) -> String {
-    let width = (rows.iter())
-        .map(|row| row.method.chars().count())
-        .max()
-        .unwrap_or(0)
-        .max(6);
-    let ways = rows
-        .iter()
-        .map(|row| row.shown.chars().count())
-        .max()
-        .unwrap_or(0)
-        .max(10);
+    let widest = |least: usize, name: &dyn Fn(&Row) -> String| {
+        rows.iter().map(|row| name(row).chars().count()).fold(least, usize::max)
+    };
+    let depth = |row: &Row| row.sensor.map_or_else(|| "true".to_owned(), name_of);
+    let (method, shown) = (
+        widest(6, &|row| row.method.clone()),
+        widest(10, &|row| row.shown.clone()),
+    );
+    let depths = widest(5, &depth);
     let mut text = format!(
-        "{:width$}  {:ways$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
-        "method", "shown"
+        "{:depths$}  wrong  {:method$}  {:shown$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "depth", "method", "shown"
     );
     for row in rows {
         let worst = row.worst(1)[0];
@@ -340,7 +379,9 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
             .map(|(_, f)| f.amplitude_psnr)
             .fold(f64::INFINITY, f64::min);
         text += &format!(
-            "\n{:width$}  {:ways$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
+            "\n{:depths$}  {:4.1}%  {:method$}  {:shown$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
+            depth(row),
+            100.0 * row.wrong_depth,
             row.method,
             row.shown,
             row.mean.amplitude_psnr,

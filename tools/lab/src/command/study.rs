@@ -1,6 +1,5 @@
 //! `phasefront-lab study` computes the paper's Fig. 2a and 2b as a table, JSON and a plot. It also studies the benefit
-//! of refined depth and of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep
-//! on other displays.
+//! of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on other displays.
 
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};
@@ -11,14 +10,13 @@ use phasefront_io::Result;
 use phasefront_io::output::{self, Holding};
 use phasefront_io::picture::plot::{self, Panel};
 use phasefront_lab::study::flicker;
-use phasefront_lab::study::refined_depth::{self, RATIO, SENSOR};
 use phasefront_lab::study::sweep_parts::{self, DisplayRow};
 use phasefront_lab::study::{self, Row, Scenes};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Study the number of layers or planes that a hologram needs, the benefit of the plane sweep's parts and of refined
-/// depth, and the flicker of video
+/// Study the number of layers or planes that a hologram needs, the benefit of the plane sweep's parts, and the flicker
+/// of video
 #[derive(Args)]
 pub(crate) struct Study {
     /// The study to run
@@ -27,7 +25,7 @@ pub(crate) struct Study {
     /// Number of random scenes
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
     scenes: u16,
-    /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768 [default: 384]
+    /// Height and width of a scene, pixels; those of flicker are 1024×768 [default: 384]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(1..=4096))]
     size: Option<u16>,
     /// Planes of SM-LBM; in the study of planes, those of the finest hologram [default: 256; for planes 8192, for sweep
@@ -60,8 +58,6 @@ enum What {
     Sweep,
     /// The plane sweep compared with exact waves on other displays
     Displays,
-    /// Holograms of depth from a sensor of 256×192, refined and not refined, compared with the truth
-    Depth,
     /// How much the displayed image of a static scene changes from frame to frame, over 30 frames of each scene
     Flicker,
 }
@@ -69,7 +65,7 @@ enum What {
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let of_planes = self.what == What::Planes;
-        let of_sensor = matches!(self.what, What::Depth | What::Flicker);
+        let of_flicker = self.what == What::Flicker;
         check_used(&[
             (
                 "--display",
@@ -86,20 +82,14 @@ impl Study {
             (
                 "--size",
                 self.size.is_some(),
-                !of_sensor,
-                "scenes without a sensor's depth",
+                !of_flicker,
+                "studies other than of flicker",
             ),
-            (
-                "--planes",
-                self.planes.is_some(),
-                self.what != What::Flicker,
-                "studies of exact waves",
-            ),
+            ("--planes", self.planes.is_some(), !of_flicker, "studies of exact waves"),
         ])?;
         output::folder(&self.output, Holding::Anything)?;
         match self.what {
             What::Layers | What::Planes => {}
-            What::Depth => return self.depth(json),
             What::Flicker => return self.flicker(json),
             What::Sweep => return self.sweep(json),
             What::Displays => return self.displays(json),
@@ -262,43 +252,10 @@ impl Study {
         })
     }
 
-    fn depth(&self, json: bool) -> Result<()> {
-        let display = self.display.read_of_midpoint()?.target.display;
-        let planes = self.planes.unwrap_or(256) as usize;
-        let sweep = Method::Sweep(Sweep::for_display(&display));
-        let mut methods = vec![("sweep".to_owned(), sweep)];
-        for model in phasefront_models::NETWORKS {
-            let network = networks::network(model.name, None)?;
-            methods.push((format!("network {}", model.name), Method::trained(network)));
-        }
-        let scenes = usize::from(self.scenes);
-        let bar = progress_bar(refined_depth::work(scenes, methods.len()) as u64, "holograms");
-        let rows = refined_depth::study(scenes, self.seed, planes, &display, &methods, &|| bar.inc(1))?;
-        bar.finish_and_clear();
-        let result = json!({
-            "study": "depth", "planes": planes, "scenes": self.scenes, "seed": self.seed, "display": display,
-            "rows": rows,
-        });
-        self.write_json("depth", &result)?;
-        let mut text = "method            depth                PSNR dB    SSIM   wrong depth".to_owned();
-        for row in &rows {
-            let depth = format!("{}, {}", row.faults, row.depth);
-            text += &format!(
-                "\n{:17} {depth:20} {:7.2}  {:.4}  {:9.2} %",
-                row.method,
-                row.psnr,
-                row.ssim,
-                100.0 * row.wrong_depth
-            );
-        }
-        terminal::print(json, &result, text);
-        Ok(())
-    }
-
     fn flicker(&self, json: bool) -> Result<()> {
         /// The number of frames of each scene.
         const FRAMES: usize = 30;
-        let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
+        let (height, width) = flicker::SHAPE;
         let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
         let method = Method::Network(networks::network("8", None)?);
         let scenes = usize::from(self.scenes);

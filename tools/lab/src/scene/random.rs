@@ -1,4 +1,4 @@
-//! Random scenes of three kinds, and their common parts.
+//! Random scenes of four kinds, and their common parts.
 
 mod ground;
 mod natural;
@@ -12,4 +12,4 @@ mod varied;
 pub use natural::natural_scene;
 pub use objects::random_scene;
 pub use photographs::{fingerprint, read_photographs};
-pub use varied::varied_scene;
+pub use varied::{hard_scene, varied_scene};

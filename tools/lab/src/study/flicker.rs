@@ -2,21 +2,27 @@
 //! frame, and the study measures how much the displayed image changes between frames.
 
 use crate::scene;
-use crate::study::refined_depth::{SENSOR, SensorFaults, simulate_sensor};
+use crate::sensor::coarse::{Coarse, Sampling};
+use crate::sensor::colour_bytes;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
-use phasefront_io::ldi::Ldi;
+use phasefront_exact::truth::visible_depth;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 
 /// A function that makes a hologram of a frame, in a session of either kind.
 type Process = dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>;
 
-/// The noise and missing readings, new in each frame.
-const FAULTS: SensorFaults = SensorFaults {
-    name: "noise and holes",
+/// The shape, (H, W), of the depth sensor, which is ARKit's.
+const SENSOR: (usize, usize) = (192, 256);
+/// The shape, (H, W), of the scenes.
+pub const SHAPE: (usize, usize) = (4 * SENSOR.0, 4 * SENSOR.1);
+/// The sensor's faults: noise and missing readings, new in each frame.
+const FAULTS: Coarse = Coarse {
+    ratio: 4.0,
+    sampling: Sampling::Mean,
+    shift: [0, 0],
     noise: 0.01,
-    shift: 0,
     holes: true,
 };
 /// The distances, in metres, at normalized depth 0 and 1.
@@ -98,7 +104,7 @@ pub struct Row {
     pub pixel: f64,
 }
 
-/// Makes `frames` frames of random scene `seed`, at (H, W) = 4 times [`SENSOR`], by `method` in each of [`SETTINGS`].
+/// Makes `frames` frames of random scene `seed`, of [`SHAPE`], by `method` in each of [`SETTINGS`].
 /// The displayed image is viewed at full light with the focus in the middle of the volume. `done` is called after each
 /// frame.
 ///
@@ -113,11 +119,11 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
     let shape = (display.height(), display.width());
     let random = scene::random_scene(seed, shape.0, shape.1);
     let ldi = scene::render_ldi_reference(&random, shape.0, shape.1, 1)?.quantized();
-    let rgb = colour_bytes(&ldi);
-    let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
-    let readings: Vec<Vec<u8>> = (0..frames)
+    let rgb = colour_bytes(&ldi.layers[0].rgb);
+    let depth = visible_depth(&ldi);
+    let readings: Vec<Vec<u8>> = (0..frames as u64)
         .map(|frame| {
-            let readings = simulate_sensor(depth.view(), &FAULTS, seed + 1 + frame as u64);
+            let readings = FAULTS.read(depth.view(), seed + 1 + frame).depth;
             let metres = readings.mapv(|d| RANGE_M.0 + d * (RANGE_M.1 - RANGE_M.0));
             metres.iter().flat_map(|m| m.to_le_bytes()).collect()
         })
@@ -180,15 +186,6 @@ fn changes(setting: &'static str, seen: &[Vec<f32>]) -> Row {
         brightness: (brightness / steps).sqrt() / overall,
         pixel: (pixel.sum::<f64>() / steps).sqrt(),
     }
-}
-
-fn colour_bytes(ldi: &Ldi) -> Vec<u8> {
-    let (height, width) = ldi.shape();
-    let rgb = &ldi.layers[0].rgb;
-    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y, x)));
-    pixels
-        .flat_map(|(y, x)| [0, 1, 2].map(|c| (rgb[(c, y, x)].clamp(0.0, 1.0) * 255.0).round() as u8))
-        .collect()
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! also measures the sweep on displays that no network was trained for.
 
 use crate::scene;
+use crate::sensor::coarse::{Coarse, Sampling};
 use crate::study::Scenes;
-use crate::study::refined_depth::{RATIO, SENSOR_FAULTS, front, refine, simulate_sensor};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Display, RgbdFrame, Sweep};
@@ -12,7 +12,7 @@ use phasefront_core::method::sweep;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_exact::sm_lbm;
-use phasefront_exact::truth::filled;
+use phasefront_exact::truth::{filled, visible_depth, visible_rgb};
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result, metrics};
 use rayon::prelude::*;
@@ -21,6 +21,15 @@ use std::time::Instant;
 
 /// The number of frames from which the fastest gives the time of a sweep.
 const TIMED_FRAMES: usize = 5;
+
+/// The sensor of the ablation: coarse, noisy, shifted and with holes, like a phone's.
+const SENSOR: Coarse = Coarse {
+    ratio: 4.0,
+    sampling: Sampling::Mean,
+    shift: [3, 3],
+    noise: 0.005,
+    holes: true,
+};
 
 /// The displays of [`displays`], as differences from the default display in the format of a display file.
 pub const DISPLAYS: [&str; 10] = [
@@ -75,16 +84,10 @@ pub struct Row {
 /// each hologram, [`ablation_work`] times in total.
 ///
 /// # Errors
-/// Returns an error if there are no scenes, if a sensor's pixels do not divide the size, or if the display cannot be
-/// swept.
+/// Returns an error if there are no scenes or if the display cannot be swept.
 pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
     check(scenes)?;
     let size = scenes.size;
-    if !size.is_multiple_of(RATIO) {
-        return Err(Error::Input(format!(
-            "scenes of {size} pixels; the simulated sensor needs a multiple of {RATIO}"
-        )));
-    }
     let display = &scenes.display;
     let settings = settings(display, planes);
     let mut plans = Vec::new();
@@ -97,14 +100,13 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             }
         });
     }
-    let faults = SENSOR_FAULTS[SENSOR_FAULTS.len() - 1];
     let of_scenes = (0..scenes.scenes as u64)
         .into_par_iter()
         .map(|i| {
             let ldi = render(scenes, i)?;
             let truth = sm_lbm::hologram(&ldi, display, planes, &|_, _| {})?;
-            let (rgb, depth) = front(&ldi);
-            let refined = refine(&simulate_sensor(depth.view(), &faults, scenes.seed + i), &rgb)?;
+            let (rgb, depth) = (visible_rgb(&ldi), visible_depth(&ldi));
+            let refined = SENSOR.read(depth.view(), scenes.seed + i).session_depth(&rgb)?;
             let frames = [depth, refined].map(|depth| RgbdFrame::new(rgb.clone(), depth));
             let mut figures = Vec::new();
             for ((.., how), plan) in settings.iter().zip(&plans) {
@@ -125,8 +127,7 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
         })
         .collect::<Result<Vec<_>>>()?;
     let ldi = render(scenes, 0)?;
-    let (rgb, depth) = front(&ldi);
-    let frame = RgbdFrame::new(rgb, depth)?;
+    let frame = RgbdFrame::new(visible_rgb(&ldi), visible_depth(&ldi))?;
     let mut rows = Vec::new();
     for (i, ((part, setting, value, _), plan)) in settings.into_iter().zip(&plans).enumerate() {
         let each = |kind: usize| of_scenes.iter().map(move |figures| figures[i][kind]);
@@ -238,8 +239,7 @@ pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             .into_par_iter()
             .map(|i| {
                 let ldi = render(scenes, i)?;
-                let (rgb, depth) = front(&ldi);
-                let frame = RgbdFrame::new(rgb, depth)?;
+                let frame = RgbdFrame::new(visible_rgb(&ldi), visible_depth(&ldi))?;
                 let there = |field| to_modulator(field, &display);
                 let truth = there(sm_lbm::hologram(&ldi, &display, planes, &|_, _| {})?)?;
                 let visible = there(exact(&frame, &display, 0, planes)?)?;

@@ -139,7 +139,7 @@ fn what_cannot_be_made_is_refused_in_one_line() {
             "study displays --display santec-slm-200 -o study",
             "has displays of its own",
         ),
-        ("study flicker --size 64 -o study", "scenes without a sensor's depth"),
+        ("study flicker --size 64 -o study", "studies other than of flicker"),
     ] {
         folder.refuses(&call.split(' ').collect::<Vec<_>>(), 1, &[word]);
     }

@@ -2,7 +2,7 @@
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::target::Aberration;
-use phasefront::{Brightness, Display, EncoderOptions, Encoding};
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Sweep};
 use phasefront_command::networks::{self, Precision};
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::optics::aperture::Opening;
@@ -14,8 +14,9 @@ use phasefront_io::display::calibration::AberrationFile;
 use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::{metrics, picture};
 use phasefront_lab::dataset::{self, Manifest};
-use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown, Viewer};
+use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown, Viewer};
 use phasefront_lab::scene;
+use phasefront_lab::sensor::Sensor;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -53,7 +54,7 @@ impl Data {
         let sample = Sample {
             scenes: vec![78, 79],
             seed: 5,
-            depth: Depth::Rendered,
+            sensors: Vec::new(),
             margin: 0,
         };
         evaluate::evaluate(&self.manifest, self.path(), &sample, methods, shown, &|| {}).unwrap()
@@ -243,7 +244,7 @@ fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
         let sample = Sample {
             scenes: vec![78, 79],
             seed: 5,
-            depth: Depth::Rendered,
+            sensors: Vec::new(),
             margin,
         };
         let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
@@ -284,22 +285,59 @@ fn what_is_shown_depends_on_the_aperture() {
 }
 
 #[test]
-fn sensor_depth_costs_quality_and_refinement_restores_it() {
+fn each_sensors_depth_is_judged_after_the_true_depth() {
     let data = Data::new();
-    let methods = [Method::visible(&data.manifest.display, PLANES)];
-    let [rendered, sensor, refined] = [Depth::Rendered, Depth::Sensor, Depth::Refined].map(|depth| {
-        let sample = Sample {
-            scenes: vec![78, 79],
-            seed: 5,
-            depth,
-            margin: 0,
-        };
-        let shown = [Shown::complex()];
-        let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
-        rows[0].mean.focal_psnr
-    });
-    assert!(sensor < rendered && refined < rendered, "{rendered} {sensor} {refined}");
-    assert!(refined > sensor, "{sensor} {refined}");
+    let methods = [
+        Method::visible(&data.manifest.display, PLANES),
+        Method::rgb(&data.manifest.display),
+    ];
+    let sample = Sample {
+        scenes: vec![78, 79],
+        seed: 5,
+        sensors: vec![Sensor::HalfBilinear, Sensor::CoarseNearest],
+        margin: 0,
+    };
+    let shown = [Shown::complex()];
+    let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
+    let of = |method: &str| -> Vec<&Row> { rows.iter().filter(|row| row.method == method).collect() };
+    let sensors = [None, Some(Sensor::HalfBilinear), Some(Sensor::CoarseNearest)];
+    for method in ["visible", "rgb"] {
+        let found: Vec<_> = of(method).iter().map(|row| row.sensor).collect();
+        assert_eq!(found, sensors);
+    }
+    let visible = of("visible");
+    assert!(
+        visible[0].mean.focal_psnr > visible[1].mean.focal_psnr + 0.5,
+        "{visible:?}"
+    );
+    assert_eq!(visible[0].wrong_depth, 0.0);
+    assert!(
+        visible[1].wrong_depth > 0.01 && visible[1].wrong_depth < visible[2].wrong_depth,
+        "{visible:?}"
+    );
+    // The image itself does not depend on depth.
+    assert_eq!(of("rgb")[0].mean, of("rgb")[2].mean);
+}
+
+/// The automatic choice takes the sweep for clean depth and the network for noisy depth.
+#[test]
+fn the_automatic_choice_is_one_of_its_methods() {
+    let data = Data::new();
+    let display = &data.manifest.display;
+    let network = networks::network("8", None).unwrap();
+    let sweep = Sweep::for_display(display);
+    let methods = [
+        Method::auto(SIZE, display, sweep, network.clone()).unwrap(),
+        Method::sweep(SIZE, display, sweep).unwrap(),
+        Method::network("network", &network, SIZE, display).unwrap(),
+    ];
+    let rows = data.evaluate(&methods, &[Shown::complex()]);
+    for (scene, (_, figures)) in rows[0].scenes.iter().enumerate() {
+        assert!(
+            [1, 2].iter().any(|&row: &usize| rows[row].scenes[scene].1 == *figures),
+            "{rows:?}"
+        );
+    }
 }
 
 #[test]
@@ -445,11 +483,12 @@ fn the_command_prints_figures_and_draws_the_worst() {
     refused(&["--method", "rgb", "--split", "validation"], 1, "pair_00007");
     refused(&["--network", "nowhere.onnx"], 1, "nowhere.onnx");
     refused(&["--method", "rgb", "--margin", "24"], 1, "leaves nothing");
+    refused(&["--method", "rgb", "--sensor", "eye"], 2, "eye");
     refused(&["--pair", "--offset-mm", "3"], 1, "3 mm");
     refused(
         &["--method", "rgb", "--taps", "9"],
         1,
-        "--taps goes with --method sweep",
+        "--taps goes with --method sweep or auto",
     );
     refused(
         &["--method", "rgb", "--planes", "9"],
@@ -459,7 +498,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
     refused(
         &["--method", "rgb", "--precision", "f32"],
         1,
-        "--precision goes with a bundled --network or --pair",
+        "--precision goes with a bundled --network, --pair or --method auto",
     );
     refused(&["--method", "rgb", "--dark-threshold", "0"], 2, "--encoder");
 }

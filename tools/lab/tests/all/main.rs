@@ -20,6 +20,7 @@ mod occlusion;
 mod peel;
 mod point_based;
 mod seeds;
+mod sensor;
 mod sm_lbm;
 mod study;
 mod sweep;

@@ -11,14 +11,10 @@ use phasefront_lab::seeds;
 const SIZE: usize = 128;
 const SCENE: usize = 79;
 
-fn manifest(size: usize) -> Manifest {
-    Manifest::new(80, size, 10, 3, 4, Display::default()).unwrap()
-}
-
 #[test]
 fn seeds_are_the_sweeps_fields_on_given_and_refined_depth() {
     let (data, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let manifest = manifest(SIZE);
+    let manifest = Manifest::new(80, SIZE, 10, 3, 4, Display::default()).unwrap();
     dataset::make(&manifest, &[], data.path(), (SCENE, 80), &|| {}).unwrap();
     let pair = dataset::read_pair(&manifest, data.path(), SCENE).unwrap();
     let clean = pair.ldi.layers[0].depth.mapv(|d| {
@@ -66,15 +62,4 @@ fn seeds_are_the_sweeps_fields_on_given_and_refined_depth() {
 
     let error = make(1).unwrap_err().to_string();
     assert!(error.contains("refined depths"), "{error}");
-}
-
-#[test]
-fn scenes_that_no_sensor_divides_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let manifest = manifest(50);
-    let sweep = Sweep::for_display(&manifest.display);
-    let make = |refined| seeds::make(&manifest, folder.path(), folder.path(), sweep, refined, &|| {});
-    let error = make(1).unwrap_err().to_string();
-    assert!(error.contains("50×50") && error.contains("multiple of 4"), "{error}");
-    make(0).unwrap();
 }

@@ -58,6 +58,22 @@ impl<'a> Surfaces<'a> {
         }
     }
 
+    /// Returns surfaces of medium brightness with textures of high contrast: noise of every spectrum, stripes, checks,
+    /// plain surfaces and patterns.
+    pub(super) fn hard() -> Self {
+        Self {
+            photographs: &[],
+            exposure: 0.5,
+            spread: 1.5,
+            colourfulness: 0.6,
+            own_colours: 0.5,
+            contrast: [0.4, 1.0],
+            whole: 0.3,
+            exponents: [0.0, 3.0],
+            shares: [6.0, 0.0, 2.0, 1.0, 0.0, 0.0, 2.0, 1.0],
+        }
+    }
+
     /// Makes the texture of one surface: a piece of a photograph, one of the kinds of this module, or two of them in a
     /// pattern.
     pub(super) fn texture(&self, dice: &mut Dice, size: (usize, usize)) -> Texture {

@@ -21,12 +21,19 @@ const MAX_TEXELS: f64 = 432.0;
 pub fn varied_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64, photographs);
     let crowd = &CROWDS[maker.dice.weighted(&CROWDS.each_ref().map(|crowd| crowd.share))];
-    let mut count = |range: [f64; 2]| maker.dice.log_range(range[0], range[1]) as usize;
-    let (objects, thin_things) = (count(crowd.objects), count(crowd.thin));
-    let mut meshes: Vec<Mesh> = (0..objects).map(|i| maker.object(crowd, part(i, objects))).collect();
-    meshes.extend((0..thin_things).map(|i| maker.thin_thing(part(i, thin_things))));
-    meshes.extend(maker.background());
-    Scene { meshes }
+    maker.scene(crowd)
+}
+
+/// Makes a random scene of about forty overlapping, tilted objects in front of a background, whose textures range from
+/// white noise to flat, with a mean amplitude of about one half. Nothing in it is dark or smooth enough to hide errors.
+/// The same arguments give the same scene on every machine.
+pub fn hard_scene(seed: u64, height: usize, width: usize) -> Scene {
+    let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64, &[]);
+    maker.span = [0.0, 1.0];
+    maker.ground = Some(Ground::varied(&mut maker.dice, maker.span));
+    maker.light = None;
+    maker.surfaces = Surfaces::hard();
+    maker.scene(&CROWDS[FORTY])
 }
 
 /// Returns the `index`th of `count` equal parts of [0, 1].
@@ -47,6 +54,9 @@ struct Crowd {
     /// The smallest and largest number of thin objects and specks.
     thin: [f64; 2],
 }
+
+/// The index of about forty overlapping objects in [`CROWDS`].
+const FORTY: usize = 1;
 
 static CROWDS: [Crowd; 5] = [
     // A few large objects.
@@ -125,6 +135,16 @@ impl<'a> Maker<'a> {
             surfaces: Surfaces::new(&mut dice, photographs),
             dice,
         }
+    }
+
+    /// Makes the whole scene.
+    fn scene(&mut self, crowd: &Crowd) -> Scene {
+        let mut count = |range: [f64; 2]| self.dice.log_range(range[0], range[1]) as usize;
+        let (objects, thin_things) = (count(crowd.objects), count(crowd.thin));
+        let mut meshes: Vec<Mesh> = (0..objects).map(|i| self.object(crowd, part(i, objects))).collect();
+        meshes.extend((0..thin_things).map(|i| self.thin_thing(part(i, thin_things))));
+        meshes.extend(self.background());
+        Scene { meshes }
     }
 
     fn background(&mut self) -> Option<Mesh> {
@@ -312,5 +332,29 @@ mod tests {
         );
         let all: usize = deciles.iter().sum();
         assert!(deciles.iter().all(|&n| n * 40 > all), "{deciles:?}");
+    }
+
+    #[test]
+    fn hard_scenes_are_of_medium_brightness_and_full_of_edges() {
+        let (mut means, mut rough) = (Vec::new(), Vec::new());
+        for seed in 0..24 {
+            let ldi = render_ldi_reference(&hard_scene(seed, 128, 128), 128, 128, 3).unwrap();
+            let (mean, roughness) = brightness_and_roughness(&ldi);
+            means.push(mean);
+            rough.push(roughness);
+            let depth = &ldi.layers[0].depth;
+            let edges = depth
+                .windows((1, 2))
+                .into_iter()
+                .filter(|pair| (pair[(0, 1)] - pair[(0, 0)]).abs() > 0.03);
+            let edges = edges.count();
+            assert!(edges > 128 * 2 && depth.iter().all(|d| !d.is_nan()), "{seed}: {edges}");
+        }
+        let mean = means.iter().sum::<f64>() / means.len() as f64;
+        assert!(
+            (0.45..0.55).contains(&mean) && means.iter().all(|m| (0.3..0.7).contains(m)),
+            "{means:.2?}"
+        );
+        assert!(rough.iter().all(|r| *r > 0.1), "{rough:.2?}");
     }
 }
