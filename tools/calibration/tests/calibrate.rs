@@ -12,6 +12,7 @@ use phasefront_calibration::curves::lut::{self, Curves, Problem, Refusal, What};
 use phasefront_calibration::rehearse;
 use phasefront_calibration::simulated_display::{self, SimulatedDisplay};
 use phasefront_core::display::levels::LevelsMut;
+use phasefront_core::optics::metrics;
 use phasefront_core::optics::zernike::Aberrations;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_exact::corrected::{self, Correction};
@@ -20,7 +21,6 @@ use phasefront_io::display::DisplayFile;
 use phasefront_io::display::calibration::AberrationFile;
 use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::ldi::{Ldi, LdiLayer};
-use phasefront_io::metrics;
 use std::f64::consts::TAU;
 
 const SIZE: (usize, usize) = (80, 144);

@@ -5,8 +5,9 @@ use ndarray::{Array2, Array3};
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::method::sweep::hidden::{Hidden, NOTHING};
 use phasefront_core::method::sweep::hidden_reach;
+use phasefront_core::optics::metrics;
+use phasefront_io::Result;
 use phasefront_io::ldi::{Ldi, LdiLayer};
-use phasefront_io::{Result, metrics};
 use serde::Serialize;
 
 /// Returns the amplitudes of the front layer. Pixels without a surface are black.
@@ -97,7 +98,7 @@ pub fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Res
     let inner = ndarray::s![.., margin..height - margin, margin..width - margin];
     let each = (views.iter().zip(truth))
         .map(|(view, truth)| metrics::compare(view.slice(inner), truth.slice(inner)))
-        .collect::<Result<Vec<_>>>()?;
+        .collect::<phasefront::Result<Vec<_>>>()?;
     let (midpoint, stack) = (&each[0], &each[1..]);
     let mean = |figure: fn(&metrics::Comparison) -> f64| stack.iter().map(figure).sum::<f64>() / stack.len() as f64;
     Ok(Figures {

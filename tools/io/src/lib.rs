@@ -11,7 +11,6 @@ pub mod frame;
 pub mod hologram;
 pub mod input;
 pub mod ldi;
-pub mod metrics;
 pub mod output;
 pub mod picture;
 

@@ -10,9 +10,10 @@ use crate::scene;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront_core::optics::metrics;
 use phasefront_exact::sm_lbm;
 use phasefront_io::ldi::Ldi;
-use phasefront_io::{Error, Result, metrics};
+use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -121,7 +122,7 @@ fn against_finest(
             let amplitude = |value| Ok::<_, Error>(hologram(&ldi, value)?.mapv(|v| v.norm()));
             let truth = amplitude(finest)?;
             (values.iter())
-                .map(|value| metrics::compare(amplitude(*value)?.view(), truth.view()))
+                .map(|value| Ok(metrics::compare(amplitude(*value)?.view(), truth.view())?))
                 .collect::<Result<Vec<_>>>()
         })
         .collect::<Result<Vec<_>>>()?;

@@ -3,7 +3,8 @@
 use clap::Args;
 use ndarray::Array3;
 use phasefront_command::terminal;
-use phasefront_io::{Error, Result, hologram, metrics, picture};
+use phasefront_core::optics::metrics;
+use phasefront_io::{Error, Result, hologram, picture};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

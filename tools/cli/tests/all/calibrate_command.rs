@@ -8,9 +8,10 @@ use phasefront::target::Aberration;
 use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_calibration::optics::spot;
 use phasefront_calibration::simulated_display::SimulatedDisplay;
+use phasefront_core::optics::metrics;
 use phasefront_core::optics::zernike::Coefficients;
 use phasefront_io::display::calibration;
-use phasefront_io::{metrics, picture};
+use phasefront_io::picture;
 use std::fs;
 
 /// Arguments that compute the table from the rehearsal's photographs.

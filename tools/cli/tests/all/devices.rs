@@ -103,7 +103,7 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
         "beyond one turn"
     );
     for other in &views[1..] {
-        let alike = phasefront_io::metrics::compare(other.view(), views[0].view()).unwrap();
+        let alike = phasefront_core::optics::metrics::compare(other.view(), views[0].view()).unwrap();
         assert!(alike.psnr_overall > 35.0, "{}", alike.psnr_overall);
     }
     // A view of this hologram needs the display file.

@@ -7,10 +7,11 @@ use ndarray::{Array3, s};
 use phasefront::target::Aberration;
 use phasefront::{Display, Target};
 use phasefront_cli::viewer;
+use phasefront_core::optics::metrics;
 use phasefront_io::display::calibration;
 use phasefront_io::hologram::packed::{Image, Kind};
 use phasefront_io::hologram::{self, Hologram, Levels};
-use phasefront_io::{metrics, picture};
+use phasefront_io::picture;
 use serde_json::Value;
 use std::fs;
 

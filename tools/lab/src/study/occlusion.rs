@@ -14,11 +14,11 @@ use ndarray::{Array2, Array3, Axis, Zip, s};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront_core::optics::asm;
+use phasefront_core::optics::metrics::{self, Comparison};
 use phasefront_core::view::refocus::Refocus;
 use phasefront_exact::point_based::{self, Occlusion};
 use phasefront_exact::sm_lbm::{self, plane_of_depth, plane_z_m};
 use phasefront_io::ldi::{Ldi, LdiLayer};
-use phasefront_io::metrics::{self, Comparison};
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 

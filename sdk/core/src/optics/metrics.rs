@@ -1,6 +1,6 @@
 //! PSNR and SSIM of amplitudes, as in the paper: with a peak of 1, for each colour and overall.
 
-use crate::{Error, Result};
+use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, ArrayView2, ArrayView3, Axis, Zip};
 use serde::Serialize;
 
@@ -29,12 +29,12 @@ pub struct Comparison {
 pub fn compare(a: ArrayView3<'_, f32>, b: ArrayView3<'_, f32>) -> Result<Comparison> {
     let ((ca, ha, wa), (cb, hb, wb)) = (a.dim(), b.dim());
     if (ha, wa) != (hb, wb) {
-        return Err(Error::Input(format!(
+        return Err(Error::Setting(format!(
             "one is {wa}×{ha}, the other {wb}×{hb}; only images of one size can be compared"
         )));
     }
     if ca != cb {
-        return Err(Error::Input(format!(
+        return Err(Error::Setting(format!(
             "one has {ca} colours, the other {cb}; only images of the same colours can be compared"
         )));
     }
