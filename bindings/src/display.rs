@@ -2,48 +2,49 @@
 
 use crate::error::{PhasefrontError, guard};
 
-/// One modulator, its lasers, and the volume it shows. It is checked where it is used.
+/// A modulator, its lasers, and the display volume. It is checked when it is used.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct Display {
-    /// Pixels along x.
+    /// The number of pixels along x.
     #[uniffi(default = 1920)]
     pub width: u32,
-    /// Pixels along y.
+    /// The number of pixels along y.
     #[uniffi(default = 1080)]
     pub height: u32,
-    /// Distance between neighbouring pixels, µm.
+    /// The distance between neighbouring pixels, in µm.
     #[uniffi(default = 8.0)]
     pub pitch_um: f64,
-    /// Wavelength of the red laser, nm.
+    /// The wavelength of the red laser, in nm.
     #[uniffi(default = 638.0)]
     pub red_nm: f64,
-    /// Wavelength of the green laser, nm.
+    /// The wavelength of the green laser, in nm.
     #[uniffi(default = 520.0)]
     pub green_nm: f64,
-    /// Wavelength of the blue laser, nm.
+    /// The wavelength of the blue laser, in nm.
     #[uniffi(default = 450.0)]
     pub blue_nm: f64,
-    /// Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
+    /// The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
+    /// wavelengths; none for a display with three lasers.
     #[uniffi(default = None)]
     pub laser_nm: Option<f64>,
-    /// Depth of the volume, mm.
+    /// The depth of the volume, in mm.
     #[uniffi(default = 6.0)]
     pub volume_depth_mm: f64,
-    /// z of the modulator against the middle of the volume, mm, positive toward the viewer.
+    /// The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
     #[uniffi(default = 0.0)]
     pub offset_mm: f64,
-    /// Bits of a modulator level.
+    /// The number of bits of a modulator level.
     #[uniffi(default = 8)]
     pub bits: u32,
-    /// Radius of the aperture in the Fourier plane; 1 is the whole first order.
+    /// The radius of the aperture in the Fourier plane; 1 is the whole first order.
     #[uniffi(default = 1.0)]
     pub aperture_radius: f64,
 }
 
-/// Reads a display from its TOML form; what is left out has the default value.
+/// Reads a display from its TOML form. Missing keys have default values.
 ///
 /// # Errors
-/// Text that is not TOML, an unknown key, or a value out of its range.
+/// Returns an error if the text is not TOML, a key is unknown, or a value is out of its range.
 #[uniffi::export]
 pub fn display_from_toml(text: String) -> Result<Display, PhasefrontError> {
     guard(|| Ok(phasefront::Display::from_toml(&text)?.into()))
@@ -51,12 +52,12 @@ pub fn display_from_toml(text: String) -> Result<Display, PhasefrontError> {
 
 impl From<phasefront::Display> for Display {
     fn from(display: phasefront::Display) -> Self {
-        // Metres times 1e9 leave the last digit off (637.9999…).
+        // Metres times 1e9 differ in the last digit (637.9999…).
         let round = |value: f64| (value * 1e6).round() / 1e6;
         let nm: Vec<f64> = display.wavelengths_m().iter().map(|l| round(l * 1e9)).collect();
         let ([red_nm, green_nm, blue_nm], laser_nm) = match nm[..] {
             [red, green, blue] => ([red, green, blue], None),
-            // What the three are where nothing is said of them.
+            // The defaults of the three.
             _ => ([638.0, 520.0, 450.0], nm.first().copied()),
         };
         Display {
@@ -92,8 +93,8 @@ impl TryFrom<&Display> for phasefront::Display {
             bits,
             aperture_radius,
         } = display;
-        // The TOML form is the core's own way in; `{:?}` writes floats so that they are read back the same, all but the
-        // case of NaN.
+        // The core reads displays only from TOML. `{:?}` writes floats so that they are read back the same, except for
+        // the letter case of NaN.
         let wavelengths_nm = match laser_nm {
             Some(laser_nm) => vec![laser_nm],
             None => vec![red_nm, green_nm, blue_nm],

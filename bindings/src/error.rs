@@ -1,33 +1,33 @@
-//! The one error of the bindings: a kind that apps can act on, and the core's message.
+//! The error of the bindings: a kind that apps can act on, and the core's message.
 
 use phasefront_core::runtime::caught::caught;
 
-/// Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right.
+/// The error of a call. The message is one line that names what is wrong and what would be right.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, uniffi::Error)]
 #[uniffi(flat_error)]
 pub enum PhasefrontError {
-    /// A display whose physics is impossible or out of range.
+    /// The physics of a display is impossible or out of range.
     #[error("{0}")]
     Display(String),
-    /// A frame, plane or image of the wrong shape or with unusable values.
+    /// A frame, plane or image has the wrong shape or unusable values.
     #[error("{0}")]
     Frame(String),
-    /// A frame that is not later than the last one. It is refused; what follows is not harmed.
+    /// A frame is not later than the previous one. It is refused; later frames are not affected.
     #[error("{0}")]
     Timestamp(String),
-    /// A setting or an argument that cannot be meant or planned for.
+    /// A setting or an argument is invalid or cannot be planned.
     #[error("{0}")]
     Setting(String),
-    /// What is not a hologram network, or one for another display.
+    /// A file is not a hologram network, or the network is for another display.
     #[error("{0}")]
     Network(String),
-    /// A file that cannot be read.
+    /// A file cannot be read.
     #[error("{0}")]
     File(String),
-    /// A call that a session cannot answer in its mode or state.
+    /// A session cannot answer the call in its mode or state.
     #[error("{0}")]
     Session(String),
-    /// A fault of Phasefront. The call had no effect, or the frame is lost; please report it.
+    /// Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
     #[error("{0}")]
     Internal(String),
 }
@@ -48,14 +48,14 @@ impl From<phasefront::Error> for PhasefrontError {
     }
 }
 
-/// What a listener threw, whatever it was. An error that comes in must not be flat: a flat one only goes out, and
-/// taking it in would be a panic on the session's thread.
+/// An error that a listener threw. It is not flat, because UniFFI cannot read a flat error and would panic on the
+/// session's thread.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, uniffi::Error)]
 pub enum ListenerError {
-    /// With its own words.
+    /// The listener threw an error or an exception.
     #[error("the listener threw: {reason}")]
     Threw {
-        /// What it said.
+        /// The message.
         reason: String,
     },
 }
@@ -67,7 +67,7 @@ impl From<uniffi::UnexpectedUniFFICallbackError> for ListenerError {
     }
 }
 
-/// What `call` gives, a panic in it made an error.
+/// Returns the result of `call`. A panic in it becomes an error.
 pub fn guard<T>(call: impl FnOnce() -> Result<T, PhasefrontError>) -> Result<T, PhasefrontError> {
     caught(call).unwrap_or_else(|message| {
         Err(PhasefrontError::Internal(format!(
@@ -92,7 +92,7 @@ mod tests {
         assert_eq!(guard(|| Ok(1)), Ok(1));
     }
 
-    /// Panics as it ends.
+    /// Panics when it is dropped.
     struct Bomb;
 
     impl Drop for Bomb {

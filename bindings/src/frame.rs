@@ -1,194 +1,199 @@
-//! Camera frames: what lies where in the memory that comes with them.
+//! Camera frames: the layout of the memory that is passed with them.
 
 use crate::error::PhasefrontError;
-use phasefront::input::{self, CameraFrame, ColourImage, DepthImage, Plane};
+use phasefront::input::{
+    self, CameraFrame, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics, Orientation, Plane,
+    Rotation, YuvMatrix,
+};
 
-/// How a colour image lies in memory.
+/// The memory layout of a colour image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum ColourFormat {
-    /// One plane; bytes red, green, blue, alpha (which is not looked at).
+    /// One plane with the bytes red, green, blue, alpha. Alpha is ignored.
     Rgba,
-    /// One plane; bytes blue, green, red, alpha (which is not looked at). iOS' 32BGRA.
+    /// One plane with the bytes blue, green, red, alpha, as in iOS' 32BGRA. Alpha is ignored.
     Bgra,
-    /// One plane; bytes red, green, blue.
+    /// One plane with the bytes red, green, blue.
     Rgb,
-    /// Two planes: luma; and at half the resolution blue and red chroma side by side. iOS' 420f and 420v.
+    /// Two planes: luma, and interleaved blue and red chroma at half the resolution. iOS' 420f and 420v.
     Nv12,
     /// Three planes: luma, and at half the resolution blue chroma (U) and red chroma (V). Android's YUV_420_888.
     Yuv420,
 }
 
-/// The matrix between luma, chroma and colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The matrix that converts luma and chroma to colour.
+#[uniffi::remote(Enum)]
 pub enum YuvMatrix {
-    /// ITU-R BT.601: standard definition, JPEG, most Android cameras.
+    /// ITU-R BT.601, for standard definition, JPEG and most Android cameras.
     Bt601,
-    /// ITU-R BT.709: high definition.
+    /// ITU-R BT.709, for high definition.
     Bt709,
 }
 
-/// How a depth image lies in memory. But for the normalized ones, 0, negative numbers and what is not finite mean no
-/// reading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
+/// are not finite mean no reading.
+#[uniffi::remote(Enum)]
+#[non_exhaustive]
 pub enum DepthFormat {
-    /// Metres, 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
+    /// Metres as 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
     MetresF32,
-    /// Metres, 16-bit floats: AVFoundation's DepthFloat16.
+    /// Metres as 16-bit floats: AVFoundation's DepthFloat16.
     MetresF16,
-    /// Inverse metres, 32-bit floats: AVFoundation's DisparityFloat32.
+    /// Inverse metres as 32-bit floats: AVFoundation's DisparityFloat32.
     DisparityF32,
-    /// Inverse metres, 16-bit floats: AVFoundation's DisparityFloat16.
+    /// Inverse metres as 16-bit floats: AVFoundation's DisparityFloat16.
     DisparityF16,
-    /// Millimetres, all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
+    /// Millimetres in all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
     MillimetresU16,
-    /// Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3. Not the same as millimetres
-    /// in all 16.
+    /// Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits. It differs from
+    /// millimetres in all 16 bits.
     AndroidDepth16,
-    /// 0 nearest to 255 farthest; every pixel is a reading.
+    /// Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
     NormalizedU8,
-    /// 0 nearest to 65535 farthest; every pixel is a reading.
+    /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16,
 }
 
-/// How a confidence map lies in memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The memory layout of a confidence map.
+#[uniffi::remote(Enum)]
+#[non_exhaustive]
 pub enum ConfidenceFormat {
-    /// 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
+    /// 0 low, 1 medium, 2 high, as in ARKit's ARConfidenceLevel.
     LowMediumHigh,
-    /// 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+    /// 0 none to 255 full, as in ARCore's acquireRawDepthConfidenceImage.
     U8,
 }
 
-/// How far a sensor's picture must be turned clockwise to stand upright.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The clockwise rotation that turns a sensor's image upright.
+#[uniffi::remote(Enum)]
 pub enum Rotation {
-    /// Not at all.
+    /// No rotation.
     Upright,
     /// A quarter turn.
     Clockwise90,
     /// Half a turn.
     Half,
-    /// Three quarters.
+    /// Three quarters of a turn.
     Clockwise270,
 }
 
-/// How a sensor's picture becomes the one that is shown: turned, then mirrored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
+/// The transformation from a sensor's image to the upright image: a rotation, then mirroring.
+#[uniffi::remote(Record)]
 pub struct Orientation {
-    /// The turn.
+    /// The rotation.
     pub rotation: Rotation,
-    /// Whether left and right are exchanged after the turn, as front cameras need.
+    /// Whether left and right are exchanged after the rotation, as front cameras need.
     #[uniffi(default = false)]
     pub mirrored: bool,
 }
 
-/// Where the pixels of one plane lie.
+/// The strides of a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct PlaneInfo {
-    /// Bytes from one row to the next.
+    /// The number of bytes from one row to the next.
     pub row_stride: u32,
-    /// Bytes from one pixel to the next in a row.
+    /// The number of bytes from one pixel to the next in a row.
     pub pixel_stride: u32,
 }
 
-/// What a colour image is.
+/// The format and size of a colour image.
 #[derive(Debug, Clone, PartialEq, Eq, uniffi::Record)]
 pub struct ColourInfo {
-    /// How it lies in memory.
+    /// The memory layout.
     pub format: ColourFormat,
-    /// Pixels along x, as the sensor gives them.
+    /// The width of the sensor's image, in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height of the sensor's image, in pixels.
     pub height: u32,
-    /// Its planes, in the format's order.
+    /// The planes, in the format's order.
     pub planes: Vec<PlaneInfo>,
-    /// The matrix of luma and chroma; other formats do not look at it.
+    /// The matrix of luma and chroma. Other formats ignore it.
     pub matrix: YuvMatrix,
-    /// Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at
-    /// it.
+    /// Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
     pub video_range: bool,
 }
 
-/// What a depth image is.
+/// The format and size of a depth image.
 #[derive(Debug, Clone, PartialEq, Eq, uniffi::Record)]
 pub struct DepthInfo {
-    /// How it lies in memory.
+    /// The memory layout.
     pub format: DepthFormat,
-    /// Pixels along x, as the sensor gives them.
+    /// The width of the sensor's image, in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height of the sensor's image, in pixels.
     pub height: u32,
-    /// Its plane.
+    /// The plane.
     pub plane: PlaneInfo,
 }
 
-/// What a confidence map is.
+/// The format and size of a confidence map.
 #[derive(Debug, Clone, PartialEq, Eq, uniffi::Record)]
 pub struct ConfidenceInfo {
-    /// How it lies in memory.
+    /// The memory layout.
     pub format: ConfidenceFormat,
-    /// Pixels along x: as many as the depth has.
+    /// The width in pixels, equal to the depth image's.
     pub width: u32,
-    /// Pixels along y: as many as the depth has.
+    /// The height in pixels, equal to the depth image's.
     pub height: u32,
-    /// Its plane.
+    /// The plane.
     pub plane: PlaneInfo,
 }
 
-/// The pinhole model of a camera, in pixels of its image before it is turned upright. The middle of the first pixel is
-/// (0, 0).
-#[derive(Debug, Clone, Copy, PartialEq, uniffi::Record)]
+/// The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
+/// pixel is (0, 0).
+#[uniffi::remote(Record)]
 pub struct Intrinsics {
-    /// Focal length along x.
+    /// The focal length along x.
     pub fx: f64,
-    /// Focal length along y.
+    /// The focal length along y.
     pub fy: f64,
-    /// x of the principal point.
+    /// The x of the principal point.
     pub cx: f64,
-    /// y of the principal point.
+    /// The y of the principal point.
     pub cy: f64,
 }
 
-/// Where a point p of the depth camera (x right, y down, z forward) is for the colour camera: R·p + t.
+/// The pose of the depth camera. A point p of the depth camera (x right, y down, z forward) is at R·p + t of the colour
+/// camera.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct Pose {
-    /// R, its 9 numbers row by row.
+    /// R: 9 numbers, row by row.
     pub rotation: Vec<f64>,
-    /// t, 3 numbers, metres.
+    /// t: 3 numbers, in metres.
     pub translation_m: Vec<f64>,
 }
 
-/// How the depth camera and the colour camera stand to each other.
+/// The intrinsics and the relative pose of the depth camera and the colour camera.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct Cameras {
-    /// Of the colour image.
+    /// The intrinsics of the colour camera.
     pub colour: Intrinsics,
-    /// Of the depth image.
+    /// The intrinsics of the depth camera.
     pub depth: Intrinsics,
-    /// From depth to colour; none for cameras at one place that look one way.
+    /// The pose from the depth camera to the colour camera; none for cameras with the same position and orientation.
     #[uniffi(default = None)]
     pub pose: Option<Pose>,
 }
 
-/// What a frame is; its memory comes beside it.
+/// The description of a frame. Its memory is passed with it.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct FrameInfo {
-    /// When it was taken, in nanoseconds of any clock that runs forward.
+    /// The time at which the frame was taken, in nanoseconds of any clock that runs forward.
     pub timestamp_ns: u64,
     /// The colour image.
     pub colour: ColourInfo,
     /// The depth image.
     pub depth: DepthInfo,
-    /// The confidence map of the depth, where there is one.
+    /// The confidence map of the depth image; none if there is no map.
     pub confidence: Option<ConfidenceInfo>,
-    /// How all must be turned to stand upright.
+    /// The transformation of all images to upright ones.
     pub orientation: Orientation,
-    /// How the pixels of depth and colour correspond; none where both show the same field of view.
+    /// The correspondence of the pixels of depth and colour; none if both images have the same field of view.
     pub cameras: Option<Cameras>,
 }
 
-/// The memory of a frame: the planes of colour (empty behind the format's last), depth, and confidence (empty where
-/// there is none).
+/// The memory of a frame: the planes of the colour image (empty after the format's last plane), the depth image, and
+/// the confidence map (empty if there is no map).
 #[derive(Clone, Copy)]
 pub(crate) struct FrameMemory<'a> {
     pub(crate) colour: [&'a [u8]; 3],
@@ -197,16 +202,13 @@ pub(crate) struct FrameMemory<'a> {
 }
 
 impl FrameInfo {
-    /// The core's frame in `memory`.
+    /// Returns the core's frame in `memory`.
     ///
     /// # Errors
-    /// [`PhasefrontError::Frame`]: what [`ColourImage::new`] or [`DepthImage::new`] refuses.
+    /// Returns [`PhasefrontError::Frame`] if [`ColourImage::new`] or [`DepthImage::new`] refuses an image.
     pub(crate) fn frame<'a>(&self, memory: FrameMemory<'a>) -> Result<CameraFrame<'a>, PhasefrontError> {
         let encoding = input::YuvEncoding {
-            matrix: match self.colour.matrix {
-                YuvMatrix::Bt601 => input::YuvMatrix::Bt601,
-                YuvMatrix::Bt709 => input::YuvMatrix::Bt709,
-            },
+            matrix: self.colour.matrix,
             video_range: self.colour.video_range,
         };
         let format = match self.colour.format {
@@ -230,38 +232,16 @@ impl FrameInfo {
         let (width, height) = size(self.colour.width, self.colour.height);
         let colour = ColourImage::new(format, width, height, &planes)?;
 
-        let format = match self.depth.format {
-            DepthFormat::MetresF32 => input::DepthFormat::MetresF32,
-            DepthFormat::MetresF16 => input::DepthFormat::MetresF16,
-            DepthFormat::DisparityF32 => input::DepthFormat::DisparityF32,
-            DepthFormat::DisparityF16 => input::DepthFormat::DisparityF16,
-            DepthFormat::MillimetresU16 => input::DepthFormat::MillimetresU16,
-            DepthFormat::AndroidDepth16 => input::DepthFormat::AndroidDepth16,
-            DepthFormat::NormalizedU8 => input::DepthFormat::NormalizedU8,
-            DepthFormat::NormalizedU16 => input::DepthFormat::NormalizedU16,
-        };
         let (width, height) = size(self.depth.width, self.depth.height);
-        let mut depth = DepthImage::new(format, width, height, self.depth.plane.plane(memory.depth))?;
+        let mut depth = DepthImage::new(self.depth.format, width, height, self.depth.plane.plane(memory.depth))?;
         if let Some(info) = &self.confidence {
-            let format = match info.format {
-                ConfidenceFormat::LowMediumHigh => input::ConfidenceFormat::LowMediumHigh,
-                ConfidenceFormat::U8 => input::ConfidenceFormat::U8,
-            };
             let (width, height) = size(info.width, info.height);
             let plane = info.plane.plane(memory.confidence);
-            depth = depth.with_confidence(format, width, height, plane)?;
+            depth = depth.with_confidence(info.format, width, height, plane)?;
         }
 
         let mut frame = CameraFrame::new(self.timestamp_ns, colour, depth);
-        frame.orientation = input::Orientation {
-            rotation: match self.orientation.rotation {
-                Rotation::Upright => input::Rotation::Upright,
-                Rotation::Clockwise90 => input::Rotation::Clockwise90,
-                Rotation::Half => input::Rotation::Half,
-                Rotation::Clockwise270 => input::Rotation::Clockwise270,
-            },
-            mirrored: self.orientation.mirrored,
-        };
+        frame.orientation = self.orientation;
         if let Some(cameras) = &self.cameras {
             frame.alignment = input::Alignment::Cameras(cameras.try_into()?);
         }
@@ -275,17 +255,11 @@ impl PlaneInfo {
     }
 }
 
-impl From<Intrinsics> for input::Intrinsics {
-    fn from(Intrinsics { fx, fy, cx, cy }: Intrinsics) -> Self {
-        input::Intrinsics { fx, fy, cx, cy }
-    }
-}
-
 impl TryFrom<&Cameras> for input::Cameras {
     type Error = PhasefrontError;
 
     fn try_from(cameras: &Cameras) -> Result<Self, PhasefrontError> {
-        let mut to = input::Cameras::concentric(cameras.colour.into(), cameras.depth.into());
+        let mut to = input::Cameras::concentric(cameras.colour, cameras.depth);
         if let Some(Pose {
             rotation,
             translation_m,

@@ -1,42 +1,41 @@
-//! Results: handles whose memory is read in place.
+//! Results: handles to memory that is read in place.
 
 use crate::error::{PhasefrontError, guard};
-use crate::options::Placement;
 use crate::statistics::FrameTimes;
 use num_complex::Complex32;
-use phasefront::output::Output;
+use phasefront::output::{Output, Placement};
 use phasefront::session;
 use std::sync::Arc;
 
-/// The hologram of one frame: modulator levels of three colours. For the layers by hand, which keep it alive while its
+/// The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
 /// planes are read.
 #[derive(Debug, uniffi::Object)]
 pub struct RawHologram {
     core: session::Hologram,
 }
 
-/// What is known of a hologram.
+/// The properties of a hologram.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct HologramInfo {
-    /// The frame's timestamp.
+    /// The timestamp of the frame.
     pub timestamp_ns: u64,
-    /// Pixels along x.
+    /// The width in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height in pixels.
     pub height: u32,
-    /// How many colours its levels have: 3, or 1 for a display of one laser.
+    /// The number of colours of the levels: 3, or 1 for a display with one laser.
     pub colours: u32,
-    /// The amplitude that full light stands for.
+    /// The amplitude that maps to full light.
     pub scale: f32,
-    /// Metres at the near end of the volume; none for normalized depth.
+    /// The distance of the near end of the volume in metres; none for normalized depth.
     pub near_m: Option<f32>,
-    /// Metres at the far end of the volume; none for normalized depth.
+    /// The distance of the far end of the volume in metres; none for normalized depth.
     pub far_m: Option<f32>,
     /// The share of the depth sensor's pixels that had a usable reading.
     pub valid_depth: f32,
-    /// The quality level that it was made at, 0 the best.
+    /// The quality level of the hologram; 0 is the best.
     pub quality_level: u32,
-    /// How long each stage took.
+    /// The time that each stage took.
     pub times: FrameTimes,
 }
 
@@ -48,7 +47,7 @@ impl RawHologram {
 
 #[uniffi::export]
 impl RawHologram {
-    /// What is known of it.
+    /// Returns the properties of the hologram.
     pub fn info(&self) -> Result<HologramInfo, PhasefrontError> {
         guard(|| {
             let (height, width) = self.core.shape();
@@ -68,35 +67,35 @@ impl RawHologram {
         })
     }
 
-    /// Another handle to the same hologram: whoever reads its memory holds one.
+    /// Returns another handle to the same hologram. Each reader of its memory holds one.
     pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
         Ok(self)
     }
 
-    /// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
-    /// laser. The colours follow one another without gaps, too. Valid as long as this object.
+    /// Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
+    /// byte; there are no gaps between rows or between colours. The address is valid as long as this object.
     ///
     /// # Errors
-    /// Another colour.
+    /// Returns an error for other colours.
     pub fn plane_address(&self, colour: u32) -> Result<u64, PhasefrontError> {
         guard(|| Ok(self.core.plane(colour as usize)?.as_ptr() as u64))
     }
 
-    /// How many bytes lie there.
+    /// Returns the number of bytes of a plane.
     pub fn plane_len(&self) -> Result<u64, PhasefrontError> {
         guard(|| Ok(self.core.plane(0)?.len() as u64))
     }
 
-    /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, mm: where to focus when
-    /// it is tapped on.
+    /// Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
+    /// Coordinates run from 0 to 1 from the upper left corner.
     pub fn z_at(&self, x: f64, y: f64) -> Result<f64, PhasefrontError> {
         guard(|| Ok(self.core.z_at(x, y) * 1e3))
     }
 
-    /// What an eye focused at `z_mm` sees, `width` × `height` pixels.
+    /// Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
     ///
     /// # Errors
-    /// An empty image, or a z too far away.
+    /// Returns an error if the image is empty or z is too far away.
     pub fn preview(&self, z_mm: f64, width: u32, height: u32) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
             let (w, h) = (width as usize, height as usize);
@@ -111,31 +110,30 @@ impl RawHologram {
         })
     }
 
-    /// What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+    /// Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
     ///
     /// # Errors
-    /// A z too far away.
+    /// Returns an error if z is too far away.
     pub fn refocus(&self, z_mm: f64) -> Result<Arc<RawPlanes>, PhasefrontError> {
         guard(|| Ok(self.planes(Numbers::Amplitudes(self.core.refocus(z_mm / 1e3)?))))
     }
 
-    /// The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
-    /// and imaginary part of each pixel.
+    /// Returns the complex field that the levels produce behind the aperture at `z_mm`, where 0 is the midpoint: the
+    /// real and the imaginary part of each pixel. The carrier is left out.
     ///
     /// # Errors
-    /// A z too far away.
+    /// Returns an error if z is too far away.
     pub fn field(&self, z_mm: f64) -> Result<Arc<RawPlanes>, PhasefrontError> {
         guard(|| Ok(self.planes(Numbers::Field(self.core.field(z_mm / 1e3)?))))
     }
 
-    /// Image `image` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in
-    /// the upper bits of a byte, the hologram where `placement` says.
+    /// Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
+    /// levels in the upper bits of a byte; `placement` positions the hologram.
     ///
     /// # Errors
-    /// An image that the layout has not.
+    /// Returns an error if the layout does not have this image.
     pub fn output(&self, placement: Placement, image: u32) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
-            let placement: phasefront::output::Placement = placement.into();
             let plan = Output::new(self.core.target(), self.core.shape(), placement)?;
             let mut bytes = vec![0; plan.image_bytes()];
             plan.write(self.core.output_levels(), image as usize, &mut bytes)?;
@@ -151,7 +149,7 @@ impl RawHologram {
 }
 
 impl RawHologram {
-    /// `numbers` of its shape.
+    /// Returns planes of the hologram's shape with `numbers`.
     fn planes(&self, numbers: Numbers) -> Arc<RawPlanes> {
         let (height, width) = self.core.shape();
         Arc::new(RawPlanes {
@@ -163,8 +161,8 @@ impl RawHologram {
     }
 }
 
-/// Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
-/// by hand.
+/// Numbers of 32 bits at each pixel of each colour, without gaps between rows or planes. The layers written by hand
+/// read them.
 #[derive(Debug, uniffi::Object)]
 pub struct RawPlanes {
     numbers: Numbers,
@@ -181,15 +179,16 @@ enum Numbers {
 
 #[uniffi::export]
 impl RawPlanes {
-    /// Another handle to the same planes: whoever reads their memory holds one.
+    /// Returns another handle to the same planes. Each reader of their memory holds one.
     pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
         Ok(self)
     }
 
-    /// Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+    /// Returns the address of the plane of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. The address is valid
+    /// as long as this object.
     ///
     /// # Errors
-    /// Another colour.
+    /// Returns an error for other colours.
     pub fn plane_address(&self, colour: u32) -> Result<u64, PhasefrontError> {
         guard(|| {
             if colour >= self.colours {
@@ -207,7 +206,7 @@ impl RawPlanes {
         })
     }
 
-    /// Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+    /// Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part.
     pub fn pixel_bytes(&self) -> Result<u32, PhasefrontError> {
         guard(|| {
             Ok(match &self.numbers {
@@ -217,23 +216,23 @@ impl RawPlanes {
         })
     }
 
-    /// Pixels along x.
+    /// Returns the width in pixels.
     pub fn width(&self) -> Result<u32, PhasefrontError> {
         Ok(self.width)
     }
 
-    /// Pixels along y.
+    /// Returns the height in pixels.
     pub fn height(&self) -> Result<u32, PhasefrontError> {
         Ok(self.height)
     }
 
-    /// Planes: 3, or 1 of a display of one laser.
+    /// Returns the number of planes: 3, or 1 for a display with one laser.
     pub fn colours(&self) -> Result<u32, PhasefrontError> {
         Ok(self.colours)
     }
 }
 
-/// An image, row by row without gaps. For the layers by hand.
+/// An image without gaps between rows. The layers written by hand read it.
 #[derive(Debug, uniffi::Object)]
 pub struct RawImage {
     bytes: Vec<u8>,
@@ -244,32 +243,32 @@ pub struct RawImage {
 
 #[uniffi::export]
 impl RawImage {
-    /// Another handle to the same image: whoever reads its memory holds one.
+    /// Returns another handle to the same image. Each reader of its memory holds one.
     pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
         Ok(self)
     }
 
-    /// Where its bytes lie. Valid as long as this object.
+    /// Returns the address of the bytes. It is valid as long as this object.
     pub fn address(&self) -> Result<u64, PhasefrontError> {
         Ok(self.bytes.as_ptr() as u64)
     }
 
-    /// How many bytes lie there.
+    /// Returns the number of bytes.
     pub fn byte_len(&self) -> Result<u64, PhasefrontError> {
         Ok(self.bytes.len() as u64)
     }
 
-    /// Pixels along x.
+    /// Returns the width in pixels.
     pub fn width(&self) -> Result<u32, PhasefrontError> {
         Ok(self.width)
     }
 
-    /// Pixels along y.
+    /// Returns the height in pixels.
     pub fn height(&self) -> Result<u32, PhasefrontError> {
         Ok(self.height)
     }
 
-    /// Bytes of a pixel.
+    /// Returns the number of bytes of a pixel.
     pub fn pixel_bytes(&self) -> Result<u32, PhasefrontError> {
         Ok(self.pixel_bytes)
     }

@@ -1,12 +1,13 @@
-//! Phasefront for Swift, Kotlin and Python, and under `bindings/c` for C. This crate only translates: what a call does,
-//! is the core's.
+//! Phasefront for Swift, Kotlin and Python, and through `bindings/c` for C. This crate only translates calls; the core
+//! does the work.
 //!
-//! The packages in `ios/`, `android/` and `bindings/python/` put a layer by hand over what is generated from here, so
-//! that it feels native there; the objects named `Raw…` are for them alone. Rules of this border:
+//! The packages in `ios/`, `android/` and `bindings/python/` add a layer written by hand to the code that is generated
+//! from this crate, so that it feels native in each language. Only these layers use the objects named `Raw…`. This
+//! crate follows these rules:
 //!
-//! - Images come in as `&[u8]`, which UniFFI passes without a copy; results are objects whose memory is read in place,
-//!   at an address that is valid as long as the object. Nothing is passed pixel by pixel.
-//! - Every call gives a result; a panic becomes [`PhasefrontError::Internal`].
+//! - Images are passed as `&[u8]`, which UniFFI passes without a copy. Results are objects whose memory is read in
+//!   place, at an address that is valid as long as the object. Nothing is passed pixel by pixel.
+//! - Every call returns a result. A panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 
 mod display;
@@ -25,17 +26,14 @@ pub use display::{Display, display_from_toml};
 #[doc(hidden)]
 pub use error::guard;
 pub use error::{ListenerError, PhasefrontError};
-pub use frame::{
-    Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
-    Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
-};
+pub use frame::{Cameras, ColourFormat, ColourInfo, ConfidenceInfo, DepthInfo, FrameInfo, PlaneInfo, Pose};
 pub use hologram::{HologramInfo, RawHologram, RawImage, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
-pub use options::{
-    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, QualityLevel, RunningMode,
-    SessionOptions, Thermal, session_options,
-};
+pub use options::{Brightness, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, session_options};
+pub use phasefront::input::{ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix};
+pub use phasefront::output::{Layout, Placement};
+pub use phasefront::session::{Backend, Thermal};
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};
 pub use target::Target;
@@ -43,7 +41,7 @@ pub use trace::{Stage, StageListener, set_stage_listener};
 
 uniffi::setup_scaffolding!();
 
-/// The version of the library.
+/// Returns the version of the library.
 #[uniffi::export]
 pub fn version() -> Result<String, PhasefrontError> {
     Ok(env!("CARGO_PKG_VERSION").to_owned())

@@ -1,4 +1,4 @@
-//! Log messages of the library, to whoever listens: the packages pass them on to the platform's log.
+//! Log messages of the library. The packages pass them to the platform's log.
 
 use crate::error::{ListenerError, PhasefrontError, guard};
 use log::{Level, LevelFilter, Log, Metadata, Record};
@@ -6,25 +6,25 @@ use phasefront_core::runtime::caught::caught;
 use std::cell::Cell;
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// How much a message matters.
+/// The severity of a log message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum LogLevel {
-    /// What went wrong.
+    /// An error.
     Error,
-    /// What looks wrong.
+    /// Something that may be wrong.
     Warning,
-    /// What is done.
+    /// An action of the library.
     Info,
     /// Details.
     Debug,
 }
 
-/// Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
-/// wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
-/// ignored.
+/// A receiver of log messages, which is called on any thread. It may call the library. On a thread that computes for a
+/// session it cannot wait for a frame: `process`, `warm_up` and previews are refused, and closing does not wait. Errors
+/// that it throws are ignored.
 #[uniffi::export(foreign)]
 pub trait LogListener: Send + Sync {
-    /// One message.
+    /// Receives a message.
     fn on_log(&self, level: LogLevel, message: String) -> Result<(), ListenerError>;
 }
 
@@ -33,11 +33,11 @@ struct Forward(RwLock<Option<Arc<dyn LogListener>>>);
 static FORWARD: Forward = Forward(RwLock::new(None));
 
 thread_local! {
-    /// Whether this thread's listener is at work: what it causes to be logged is not told to it.
+    /// Whether the listener is running on this thread. It does not receive messages that it causes itself.
     static TELLING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Ends the listener's work on this thread, also where it panicked.
+/// Marks the end of the listener's work on this thread, even after a panic.
 struct Telling;
 
 impl Drop for Telling {
@@ -46,11 +46,11 @@ impl Drop for Telling {
     }
 }
 
-/// Sends messages of `level` and above to `listener`; none for silence. Of the libraries underneath, warnings and
-/// errors are sent.
+/// Sends messages of `level` and above to `listener`, and warnings and errors of the libraries that Phasefront uses.
+/// Without a listener, no messages are sent.
 ///
 /// # Errors
-/// A process that already logs elsewhere.
+/// Returns an error if the process already has another logger of Rust's `log`.
 #[uniffi::export]
 pub fn set_log_listener(level: LogLevel, listener: Option<Arc<dyn LogListener>>) -> Result<(), PhasefrontError> {
     guard(|| {
@@ -65,7 +65,7 @@ pub fn set_log_listener(level: LogLevel, listener: Option<Arc<dyn LogListener>>)
             &mut *FORWARD.0.write().unwrap_or_else(PoisonError::into_inner),
             listener,
         );
-        // Not under the lock: what ends with the listener may call the library, which logs.
+        // Dropping the listener may call the library, which logs, so the lock is released first.
         drop(before);
         let other =
             log::set_logger(&FORWARD).is_err() && !std::ptr::addr_eq(log::logger(), std::ptr::from_ref(&FORWARD));
@@ -97,7 +97,7 @@ impl Log for Forward {
                 Level::Info => LogLevel::Info,
                 Level::Debug | Level::Trace => LogLevel::Debug,
             };
-            // There is nobody to tell that telling failed.
+            // An error of the listener cannot be reported anywhere.
             let message = record.args().to_string();
             let _ = caught(|| listener.on_log(level, message));
         }
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use std::sync::mpsc::{Sender, channel};
 
-    /// Panics at one message, and logs when it ends.
+    /// Panics at some messages, and logs when it is dropped.
     struct Unruly(Sender<String>);
 
     impl LogListener for Unruly {
@@ -126,7 +126,7 @@ mod tests {
         }
     }
 
-    /// Panics as it ends.
+    /// Panics when it is dropped.
     struct Bomb;
 
     impl Drop for Bomb {
@@ -141,14 +141,14 @@ mod tests {
         }
     }
 
-    /// All in one test: there is one listener a process.
+    /// There is one listener per process, so one test covers everything.
     #[test]
     fn a_listener_that_throws_panics_or_logs_as_it_ends_is_told_of_the_next_message() {
         let (sender, told) = channel();
         let messages = ["panic", "panic twice", "error", "next"];
         set_log_listener(LogLevel::Info, Some(Arc::new(Unruly(sender.clone())))).unwrap();
         messages.iter().for_each(|message| log::info!("{message}"));
-        // A second thread, so that a deadlock is a failure and not a test without end.
+        // A second thread turns a deadlock into a failure instead of a test that never ends.
         let replaced = std::thread::spawn(move || set_log_listener(LogLevel::Info, Some(Arc::new(Unruly(sender)))));
         let told: Vec<_> = (0..5)
             .map(|_| told.recv_timeout(std::time::Duration::from_secs(60)).unwrap())

@@ -1,45 +1,44 @@
-//! Networks: from a file, from bytes, or built in.
+//! Networks from files or bytes, and built-in networks.
 
 use crate::error::{PhasefrontError, guard};
 use phasefront_core::runtime::file;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A hologram network. Immutable; one serves many sessions.
+/// A hologram network. It is immutable and can be used by several sessions.
 #[derive(Debug, uniffi::Object)]
 pub struct Network {
     pub(crate) core: Arc<phasefront::Network>,
 }
 
-/// What a network is, and the display that it was trained for.
+/// The properties of a network and of the display that it was trained for.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct NetworkInfo {
-    /// How many convolutions.
+    /// The number of convolutions.
     pub layers: u32,
-    /// Filters of each hidden layer.
+    /// The number of filters of each hidden layer.
     pub filters: u32,
-    /// The numbers that its layers compute in.
+    /// The number format of the layers.
     pub precision: String,
-    /// Distance between neighbouring pixels, µm.
+    /// The distance between neighbouring pixels, in µm.
     pub pitch_um: f64,
-    /// Depth of the volume, mm.
+    /// The depth of the volume, in mm.
     pub volume_depth_mm: f64,
 }
 
 /// A hologram network and the pre-filter that was trained with it, for the deep double phase method.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct DeepPair {
-    /// Makes the hologram.
+    /// The hologram network.
     pub hologram: Arc<Network>,
-    /// Prepares it for its encoding.
+    /// The pre-filter.
     pub prefilter: Arc<Network>,
 }
 
-/// The pair in int8 that is bundled for a modulator at `offset_mm` and the default display's pitch, colours and
-/// volume.
+/// Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
 ///
 /// # Errors
-/// Another offset, or a library that was built without them.
+/// Returns an error for other offsets, and if the library was built without networks.
 #[uniffi::export]
 pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
     guard(|| {
@@ -54,7 +53,7 @@ pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
     })
 }
 
-/// What is compiled in.
+/// The networks that are compiled in.
 #[cfg(feature = "built-in-network")]
 mod built_in {
     use super::{DeepPair, Network};
@@ -65,13 +64,13 @@ mod built_in {
         phasefront_models::network(name, Int8)
     }
 
-    /// What networks are called.
+    /// Returns the names of the networks.
     pub(super) fn names() -> String {
         let names: Vec<_> = phasefront_models::NETWORKS.iter().map(|model| model.name).collect();
         names.join(", ")
     }
 
-    /// Which pairs there are.
+    /// Returns a list of the offsets that have a pair.
     pub(super) fn offsets() -> String {
         let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
         format!("there are pairs for {} mm", offsets.collect::<Vec<_>>().join(", "))
@@ -87,7 +86,7 @@ mod built_in {
     }
 }
 
-/// Nothing.
+/// Stands in for the networks of a library that was built without them.
 #[cfg(not(feature = "built-in-network"))]
 mod built_in {
     pub(super) fn network(_: &str) -> Option<std::sync::Arc<phasefront::Network>> {
@@ -109,10 +108,10 @@ mod built_in {
 
 #[uniffi::export]
 impl Network {
-    /// Reads an ONNX file's bytes.
+    /// Reads a network from the bytes of an ONNX file.
     ///
     /// # Errors
-    /// What is not a hologram network, with what is not so and what would be right.
+    /// Returns an error that says what is wrong and what would be right if the bytes are not a hologram network.
     #[uniffi::constructor]
     pub fn from_bytes(onnx: &[u8]) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
@@ -122,10 +121,10 @@ impl Network {
         })
     }
 
-    /// Reads an ONNX file.
+    /// Reads a network from an ONNX file.
     ///
     /// # Errors
-    /// A file that cannot be read; as [`Self::from_bytes`].
+    /// Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
     #[uniffi::constructor]
     pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
@@ -135,11 +134,11 @@ impl Network {
         })
     }
 
-    /// A network in int8 that is bundled, by `name`: that of 8 layers unless another is named. For the default
+    /// Returns the bundled int8 network called `name`, by default the one with 8 layers. It is for the default
     /// display's pitch, colours and volume.
     ///
     /// # Errors
-    /// A name that none has, or a library that was built without them.
+    /// Returns an error if there is no such network, and if the library was built without networks.
     #[uniffi::constructor(default(name = "rgbd-8"))]
     pub fn built_in(name: &str) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| match built_in::network(name) {
@@ -151,7 +150,7 @@ impl Network {
         })
     }
 
-    /// What it is.
+    /// Returns the properties of the network.
     pub fn info(&self) -> Result<NetworkInfo, PhasefrontError> {
         guard(|| {
             let display = self.core.display();

@@ -1,235 +1,225 @@
-//! What a session makes, and how.
+//! The options of a session.
 
 use crate::error::{PhasefrontError, guard};
 use crate::network::Network;
 use crate::target::Target;
-use phasefront::{Sweep, input, output, session};
+use phasefront::Sweep;
+use phasefront::input::DepthRange;
+use phasefront::output::{Layout, Placement};
+use phasefront::session::{self, Backend, Thermal};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-/// How a session runs; fixed when it is made.
+/// The running mode of a session. It is fixed when the session is created.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum RunningMode {
-    /// Each frame is answered by itself.
+    /// The session answers each frame independently of all others.
     Image,
-    /// Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
+    /// The session answers each frame, and smooths depth and brightness over time. Timestamps must increase.
     Video,
-    /// Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+    /// The app submits frames without waiting, and the listener receives the outcome of each. Timestamps must increase.
     Live,
 }
 
-/// How the field becomes phases.
+/// The conversion of a field to phases.
 #[derive(Debug, Clone, uniffi::Enum)]
 pub enum Encoding {
-    /// Double phase on the field as it is.
+    /// Double phase of the unchanged field.
     DoublePhase,
-    /// A small Gaussian blur first (AA-DPM).
+    /// Double phase after a small Gaussian blur (AA-DPM).
     AntiAlias {
-        /// Standard deviation, pixels; 0.7 as published.
+        /// The standard deviation in pixels; 0.7 in the paper.
         sigma: f32,
-        /// Taps, an odd number; 3 as published.
+        /// The number of taps, an odd number; 3 in the paper.
         width: u32,
     },
-    /// High diagonal frequencies cut first (BL-DPM).
+    /// Double phase after a filter that removes high diagonal frequencies (BL-DPM).
     BandLimit {
-        /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel; 1 as published.
+        /// The bound of |tan(πfx)·tan(πfy)|, where f is in cycles per pixel; 1 in the paper.
         k: f32,
     },
-    /// A pre-filter network first (DDPM), trained for the display's offset together with the hologram network.
+    /// Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
+    /// offset of the display.
     Deep {
         /// The pre-filter.
         prefilter: Arc<Network>,
     },
 }
 
-/// Which amplitude full light stands for.
+/// The amplitude that maps to full light.
 #[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
 pub enum Brightness {
-    /// Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
+    /// An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
     Smoothed,
-    /// This one; what is brighter is clipped.
+    /// A fixed amplitude. Larger amplitudes are clipped.
     Fixed {
         /// The amplitude.
         scale: f32,
     },
-    /// The frame's largest.
+    /// The largest amplitude of the frame.
     FrameMax,
 }
 
-/// Which metres are shown at the ends of the volume.
-#[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
+/// The distances that map to the ends of the volume.
+#[uniffi::remote(Enum)]
 pub enum DepthRange {
-    /// The 1st and 99th percentile of the readings, in video smoothed.
+    /// The 1st and 99th percentile of the readings, smoothed over time in video.
     Percentiles,
-    /// These.
+    /// Fixed distances.
     Fixed {
-        /// Metres shown nearest.
+        /// The distance of the near end, in metres.
         near_m: f32,
-        /// Metres shown farthest.
+        /// The distance of the far end, in metres.
         far_m: f32,
     },
 }
 
-/// What makes holograms.
+/// The method that computes holograms.
 #[derive(Debug, Clone, uniffi::Enum)]
 pub enum Method {
     /// A trained network.
     Trained {
-        /// The network, for the session's display.
+        /// The network, which must suit the session's display.
         network: Arc<Network>,
     },
-    /// The plane sweep, for any display: slower, and nothing needs to be trained.
+    /// The plane sweep, which suits any display. It is slower and needs no training.
     Sweep,
-    /// For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained
-    /// network where it is noisy or incomplete, as sensors' depth is.
+    /// The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
+    /// noisy or incomplete depth, such as depth from sensors.
     Auto {
-        /// The network, for the session's display.
+        /// The network, which must suit the session's display.
         network: Arc<Network>,
     },
 }
 
-/// One quality: a method, a resolution, and how the displayed image is corrected. A hologram smaller than the modulator
-/// is shown in its middle.
+/// A quality level: a method, a resolution and the number of correction steps. A hologram smaller than the modulator is
+/// displayed in its centre.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct QualityLevel {
-    /// What makes the hologram.
+    /// The method that computes the hologram.
     pub method: Method,
-    /// Width of the hologram, pixels.
+    /// The width of the hologram in pixels.
     pub width: u32,
-    /// Height of the hologram, pixels.
+    /// The height of the hologram in pixels.
     pub height: u32,
-    /// Local steps of this quality level; none for the session's.
+    /// The number of local steps; none for the session's number.
     #[uniffi(default = None)]
     pub local_steps: Option<u32>,
-    /// Steps at the midpoint of this quality level; none for the session's.
+    /// The number of steps at the midpoint; none for the session's number.
     #[uniffi(default = None)]
     pub midpoint_steps: Option<u32>,
 }
 
-/// Whether a session may change its quality.
+/// Determines whether a session may change its quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum Quality {
-    /// It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
-    /// where there is room.
+    /// The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and
+    /// raises it if there is time left.
     Adaptive,
-    /// It stays at this quality level.
+    /// The session stays at this quality level.
     Fixed {
-        /// 0 the best.
+        /// The quality level; 0 is the best.
         quality_level: u32,
     },
 }
 
-/// How hot the device is, as its system says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The thermal state of the device as reported by its system.
+#[uniffi::remote(Enum)]
 pub enum Thermal {
-    /// Not warm: nothing is limited.
+    /// The device is not warm; nothing is limited.
     Nominal,
-    /// Warm: frames may take a little less time.
+    /// The device is warm; frames may take a little less time.
     Fair,
-    /// Hot: half the time.
+    /// The device is hot; frames may take half the time.
     Serious,
-    /// Too hot: the lowest quality level.
+    /// The device is too hot; the session uses the lowest quality level.
     Critical,
 }
 
-/// Where frames are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The backend that computes frames.
+#[uniffi::remote(Enum)]
 pub enum Backend {
-    /// On the CPU.
+    /// Computes on the CPU.
     Cpu,
-    /// On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
-    /// The statistics' `backend` and `backend_why` say which it is, and why.
+    /// Computes on the GPU if this library was built with GPU support, a GPU exists and its results agree with the
+    /// CPU's; otherwise on the CPU. `backend` and `backend_why` in the statistics name the backend in use and the
+    /// reason.
     Gpu,
 }
 
-/// What a session makes, and how. [`session_options`] gives the defaults; change what differs.
+/// The options of a session. [`session_options`] returns the defaults.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct SessionOptions {
-    /// What holograms are for.
+    /// The target of the holograms.
     pub target: Arc<Target>,
-    /// Quality levels, the best first: 1 to 16.
+    /// The quality levels, best first: 1 to 16.
     pub quality_levels: Vec<QualityLevel>,
     /// Whether the session may change its quality level by itself.
     pub quality: Quality,
-    /// Frames a second that are aimed at; none takes every frame and never steps.
+    /// The target rate in frames per second; none if the session takes every frame and does not adapt its quality level
+    /// to frame times.
     pub target_rate_hz: Option<f64>,
-    /// How the field becomes phases.
+    /// The conversion of fields to phases.
     pub encoding: Encoding,
-    /// Which amplitude full light stands for.
+    /// The amplitude that maps to full light.
     pub brightness: Brightness,
-    /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
-    /// in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+    /// The share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark
+    /// areas; none for the encoding's default: 0.4, and 0 with a pre-filter.
     #[uniffi(default = None)]
     pub dark_threshold: Option<f32>,
-    /// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
-    /// what suits the encoding: 1, and 0 with a pre-filter.
+    /// The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for
+    /// the encoding's default: 1, and 0 with a pre-filter.
     #[uniffi(default = None)]
     pub local_steps: Option<u32>,
-    /// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
-    /// video, where it goes on from the frame before.
+    /// The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
+    /// stills; 1 suits video, where each frame continues from the previous one.
     #[uniffi(default = 0)]
     pub midpoint_steps: u32,
-    /// Which metres are shown at the ends of the volume.
+    /// The distances that map to the ends of the volume.
     pub depth_range: DepthRange,
-    /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
+    /// The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
     pub least_confidence: f32,
-    /// Threads to compute with, at most 256; none for as many as the device has.
+    /// The number of threads to compute with, at most 256; none for as many as the device has.
     pub threads: Option<u32>,
-    /// Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a
-    /// multiple of them.
+    /// The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
+    /// session is a multiple of it.
     #[uniffi(default = 33554432)]
     pub most_pixels: u64,
-    /// Where frames are computed.
+    /// The backend that computes frames.
     pub backend: Backend,
 }
 
-/// How the levels of the colours lie in images for a modulator's driver.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+/// The arrangement of the colours' levels in images for a modulator's driver.
+#[uniffi::remote(Enum)]
+#[non_exhaustive]
 pub enum Layout {
-    /// One image, bytes red, green, blue.
+    /// One image with bytes red, green, blue.
     Rgb,
-    /// One image, bytes red, green, blue, alpha 255.
+    /// One image with bytes red, green, blue, alpha 255.
     Rgba,
-    /// One image, bytes blue, green, red, alpha 255.
+    /// One image with bytes blue, green, red, alpha 255.
     Bgra,
-    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
+    /// One image for each colour in the order red, green, blue, with one byte for each pixel.
     Grey,
 }
 
-/// How a hologram is put on its modulator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
+/// The placement of a hologram on its modulator.
+#[uniffi::remote(Record)]
 pub struct Placement {
-    /// How colours lie in images.
+    /// The arrangement of colours in images.
     pub layout: Layout,
-    /// Whether left and right are exchanged, of the whole image.
+    /// Whether the whole image is flipped left to right.
     #[uniffi(default = false)]
     pub flip_x: bool,
-    /// Whether top and bottom are exchanged, of the whole image.
+    /// Whether the whole image is flipped top to bottom.
     #[uniffi(default = false)]
     pub flip_y: bool,
-    /// How many pixels to the right of the middle the hologram stands, before flips.
+    /// The hologram's shift to the right of the middle in pixels, before flips.
     #[uniffi(default = 0)]
     pub shift_x: i32,
-    /// How many pixels below the middle it stands, before flips.
+    /// The hologram's shift below the middle in pixels, before flips.
     #[uniffi(default = 0)]
     pub shift_y: i32,
-}
-
-impl From<Placement> for output::Placement {
-    fn from(placement: Placement) -> Self {
-        output::Placement {
-            layout: match placement.layout {
-                Layout::Rgb => output::Layout::Rgb,
-                Layout::Rgba => output::Layout::Rgba,
-                Layout::Bgra => output::Layout::Bgra,
-                Layout::Grey => output::Layout::Grey,
-            },
-            flip_x: placement.flip_x,
-            flip_y: placement.flip_y,
-            shift_x: placement.shift_x,
-            shift_y: placement.shift_y,
-        }
-    }
 }
 
 impl Method {
@@ -242,9 +232,9 @@ impl Method {
     }
 }
 
-/// The default options for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
-/// correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
-/// the display; smoothed brightness, near and far by percentiles.
+/// Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
+/// correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
+/// built-in network, or the plane sweep if that network was not trained for the display.
 #[uniffi::export(default(method = None))]
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
@@ -271,7 +261,7 @@ fn default_options(target: &phasefront::Target) -> session::SessionOptions {
 }
 
 impl SessionOptions {
-    /// Those of the core, for the same `target`.
+    /// Converts the options of the core, which are for the same `target`.
     fn new(target: Arc<Target>, core: session::SessionOptions) -> Self {
         let network = |core: &Arc<phasefront::Network>| Arc::new(Network { core: core.clone() });
         let method = |method: &phasefront::Method| match method {
@@ -318,17 +308,11 @@ impl SessionOptions {
             dark_threshold: None,
             local_steps: None,
             midpoint_steps: core.encoder.midpoint_steps as u32,
-            depth_range: match core.depth.range {
-                input::DepthRange::Percentiles => DepthRange::Percentiles,
-                input::DepthRange::Fixed { near_m, far_m } => DepthRange::Fixed { near_m, far_m },
-            },
+            depth_range: core.depth.range,
             least_confidence: core.depth.least_confidence,
             threads: core.threads.map(|threads| threads.get() as u32),
             most_pixels: core.most_pixels as u64,
-            backend: match core.backend {
-                session::Backend::Cpu => Backend::Cpu,
-                session::Backend::Gpu => Backend::Gpu,
-            },
+            backend: core.backend,
         }
     }
 }
@@ -381,15 +365,9 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
                 }),
             })
             .collect();
-        to.depth.range = match options.depth_range {
-            DepthRange::Percentiles => input::DepthRange::Percentiles,
-            DepthRange::Fixed { near_m, far_m } => input::DepthRange::Fixed { near_m, far_m },
-        };
+        to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
-        to.backend = match options.backend {
-            Backend::Cpu => session::Backend::Cpu,
-            Backend::Gpu => session::Backend::Gpu,
-        };
+        to.backend = options.backend;
         to.most_pixels = usize::try_from(options.most_pixels).unwrap_or(usize::MAX);
         to.threads = match options.threads {
             None => None,
@@ -406,17 +384,6 @@ impl From<Quality> for session::Quality {
         match quality {
             Quality::Adaptive => session::Quality::Adaptive,
             Quality::Fixed { quality_level } => session::Quality::Fixed(quality_level as usize),
-        }
-    }
-}
-
-impl From<Thermal> for session::Thermal {
-    fn from(thermal: Thermal) -> Self {
-        match thermal {
-            Thermal::Nominal => session::Thermal::Nominal,
-            Thermal::Fair => session::Thermal::Fair,
-            Thermal::Serious => session::Thermal::Serious,
-            Thermal::Critical => session::Thermal::Critical,
         }
     }
 }

@@ -1,33 +1,33 @@
-//! Sessions: frames in, holograms out.
+//! Sessions, which turn frames into holograms.
 
 use crate::error::{ListenerError, PhasefrontError, guard};
 use crate::frame::{FrameInfo, FrameMemory};
 use crate::hologram::RawHologram;
-use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
+use crate::options::{Quality, RunningMode, SessionOptions};
 use crate::statistics::Statistics;
-use phasefront::session::{self, Event, SessionHandle};
+use phasefront::session::{self, Event, SessionHandle, Thermal};
 use phasefront::{ImageSession, LiveSession, VideoSession};
 use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Why a frame was not made into a hologram, without fault.
+/// The reason why a session dropped a frame without an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum DropReason {
-    /// A newer frame came while it waited.
+    /// A newer frame arrived while this one waited.
     Superseded,
-    /// It came sooner than the target rate asks for.
+    /// The frame arrived sooner than the target rate allows.
     AboveTargetRate,
     /// The session was paused.
     Paused,
-    /// The session was reset before it was done.
+    /// The session was reset before the frame was finished.
     Reset,
-    /// The session was closed before it was done.
+    /// The session was closed before the frame was finished.
     Closed,
-    /// It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages'
-    /// streams say so.
+    /// The frame became a hologram, but newer ones arrived before the app took it from the stream of events. Only the
+    /// streams of the packages report this reason.
     Unread,
-    /// For a reason that this version of the bindings does not know.
+    /// A reason that this version of the bindings does not know.
     Other,
 }
 
@@ -44,57 +44,57 @@ impl From<session::DropReason> for DropReason {
     }
 }
 
-/// Why a session changed its quality.
+/// The reason why a session changed its quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum QualityReason {
     /// Frames took longer than the target rate allows.
     TooSlow,
-    /// There was room for more.
+    /// There was time left.
     Room,
     /// The device is hot.
     Thermal,
-    /// The caller said so.
+    /// The app asked for it.
     Asked,
-    /// The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+    /// The next quality level cannot be planned. The session keeps the previous one and does not try the next one
     /// again.
     Refused,
-    /// For a reason that this version of the bindings does not know.
+    /// A reason that this version of the bindings does not know.
     Other,
 }
 
 /// A change of the quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct QualityChange {
-    /// The quality level before.
+    /// The previous quality level.
     pub from_quality_level: u32,
-    /// The quality level now; the one before where the step was refused.
+    /// The new quality level; the previous one if the reason is `Refused`.
     pub to_quality_level: u32,
-    /// Why.
+    /// The reason.
     pub reason: QualityReason,
 }
 
-/// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
-/// order in which things happened. While it is busy no frame is processed. What it throws is counted and logged.
+/// A receiver of the events of a live session. Calls arrive one after another, on the session's own thread, in the
+/// order of the events. No frame is processed while the listener is busy. Errors that it throws are counted and logged.
 #[uniffi::export(foreign)]
 pub trait SessionListener: Send + Sync {
-    /// A frame became a hologram.
+    /// Reports that a frame became a hologram.
     fn on_processed(&self, hologram: Arc<RawHologram>) -> Result<(), ListenerError>;
 
-    /// A frame was dropped.
+    /// Reports that a frame was dropped.
     fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> Result<(), ListenerError>;
 
-    /// A frame could not be processed. The session goes on.
+    /// Reports that a frame could not be processed. The session continues.
     fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), ListenerError>;
 
-    /// The frames after this one are made at another quality level.
+    /// Reports that the session uses another quality level after the frame of `timestamp_ns`.
     fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), ListenerError>;
 
-    /// The session is closed and its memory is given back. This is the last call, made exactly once, also where
-    /// shutting down does not wait for it.
+    /// Reports that the session is closed and its memory is freed. This is the last call. It is made exactly once, even
+    /// if shutting down does not wait for it.
     fn on_closed(&self) -> Result<(), ListenerError>;
 }
 
-/// A session. Every call may come from any thread, at any moment.
+/// A session. All its methods can be called from any thread at any time.
 #[derive(uniffi::Object)]
 pub struct RawSession {
     core: Core,
@@ -104,11 +104,11 @@ pub struct RawSession {
 
 #[uniffi::export]
 impl RawSession {
-    /// A session that runs in `mode`; live, it needs a `listener`.
+    /// Creates a session that runs in `mode`. A live session needs a `listener`.
     ///
     /// # Errors
-    /// Options that cannot be meant or planned for, a live session without a listener, another with one, or threads
-    /// that cannot be started.
+    /// Returns an error if the options are invalid or cannot be planned, if a live session has no listener or another
+    /// session has one, or if threads cannot be started.
     #[uniffi::constructor]
     pub fn new(
         options: SessionOptions,
@@ -152,12 +152,12 @@ impl RawSession {
         })
     }
 
-    /// The hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of its colour,
-    /// `chroma` and `chroma_v` the others; what the frame has not, is empty.
+    /// Returns the hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of the
+    /// colour image; `chroma` and `chroma_v` are the others. Memory that the frame does not have is empty.
     ///
     /// # Errors
-    /// A frame that is not usable or late, or a session that is live, paused or closed. None of them harms the frames
-    /// that follow.
+    /// Returns an error if the frame is unusable or late, or if the session is live, paused or closed. Later frames are
+    /// not affected.
     pub fn process(
         &self,
         luma_or_colour: &[u8],
@@ -186,12 +186,12 @@ impl RawSession {
         })
     }
 
-    /// Hands a frame to a live session, which copies it and goes on by itself. Gives why the frame was dropped, if it
-    /// was at once; the listener hears of it too. Planes as [`Self::process`] takes them.
+    /// Submits a frame to a live session, which copies it, without waiting for its hologram. Returns the reason if the
+    /// frame is dropped at once, which the listener receives too. The planes are those of [`Self::process`].
     ///
     /// # Errors
-    /// A frame that is not usable or late, or a session that is not live or is closed. None of them harms the frames
-    /// that follow.
+    /// Returns an error if the frame is unusable or late, or if the session is not live or is closed. Later frames are
+    /// not affected.
     pub fn submit(
         &self,
         luma_or_colour: &[u8],
@@ -216,12 +216,12 @@ impl RawSession {
         })
     }
 
-    /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+    /// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones.
     pub fn warm_up(&self) -> Result<(), PhasefrontError> {
         guard(|| Ok(self.session()?.warm_up()?))
     }
 
-    /// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
+    /// Forgets all previous frames, including one that is being processed. The next frame may have any timestamp.
     pub fn reset(&self) -> Result<(), PhasefrontError> {
         guard(|| {
             self.session()?.reset();
@@ -229,7 +229,7 @@ impl RawSession {
         })
     }
 
-    /// Takes no frames until [`Self::resume`].
+    /// Accepts no frames until [`Self::resume`].
     pub fn pause(&self) -> Result<(), PhasefrontError> {
         guard(|| {
             self.session()?.pause();
@@ -237,7 +237,7 @@ impl RawSession {
         })
     }
 
-    /// Takes frames again.
+    /// Accepts frames again.
     pub fn resume(&self) -> Result<(), PhasefrontError> {
         guard(|| {
             self.session()?.resume();
@@ -245,10 +245,10 @@ impl RawSession {
         })
     }
 
-    /// Says how hot the device is.
+    /// Sets the thermal state of the device.
     pub fn set_thermal(&self, thermal: Thermal) -> Result<(), PhasefrontError> {
         guard(|| {
-            self.session()?.set_thermal(thermal.into());
+            self.session()?.set_thermal(thermal);
             Ok(())
         })
     }
@@ -256,12 +256,12 @@ impl RawSession {
     /// Allows or forbids changes of the quality level.
     ///
     /// # Errors
-    /// A quality level that the session does not have.
+    /// Returns an error if the session does not have the quality level.
     pub fn set_quality(&self, quality: Quality) -> Result<(), PhasefrontError> {
         guard(|| Ok(self.session()?.set_quality(quality.into())?))
     }
 
-    /// What the session has done so far; of a closed one, what it did. Never waits for a frame.
+    /// Returns the statistics of the session, also after it was closed. Never waits for a frame.
     pub fn statistics(&self) -> Result<Statistics, PhasefrontError> {
         guard(|| {
             let failures = self.listener_failures.load(Ordering::Relaxed);
@@ -269,9 +269,9 @@ impl RawSession {
         })
     }
 
-    /// Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
-    /// last, and will not be called again; called by a listener, of this session or another, or by a log handler while
-    /// a session computes, it does not wait for that. Closing twice does nothing.
+    /// Closes the session: it accepts no more frames and frees its memory. When this returns, the listener has received
+    /// all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
+    /// listener while a session computes, does not wait for that. Closing twice does nothing.
     pub fn shut_down(&self) -> Result<(), PhasefrontError> {
         guard(|| {
             self.closed.store(true, Ordering::Relaxed);
@@ -290,7 +290,7 @@ impl RawSession {
     }
 }
 
-/// A session of any running mode: the languages have one type for all three.
+/// A session of any running mode. The languages have one type for all three.
 enum Core {
     Image(ImageSession),
     Video(VideoSession),
@@ -309,7 +309,7 @@ impl Deref for Core {
     }
 }
 
-/// Tells `listener` of `event`.
+/// Reports `event` to `listener`.
 fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerError> {
     match event {
         Event::Processed(hologram) => listener.on_processed(RawHologram::new(hologram)),

@@ -1,22 +1,22 @@
-//! What a session has done so far.
+//! The statistics of a session.
 
 use phasefront::session;
 use std::time::Duration;
 
-/// How long each stage of a frame took, milliseconds.
+/// The time that each stage of a frame took, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, uniffi::Record)]
 pub struct FrameTimes {
-    /// Colour to amplitudes of the display's resolution.
+    /// Rotating, converting and resizing the colour image.
     pub colour_ms: f64,
-    /// Depth to normalized depth of the display's resolution.
+    /// Reading, aligning, temporally smoothing and refining the depth.
     pub depth_ms: f64,
-    /// The midpoint hologram.
+    /// Computing the midpoint hologram from the frame.
     pub method_ms: f64,
-    /// From the midpoint to the modulator.
+    /// Propagating from the midpoint to the modulator.
     pub propagate_ms: f64,
-    /// From the field to levels.
+    /// Encoding the field into levels.
     pub encode_ms: f64,
-    /// All together.
+    /// The sum of all stages.
     pub total_ms: f64,
 }
 
@@ -34,49 +34,50 @@ impl From<session::FrameTimes> for FrameTimes {
     }
 }
 
-/// Dropped frames by reason.
+/// The number of dropped frames for each reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct Drops {
-    /// A newer frame came while they waited.
+    /// Frames that waited when a newer frame arrived.
     pub superseded: u64,
-    /// They came sooner than the target rate asks for.
+    /// Frames that arrived sooner than the target rate allows.
     pub above_target_rate: u64,
-    /// The session was paused.
+    /// Frames that arrived while the session was paused.
     pub paused: u64,
-    /// The session was reset before they were done.
+    /// Frames that were not finished when the session was reset.
     pub reset: u64,
-    /// The session was closed before they were done.
+    /// Frames that were not finished when the session was closed.
     pub closed: u64,
-    /// All together.
+    /// The sum of all reasons.
     pub total: u64,
 }
 
-/// What a session has done so far. Submitted frames are processed, failed, refused, dropped or pending.
+/// The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
+/// pending.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct Statistics {
-    /// Frames that were given to the session.
+    /// Frames that were submitted.
     pub submitted: u64,
     /// Frames that became holograms.
     pub processed: u64,
     /// Frames that could not be processed.
     pub failed: u64,
-    /// Frames that came late.
+    /// Frames that were refused because they were late or the session was closed.
     pub refused: u64,
     /// Frames that were dropped.
     pub dropped: Drops,
-    /// Frames that wait or are in flight.
+    /// Frames that wait or are being processed.
     pub pending: u64,
-    /// Holograms a second, of late.
+    /// Holograms per second over the last 30.
     pub rate_hz: f64,
-    /// Mean times, of late.
+    /// The mean times of the stages over the last 30 holograms.
     pub times: FrameTimes,
-    /// What runs the network.
+    /// The backend that computes the frames.
     pub backend: String,
-    /// Why that.
+    /// The reason for using this backend.
     pub backend_why: String,
-    /// The quality level, 0 the best.
+    /// The quality level; 0 is the best.
     pub quality_level: u32,
-    /// How often the listener threw.
+    /// The number of errors that the listener threw.
     pub listener_failures: u64,
 }
 

@@ -1,4 +1,4 @@
-//! What holograms are made for.
+//! The target of holograms.
 
 use crate::display::Display;
 use crate::error::{PhasefrontError, guard};
@@ -7,8 +7,8 @@ use phasefront_core::runtime::file;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
-/// lasers' light, what corrects its optics. Immutable; one serves many sessions.
+/// The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+/// light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
 #[derive(Debug, uniffi::Object)]
 pub struct Target {
     pub(crate) core: phasefront::Target,
@@ -16,10 +16,10 @@ pub struct Target {
 
 #[uniffi::export]
 impl Target {
-    /// A display with levels in equal steps of phase, as many as its bits have.
+    /// Creates a target whose levels are equal steps of phase, with as many levels as the display's bits allow.
     ///
     /// # Errors
-    /// A display that cannot be.
+    /// Returns an error if the display is impossible.
     #[uniffi::constructor]
     pub fn of_display(display: Display) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
@@ -28,10 +28,11 @@ impl Target {
         })
     }
 
-    /// A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+    /// Creates a target whose modulator was calibrated as a whole. `levels` has 256 entries; the level at i displays
+    /// the phase 2πi/256.
     ///
     /// # Errors
-    /// A display that cannot be, or another number of levels.
+    /// Returns an error if the display is impossible or there are not 256 levels.
     #[uniffi::constructor]
     pub fn with_look_up_table(display: Display, levels: Vec<u8>) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
@@ -50,10 +51,10 @@ impl Target {
         })
     }
 
-    /// Reads the bytes of a calibration's file, as `phasefront calibrate pack` writes it.
+    /// Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
     ///
     /// # Errors
-    /// What is not such a file, with what is not so.
+    /// Returns an error that says what is wrong if the bytes are not such a file.
     #[uniffi::constructor]
     pub fn from_bytes(file: &[u8]) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
@@ -62,10 +63,10 @@ impl Target {
         })
     }
 
-    /// Reads a calibration's file.
+    /// Reads a target from a calibration file.
     ///
     /// # Errors
-    /// A file that cannot be read; as [`Self::from_bytes`].
+    /// Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
     #[uniffi::constructor]
     pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
@@ -75,7 +76,7 @@ impl Target {
         })
     }
 
-    /// The display itself.
+    /// Returns the display.
     pub fn display(&self) -> Result<Display, PhasefrontError> {
         guard(|| Ok(self.core.display.clone().into()))
     }

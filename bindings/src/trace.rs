@@ -1,4 +1,4 @@
-//! When stages begin and end, to whoever listens: the packages pass it on to the platform's profiler.
+//! The begin and end of stages. The packages pass them to the platform's profiler.
 
 use crate::error::{ListenerError, PhasefrontError, guard};
 use phasefront_core::runtime::caught::caught;
@@ -13,25 +13,25 @@ use tracing_subscriber::registry::LookupSpan;
 /// A part of the work on a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum Stage {
-    /// All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
+    /// The whole work on a frame on the session's threads. It contains all other stages except `Plan` and `Preview`.
     Frame,
-    /// Colour: turned, converted, resized.
+    /// Rotating, converting and resizing the colour image.
     Colour,
-    /// Depth: read, aligned, smoothed over time, refined.
+    /// Reading, aligning, temporally smoothing and refining the depth.
     Depth,
-    /// From the frame to the midpoint hologram.
+    /// Computing the midpoint hologram from the frame.
     Method,
-    /// From the midpoint to the modulator.
+    /// Propagating from the midpoint to the modulator.
     Propagate,
-    /// From the field to levels.
+    /// Encoding the field into levels.
     Encode,
-    /// Steps at the midpoint, within `Encode`.
+    /// Correction steps at the midpoint, inside `Encode`.
     Midpoint,
-    /// A frame that a GPU computes, with the ways there and back.
+    /// Computing a frame on a GPU, including both transfers.
     Gpu,
-    /// Plans and memory of a quality level are made.
+    /// Creating the plans and memory of a quality level.
     Plan,
-    /// A small view.
+    /// Computing a preview.
     Preview,
 }
 
@@ -54,34 +54,34 @@ impl Stage {
     }
 }
 
-/// Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
-/// must not call the library. What it throws is ignored.
+/// A receiver of the begin and end of stages, which is called on the threads that compute them. The stages of one
+/// thread are nested. The receiver must not call the library. Errors that it throws are ignored.
 #[uniffi::export(foreign)]
 pub trait StageListener: Send + Sync {
-    /// A stage begins on this thread.
+    /// Reports that a stage begins on this thread.
     fn on_begin(&self, stage: Stage) -> Result<(), ListenerError>;
-    /// The stage that began last on this thread ends.
+    /// Reports that the stage that began last on this thread ends.
     fn on_end(&self, stage: Stage) -> Result<(), ListenerError>;
 }
 
 static LISTENER: RwLock<Option<Arc<dyn StageListener>>> = RwLock::new(None);
-/// Whether the spans of this process come here; known once a listener was set.
+/// Whether the spans of this process arrive here. It is known once a listener was set.
 static COLLECTING: OnceLock<bool> = OnceLock::new();
 
 fn listener() -> Option<Arc<dyn StageListener>> {
     LISTENER.read().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a
-/// stage that is under way it may hear the end alone.
+/// Reports every stage of every session to `listener`. Without a listener, nothing is reported and nothing is spent.
+/// Set it between frames, because it may receive only the end of a stage that has already begun.
 ///
 /// # Errors
-/// A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
+/// Returns an error if the process already collects Rust's `tracing` elsewhere, where the spans of stages go.
 #[uniffi::export]
 pub fn set_stage_listener(listener: Option<Arc<dyn StageListener>>) -> Result<(), PhasefrontError> {
     guard(|| {
         let before = std::mem::replace(&mut *LISTENER.write().unwrap_or_else(PoisonError::into_inner), listener);
-        // Not under the lock: what ends with the listener may call the library.
+        // Dropping the listener may call the library, so the lock is released first.
         drop(before);
         let collecting = *COLLECTING.get_or_init(|| {
             let told = filter_fn(|span| Stage::of(span).is_some() && self::listener().is_some());
@@ -93,7 +93,7 @@ pub fn set_stage_listener(listener: Option<Arc<dyn StageListener>>) -> Result<()
                 "this process already collects Rust's `tracing`; the spans of stages go there".into(),
             ));
         }
-        // Whether anybody listens is asked once a place in the code.
+        // Each place in the code asks only once whether there is a listener.
         tracing::callsite::rebuild_interest_cache();
         Ok(())
     })
@@ -108,7 +108,7 @@ impl Forward {
         tell: impl FnOnce(&dyn StageListener, Stage) -> Result<(), ListenerError>,
     ) {
         if let (Some(stage), Some(listener)) = (context.metadata(span).and_then(Stage::of), listener()) {
-            // There is nobody to tell that telling failed.
+            // An error of the listener cannot be reported anywhere.
             let _ = caught(|| tell(&*listener, stage));
         }
     }
@@ -132,7 +132,7 @@ mod tests {
     use phasefront::{Display, ImageSession, Method, SessionOptions, Sweep};
     use std::sync::Mutex;
 
-    /// Keeps what it hears, and panics each time.
+    /// Keeps what it receives, and panics each time.
     struct Unruly(Mutex<Vec<(bool, Stage)>>);
 
     impl StageListener for Unruly {
@@ -154,7 +154,7 @@ mod tests {
         session.process(&CameraFrame::new(0, colour, depth)).unwrap();
     }
 
-    /// All in one test: there is one listener a process.
+    /// There is one listener per process, so one test covers everything.
     #[test]
     fn a_listener_hears_each_stage_begin_and_end_until_it_is_gone() {
         let display = Display::default().with_size(16, 24).unwrap();

@@ -1,9 +1,9 @@
-// Phasefront: RGB-D frames to phase-only holograms. Made by cbindgen: bindings/c/header writes it anew.
+// Phasefront turns RGB-D frames into phase-only holograms. bindings/c/header generates this file with cbindgen.
 //
-// Every call gives a PfStatus; where it is not PF_STATUS_OK, pf_last_error has one line that says what is wrong and what
-// would be right, and nothing was written to what the call gives. Objects are opaque: what a call gives is yours until
-// its free function, which takes NULL too. Text is UTF-8. Any call may come from any thread; one PfOptions is for one
-// thread at a time. No panic leaves a call.
+// Every function returns a PfStatus. If it is not PF_STATUS_OK, pf_last_error returns one line that says what is wrong
+// and what would be right, and the function has written no results. Objects are opaque. An object that a function
+// creates belongs to the caller until its free function, which also accepts NULL. Text is UTF-8. Functions can be called
+// from any thread, but a PfOptions only from one thread at a time. No panic leaves a function.
 
 #ifndef PHASEFRONT_H
 #define PHASEFRONT_H
@@ -12,471 +12,473 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Whether a call did what it says, and else why not.
+// The result of a call.
 typedef enum PfStatus {
-  // It did.
+  // The call succeeded.
   PF_STATUS_OK = 0,
-  // A display whose physics is impossible or out of range.
+  // The physics of a display is impossible or out of range.
   PF_STATUS_DISPLAY = 1,
-  // A frame, plane or image of the wrong shape or with unusable values.
+  // A frame, plane or image has the wrong shape or unusable values.
   PF_STATUS_FRAME = 2,
-  // A frame that is not later than the last one. It is refused; what follows is not harmed.
+  // A frame is not later than the previous one. It is refused; later frames are not affected.
   PF_STATUS_TIMESTAMP = 3,
-  // A setting or an argument that cannot be meant or planned for.
+  // A setting or an argument is invalid or cannot be planned.
   PF_STATUS_SETTING = 4,
-  // What is not a hologram network, or one for another display.
+  // A file is not a hologram network, or the network is for another display.
   PF_STATUS_NETWORK = 5,
-  // A file that cannot be read.
+  // A file cannot be read.
   PF_STATUS_FILE = 6,
-  // A call that a session cannot answer in its mode or state.
+  // A session cannot answer the call in its mode or state.
   PF_STATUS_SESSION = 7,
-  // A fault of Phasefront. The call had no effect, or the frame is lost; please report it.
+  // Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
   PF_STATUS_INTERNAL = 8,
 } PfStatus;
 
-// How much a message matters.
+// The severity of a log message.
 typedef enum PfLogLevel {
-  // What went wrong.
+  // An error.
   PF_LOG_LEVEL_ERROR = 0,
-  // What looks wrong.
+  // Something that may be wrong.
   PF_LOG_LEVEL_WARNING = 1,
-  // What is done.
+  // An action of the library.
   PF_LOG_LEVEL_INFO = 2,
   // Details.
   PF_LOG_LEVEL_DEBUG = 3,
 } PfLogLevel;
 
-// Why a frame was not made into a hologram, without fault.
+// The reason why a session dropped a frame without an error.
 typedef enum PfDropReason {
-  // It was not dropped.
+  // The frame was not dropped.
   PF_DROP_REASON_NOT = 0,
-  // A newer frame came while it waited.
+  // A newer frame arrived while this one waited.
   PF_DROP_REASON_SUPERSEDED = 1,
-  // It came sooner than the target rate asks for.
+  // The frame arrived sooner than the target rate allows.
   PF_DROP_REASON_ABOVE_TARGET_RATE = 2,
   // The session was paused.
   PF_DROP_REASON_PAUSED = 3,
-  // The session was reset before it was done.
+  // The session was reset before the frame was finished.
   PF_DROP_REASON_RESET = 4,
-  // The session was closed before it was done.
+  // The session was closed before the frame was finished.
   PF_DROP_REASON_CLOSED = 5,
-  // For a reason that this version does not know.
+  // A reason that this version does not know.
   PF_DROP_REASON_OTHER = 6,
 } PfDropReason;
 
-// Why a session changed its quality.
+// The reason why a session changed its quality level.
 typedef enum PfQualityReason {
   // Frames took longer than the target rate allows.
   PF_QUALITY_REASON_TOO_SLOW = 0,
-  // There was room for more.
+  // There was time left.
   PF_QUALITY_REASON_ROOM = 1,
   // The device is hot.
   PF_QUALITY_REASON_THERMAL = 2,
-  // The caller said so.
+  // The app asked for it.
   PF_QUALITY_REASON_ASKED = 3,
-  // The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+  // The next quality level cannot be planned. The session keeps the previous one and does not try the next one
   // again.
   PF_QUALITY_REASON_REFUSED = 4,
-  // For a reason that this version does not know.
+  // A reason that this version does not know.
   PF_QUALITY_REASON_OTHER = 5,
 } PfQualityReason;
 
-// How a colour image lies in memory.
+// The memory layout of a colour image.
 typedef enum PfColourFormat {
-  // One plane; bytes red, green, blue, alpha (which is not looked at).
+  // One plane with the bytes red, green, blue, alpha. Alpha is ignored.
   PF_COLOUR_FORMAT_RGBA = 0,
-  // One plane; bytes blue, green, red, alpha (which is not looked at).
+  // One plane with the bytes blue, green, red, alpha. Alpha is ignored.
   PF_COLOUR_FORMAT_BGRA = 1,
-  // One plane; bytes red, green, blue.
+  // One plane with the bytes red, green, blue.
   PF_COLOUR_FORMAT_RGB = 2,
-  // Two planes: luma; and at half the resolution blue and red chroma side by side.
+  // Two planes: luma, and interleaved blue and red chroma at half the resolution.
   PF_COLOUR_FORMAT_NV12 = 3,
   // Three planes: luma, and at half the resolution blue chroma (U) and red chroma (V). Android's YUV_420_888.
   PF_COLOUR_FORMAT_YUV420 = 4,
 } PfColourFormat;
 
-// The matrix between luma, chroma and colour.
+// The matrix that converts luma and chroma to colour.
 typedef enum PfYuvMatrix {
-  // ITU-R BT.601: standard definition, JPEG, most Android cameras.
+  // ITU-R BT.601, for standard definition, JPEG and most Android cameras.
   PF_YUV_MATRIX_BT601 = 0,
-  // ITU-R BT.709: high definition.
+  // ITU-R BT.709, for high definition.
   PF_YUV_MATRIX_BT709 = 1,
 } PfYuvMatrix;
 
-// How a depth image lies in memory. But for the normalized ones, 0, negative numbers and what is not finite mean no
-// reading.
+// The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
+// are not finite mean no reading.
 typedef enum PfDepthFormat {
-  // Metres, 32-bit floats.
+  // Metres as 32-bit floats.
   PF_DEPTH_FORMAT_METRES_F32 = 0,
-  // Metres, 16-bit floats.
+  // Metres as 16-bit floats.
   PF_DEPTH_FORMAT_METRES_F16 = 1,
-  // Inverse metres, 32-bit floats.
+  // Inverse metres as 32-bit floats.
   PF_DEPTH_FORMAT_DISPARITY_F32 = 2,
-  // Inverse metres, 16-bit floats.
+  // Inverse metres as 16-bit floats.
   PF_DEPTH_FORMAT_DISPARITY_F16 = 3,
-  // Millimetres, all 16 bits.
+  // Millimetres in all 16 bits.
   PF_DEPTH_FORMAT_MILLIMETRES_U16 = 4,
-  // Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3.
+  // Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits.
   PF_DEPTH_FORMAT_ANDROID_DEPTH16 = 5,
-  // 0 nearest to 255 farthest; every pixel is a reading.
+  // Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
   PF_DEPTH_FORMAT_NORMALIZED_U8 = 6,
-  // 0 nearest to 65535 farthest; every pixel is a reading.
+  // 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
   PF_DEPTH_FORMAT_NORMALIZED_U16 = 7,
 } PfDepthFormat;
 
-// How a confidence map lies in memory.
+// The memory layout of a confidence map.
 typedef enum PfConfidenceFormat {
-  // 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
+  // 0 low, 1 medium, 2 high, as in ARKit's ARConfidenceLevel.
   PF_CONFIDENCE_FORMAT_LOW_MEDIUM_HIGH = 0,
-  // 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+  // 0 none to 255 full, as in ARCore's acquireRawDepthConfidenceImage.
   PF_CONFIDENCE_FORMAT_U8 = 1,
 } PfConfidenceFormat;
 
-// How far a sensor's picture must be turned clockwise to stand upright.
+// The clockwise rotation that turns a sensor's image upright.
 typedef enum PfRotation {
-  // Not at all.
+  // No rotation.
   PF_ROTATION_UPRIGHT = 0,
   // A quarter turn.
   PF_ROTATION_CLOCKWISE90 = 1,
   // Half a turn.
   PF_ROTATION_HALF = 2,
-  // Three quarters.
+  // Three quarters of a turn.
   PF_ROTATION_CLOCKWISE270 = 3,
 } PfRotation;
 
-// What makes holograms.
+// The method that computes holograms.
 typedef enum PfMethod {
-  // The network that is built in, or the plane sweep where it was not trained for the display.
+  // The built-in network, or the plane sweep if that network was not trained for the display.
   PF_METHOD_DEFAULT = 0,
   // A trained network.
   PF_METHOD_TRAINED = 1,
-  // The plane sweep, for any display: slower, and nothing needs to be trained.
+  // The plane sweep, which suits any display. It is slower and needs no training.
   PF_METHOD_SWEEP = 2,
-  // For each frame what suits its depth: the plane sweep where it is clean, the network where it is noisy.
+  // The plane sweep for frames with clean depth, and the network for frames with noisy or incomplete depth.
   PF_METHOD_AUTO = 3,
 } PfMethod;
 
-// How a session runs; fixed when it is made.
+// The running mode of a session. It is fixed when the session is created.
 typedef enum PfRunningMode {
-  // Each frame is answered by itself.
+  // The session answers each frame independently of all others.
   PF_RUNNING_MODE_IMAGE = 0,
-  // Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
+  // The session answers each frame, and smooths depth and brightness over time. Timestamps must increase.
   PF_RUNNING_MODE_VIDEO = 1,
-  // Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+  // The app submits frames without waiting, and the listener receives the outcome of each. Timestamps must increase.
   PF_RUNNING_MODE_LIVE = 2,
 } PfRunningMode;
 
-// Where frames are computed.
+// The backend that computes frames.
 typedef enum PfBackend {
-  // On the CPU.
+  // Computes on the CPU.
   PF_BACKEND_CPU = 0,
-  // On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
+  // Computes on the GPU if this library was built with GPU support, a GPU exists and its results agree with the
+  // CPU's; otherwise on the CPU.
   PF_BACKEND_GPU = 1,
 } PfBackend;
 
-// How hot the device is, as its system says.
+// The thermal state of the device as reported by its system.
 typedef enum PfThermal {
-  // Not warm: nothing is limited.
+  // The device is not warm; nothing is limited.
   PF_THERMAL_NOMINAL = 0,
-  // Warm: frames may take a little less time.
+  // The device is warm; frames may take a little less time.
   PF_THERMAL_FAIR = 1,
-  // Hot: half the time.
+  // The device is hot; frames may take half the time.
   PF_THERMAL_SERIOUS = 2,
-  // Too hot: the lowest quality level.
+  // The device is too hot; the session uses the lowest quality level.
   PF_THERMAL_CRITICAL = 3,
 } PfThermal;
 
-// How the levels of the colours lie in images for a modulator's driver.
+// The arrangement of the colours' levels in images for a modulator's driver.
 typedef enum PfLayout {
-  // One image, bytes red, green, blue.
+  // One image with bytes red, green, blue.
   PF_LAYOUT_RGB = 0,
-  // One image, bytes red, green, blue, alpha 255.
+  // One image with bytes red, green, blue, alpha 255.
   PF_LAYOUT_RGBA = 1,
-  // One image, bytes blue, green, red, alpha 255.
+  // One image with bytes blue, green, red, alpha 255.
   PF_LAYOUT_BGRA = 2,
-  // An image for each colour, one after another: red, green, blue; a byte a pixel.
+  // One image for each colour in the order red, green, blue, with one byte for each pixel.
   PF_LAYOUT_GREY = 3,
 } PfLayout;
 
 // The hologram of one frame: modulator levels of its colours.
 typedef struct PfHologram PfHologram;
 
-// An image, row by row without gaps.
+// An image without gaps between rows.
 typedef struct PfImage PfImage;
 
-// A hologram network or a pre-filter. Immutable; one serves many sessions.
+// A hologram network or a pre-filter. It is immutable and can be used by several sessions.
 typedef struct PfNetwork PfNetwork;
 
-// What a session makes, and how.
+// The options of a session.
 typedef struct PfOptions PfOptions;
 
 // Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
 typedef struct PfPlanes PfPlanes;
 
-// A session. Every call may come from any thread, at any moment, but for pf_session_free, which is the last.
+// A session. All functions except pf_session_free can be called from any thread at any time.
 typedef struct PfSession PfSession;
 
-// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
-// lasers' light, what corrects its optics. Immutable; one serves many sessions.
+// The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+// light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
 typedef struct PfTarget PfTarget;
 
-// How long each stage of a frame took, milliseconds.
+// The time that each stage of a frame took, in milliseconds.
 typedef struct PfFrameTimes {
-  // Colour to amplitudes of the display's resolution.
+  // Rotating, converting and resizing the colour image.
   double colour_ms;
-  // Depth to normalized depth of the display's resolution.
+  // Reading, aligning, temporally smoothing and refining the depth.
   double depth_ms;
-  // The midpoint hologram.
+  // Computing the midpoint hologram from the frame.
   double method_ms;
-  // From the midpoint to the modulator.
+  // Propagating from the midpoint to the modulator.
   double propagate_ms;
-  // From the field to levels.
+  // Encoding the field into levels.
   double encode_ms;
-  // All together.
+  // The sum of all stages.
   double total_ms;
 } PfFrameTimes;
 
-// What is known of a hologram.
+// The properties of a hologram.
 typedef struct PfHologramInfo {
-  // The frame's timestamp.
+  // The timestamp of the frame.
   uint64_t timestamp_ns;
-  // Pixels along x.
+  // The width in pixels.
   uint32_t width;
-  // Pixels along y.
+  // The height in pixels.
   uint32_t height;
-  // How many colours its levels have: 3, or 1 for a display of one laser.
+  // The number of colours of the levels: 3, or 1 for a display with one laser.
   uint32_t colours;
-  // The quality level that it was made at, 0 the best.
+  // The quality level of the hologram; 0 is the best.
   uint32_t quality_level;
-  // The amplitude that full light stands for.
+  // The amplitude that maps to full light.
   float scale;
-  // Metres at the near end of the volume; NaN for normalized depth.
+  // The distance of the near end of the volume in metres; NaN for normalized depth.
   float near_m;
-  // Metres at the far end of the volume; NaN for normalized depth.
+  // The distance of the far end of the volume in metres; NaN for normalized depth.
   float far_m;
   // The share of the depth sensor's pixels that had a usable reading.
   float valid_depth;
-  // How long each stage took.
+  // The time that each stage took.
   struct PfFrameTimes times;
 } PfHologramInfo;
 
-// What planes are.
+// The memory and size of planes.
 typedef struct PfPlanesInfo {
-  // The first plane's first number, row by row without gaps; the planes of the other colours follow it. Valid until
-  // pf_planes_free.
+  // The first number of the first plane. There are no gaps between rows, and the planes of the other colours follow.
+  // It is valid until pf_planes_free.
   const float *data;
-  // How many numbers lie there.
+  // The number of numbers.
   size_t length;
-  // Pixels along x.
+  // The width in pixels.
   uint32_t width;
-  // Pixels along y.
+  // The height in pixels.
   uint32_t height;
-  // How many planes there are: 3, or 1 of a display of one laser.
+  // The number of planes: 3, or 1 for a display with one laser.
   uint32_t colours;
-  // Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.
+  // The number of numbers of a pixel: 1 for an amplitude, 2 for a real and an imaginary part.
   uint32_t numbers;
 } PfPlanesInfo;
 
-// How a hologram is put on its modulator.
+// The placement of a hologram on its modulator.
 typedef struct PfPlacement {
-  // How colours lie in images: a PfLayout.
+  // The arrangement of colours in images, a PfLayout.
   uint32_t layout;
-  // Whether left and right are exchanged, of the whole image.
+  // Whether the whole image is flipped left to right.
   bool flip_x;
-  // Whether top and bottom are exchanged, of the whole image.
+  // Whether the whole image is flipped top to bottom.
   bool flip_y;
-  // How many pixels to the right of the middle the hologram stands, before flips.
+  // The hologram's shift to the right of the middle in pixels, before flips.
   int32_t shift_x;
-  // How many pixels below the middle it stands, before flips.
+  // The hologram's shift below the middle in pixels, before flips.
   int32_t shift_y;
 } PfPlacement;
 
-// What an image is.
+// The memory and size of an image.
 typedef struct PfImageInfo {
-  // Its first byte. Valid until pf_image_free.
+  // The first byte. It is valid until pf_image_free.
   const uint8_t *data;
-  // How many bytes lie there.
+  // The number of bytes.
   size_t length;
-  // Pixels along x.
+  // The width in pixels.
   uint32_t width;
-  // Pixels along y.
+  // The height in pixels.
   uint32_t height;
-  // Bytes of a pixel.
+  // The number of bytes of a pixel.
   uint32_t pixel_bytes;
 } PfImageInfo;
 
-// Hears log messages, on any thread. The message ends with the call. It may call the library, but where a session
-// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview
-// are refused there.
+// A receiver of log messages, which is called on any thread. The message is valid during the call. The receiver may
+// call the library. On a thread that computes for a session it cannot wait for a frame: pf_session_process,
+// pf_session_warm_up and pf_hologram_preview are refused.
 typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *message);
 
-// One quality: a method, a resolution, and how the displayed image is corrected.
+// A quality level: a method, a resolution and the number of correction steps.
 typedef struct PfQualityLevel {
-  // A PfMethod but for PF_METHOD_DEFAULT.
+  // The method, a PfMethod except PF_METHOD_DEFAULT.
   uint32_t method;
-  // Of PF_METHOD_TRAINED and PF_METHOD_AUTO; else NULL.
+  // The network of PF_METHOD_TRAINED and PF_METHOD_AUTO; otherwise NULL.
   const struct PfNetwork *network;
-  // Width of the hologram, pixels.
+  // The width of the hologram in pixels.
   uint32_t width;
-  // Height of the hologram, pixels.
+  // The height of the hologram in pixels.
   uint32_t height;
-  // Local steps of this quality level; below 0 the session's.
+  // The number of local steps; negative for the session's number.
   int32_t local_steps;
-  // Steps at the midpoint of this quality level; below 0 the session's.
+  // The number of steps at the midpoint; negative for the session's number.
   int32_t midpoint_steps;
 } PfQualityLevel;
 
 // A change of the quality level.
 typedef struct PfQualityChange {
-  // The quality level before.
+  // The previous quality level.
   uint32_t from_quality_level;
-  // The quality level now; the one before where the step was refused.
+  // The new quality level; the previous one if the reason is PF_QUALITY_REASON_REFUSED.
   uint32_t to_quality_level;
-  // Why.
+  // The reason.
   enum PfQualityReason reason;
 } PfQualityChange;
 
-// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
-// order in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No
-// exception may leave a call.
+// A receiver of the events of a live session. Calls arrive one after another, on the session's own thread, in the
+// order of the events. No frame is processed while the listener is busy. A function that is NULL is not called.
+// Functions must not throw exceptions.
 //
-// `context` must live until on_closed was called; that call may free it. Where pf_session_new fails, no call is made,
-// and the context is the caller's.
+// `context` must live until on_closed is called, which may free it. If pf_session_new fails, no function is called and
+// the context still belongs to the caller.
 typedef struct PfListener {
-  // Given to each call.
+  // The first argument of each function.
   void *context;
-  // A frame became a hologram, which is the listener's until pf_hologram_free.
+  // Reports that a frame became a hologram. The listener must free it with pf_hologram_free.
   void (*on_processed)(void *context, struct PfHologram *hologram);
-  // A frame was dropped.
+  // Reports that a frame was dropped.
   void (*on_dropped)(void *context, uint64_t timestamp_ns, enum PfDropReason reason);
-  // A frame could not be processed. The session goes on. The message ends with the call.
+  // Reports that a frame could not be processed. The session continues. The message is valid during the call.
   void (*on_failed)(void *context, uint64_t timestamp_ns, const char *message);
-  // The frames after this one are made at another quality level.
+  // Reports that the session uses another quality level after the frame of `timestamp_ns`.
   void (*on_quality_changed)(void *context, uint64_t timestamp_ns, struct PfQualityChange change);
-  // The session has ended. This is the last call, made exactly once: before pf_session_free returns, or after it
-  // where that does not wait.
+  // Reports that the session is closed. This is the last call. It is made exactly once, before pf_session_free
+  // returns, or after it if pf_session_free does not wait.
   void (*on_closed)(void *context);
 } PfListener;
 
-// One plane of an image.
+// A plane of an image.
 typedef struct PfPlane {
-  // Its first byte; NULL where there is no such plane.
+  // The first byte; NULL if there is no such plane.
   const uint8_t *data;
-  // Bytes from there to its end.
+  // The number of bytes of the plane.
   size_t length;
-  // Bytes from one row to the next.
+  // The number of bytes from one row to the next.
   uint32_t row_stride;
-  // Bytes from one pixel to the next in a row.
+  // The number of bytes from one pixel to the next in a row.
   uint32_t pixel_stride;
 } PfPlane;
 
 // A colour image.
 typedef struct PfColour {
-  // How it lies in memory: a PfColourFormat.
+  // The memory layout, a PfColourFormat.
   uint32_t format;
-  // Pixels along x, as the sensor gives them.
+  // The width of the sensor's image, in pixels.
   uint32_t width;
-  // Pixels along y.
+  // The height of the sensor's image, in pixels.
   uint32_t height;
-  // A PfYuvMatrix; only formats of luma and chroma look at it.
+  // The matrix of luma and chroma, a PfYuvMatrix. Other formats ignore it.
   uint32_t matrix;
-  // Whether luma runs over 16 to 235 and chroma over 16 to 240, not both over 0 to 255; the same.
+  // Whether luma spans 16 to 235 and chroma 16 to 240 instead of 0 to 255 for both. Other formats ignore it.
   bool video_range;
-  // Its planes, in the format's order.
+  // The planes, in the format's order.
   struct PfPlane planes[3];
 } PfColour;
 
 // A depth image.
 typedef struct PfDepth {
-  // How it lies in memory: a PfDepthFormat.
+  // The memory layout, a PfDepthFormat.
   uint32_t format;
-  // Pixels along x, as the sensor gives them.
+  // The width of the sensor's image, in pixels.
   uint32_t width;
-  // Pixels along y.
+  // The height of the sensor's image, in pixels.
   uint32_t height;
-  // Its plane.
+  // The plane.
   struct PfPlane plane;
 } PfDepth;
 
 // The confidence map of a depth image.
 typedef struct PfConfidence {
-  // How it lies in memory: a PfConfidenceFormat.
+  // The memory layout, a PfConfidenceFormat.
   uint32_t format;
-  // Pixels along x: as many as the depth has.
+  // The width in pixels, equal to the depth image's.
   uint32_t width;
-  // Pixels along y: as many as the depth has.
+  // The height in pixels, equal to the depth image's.
   uint32_t height;
-  // Its plane; without data there is no map.
+  // The plane. Without data there is no map.
   struct PfPlane plane;
 } PfConfidence;
 
-// The pinhole model of a camera, in pixels of its image before it is turned upright. The middle of the first pixel is
-// (0, 0).
+// The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
+// pixel is (0, 0).
 typedef struct PfIntrinsics {
-  // Focal length along x.
+  // The focal length along x.
   double fx;
-  // Focal length along y.
+  // The focal length along y.
   double fy;
-  // x of the principal point.
+  // The x of the principal point.
   double cx;
-  // y of the principal point.
+  // The y of the principal point.
   double cy;
 } PfIntrinsics;
 
-// How the depth camera and the colour camera stand to each other: a point p of the depth camera (x right, y down, z
-// forward) is at R*p + t for the colour camera.
+// The intrinsics and the relative pose of the depth camera and the colour camera. A point p of the depth camera (x
+// right, y down, z forward) is at R*p + t of the colour camera.
 typedef struct PfCameras {
-  // Of the colour image.
+  // The intrinsics of the colour camera.
   struct PfIntrinsics colour;
-  // Of the depth image.
+  // The intrinsics of the depth camera.
   struct PfIntrinsics depth;
-  // R, row by row; 1, 0, 0, 0, 1, 0, 0, 0, 1 for cameras that look one way.
+  // R, row by row; 1, 0, 0, 0, 1, 0, 0, 0, 1 for cameras with the same orientation.
   double rotation[9];
-  // t, metres.
+  // t, in metres.
   double translation_m[3];
 } PfCameras;
 
-// A frame: colour, depth, and how they belong together. Start from zeros.
+// A frame: colour, depth, and their relation. Initialize it with zeros.
 typedef struct PfFrame {
-  // When it was taken, in nanoseconds of any clock that runs forward.
+  // The time at which the frame was taken, in nanoseconds of any clock that runs forward.
   uint64_t timestamp_ns;
   // The colour image.
   struct PfColour colour;
   // The depth image.
   struct PfDepth depth;
-  // The confidence map of the depth.
+  // The confidence map of the depth image.
   struct PfConfidence confidence;
-  // How all must be turned to stand upright: a PfRotation.
+  // The clockwise rotation that turns all images upright, a PfRotation.
   uint32_t rotation;
-  // Whether left and right are exchanged after the turn, as front cameras need.
+  // Whether left and right are exchanged after the rotation, as front cameras need.
   bool mirrored;
-  // NULL where depth and colour show the same field of view.
+  // The cameras; NULL if depth and colour have the same field of view.
   const struct PfCameras *cameras;
 } PfFrame;
 
-// What a session has done so far. Submitted frames are processed, failed, refused, dropped or pending.
+// The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
+// pending.
 typedef struct PfStatistics {
-  // Frames that were given to the session.
+  // Frames that were submitted.
   uint64_t submitted;
   // Frames that became holograms.
   uint64_t processed;
   // Frames that could not be processed.
   uint64_t failed;
-  // Frames that came late.
+  // Frames that were refused because they were late or the session was closed.
   uint64_t refused;
   // Frames that were dropped.
   uint64_t dropped;
-  // Frames that wait or are in flight.
+  // Frames that wait or are being processed.
   uint64_t pending;
-  // The quality level, 0 the best.
+  // The quality level; 0 is the best.
   uint32_t quality_level;
-  // Holograms a second, of late.
+  // Holograms per second over the last 30.
   double rate_hz;
-  // Mean times, of late.
+  // The mean times of the stages over the last 30 holograms.
   struct PfFrameTimes times;
-  // What computes, as text; cut where it is longer.
+  // The name of the backend that computes the frames, cut if it is longer.
   char backend[64];
-  // Why that.
+  // The reason for using this backend, cut if it is longer.
   char backend_why[256];
 } PfStatistics;
 
@@ -484,218 +486,226 @@ typedef struct PfStatistics {
 extern "C" {
 #endif // __cplusplus
 
-// What is known of a hologram.
+// Returns the properties of a hologram.
 enum PfStatus pf_hologram_info(const struct PfHologram *hologram, struct PfHologramInfo *info);
 
-// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one laser.
-// The colours follow one another without gaps, too. Valid until pf_hologram_free.
+// Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a byte;
+// there are no gaps between rows or between colours. The address is valid until pf_hologram_free.
 enum PfStatus pf_hologram_levels(const struct PfHologram *hologram,
                                  uint32_t colour,
                                  const uint8_t **levels,
                                  size_t *length);
 
-// z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, mm: where to focus when it is
-// tapped on.
+// Returns the z in mm of the scene point at (x, y) of the picture, for example to focus where the user taps.
+// Coordinates run from 0 to 1 from the upper left corner.
 enum PfStatus pf_hologram_z_at(const struct PfHologram *hologram, double x, double y, double *z_mm);
 
-// What an eye focused at z sees, 4 bytes a pixel: red, green, blue, 255.
+// Creates the view of an eye focused at z, with 4 bytes for each pixel: red, green, blue, 255.
 enum PfStatus pf_hologram_preview(const struct PfHologram *hologram,
                                   double z_mm,
                                   uint32_t width,
                                   uint32_t height,
                                   struct PfImage **image);
 
-// What an eye focused at z sees of the whole hologram: amplitudes, of which 1 is white. It transforms all of it: not
-// for every frame. A z too far away is refused.
+// Creates the view of an eye focused at z at full resolution, as amplitudes where 1 is white. This transforms the
+// whole hologram; do not use it for every frame. A z too far away is refused.
 enum PfStatus pf_hologram_refocus(const struct PfHologram *hologram, double z_mm, struct PfPlanes **planes);
 
-// The complex field that the levels make behind the aperture at z, 0 the midpoint, without the carrier: real and
-// imaginary part of each pixel. It transforms all of the hologram: not for every frame. A z too far away is refused.
+// Creates the complex field that the levels produce behind the aperture at z, where 0 is the midpoint: the real and
+// the imaginary part of each pixel. The carrier is left out. This transforms the whole hologram; do not use it for
+// every frame. A z too far away is refused.
 enum PfStatus pf_hologram_field(const struct PfHologram *hologram, double z_mm, struct PfPlanes **planes);
 
-// What planes are, and where they lie.
+// Returns the memory and size of planes.
 enum PfStatus pf_planes_info(const struct PfPlanes *planes, struct PfPlanesInfo *info);
 
-// Ends planes.
+// Frees planes.
 void pf_planes_free(struct PfPlanes *planes);
 
-// Image `number` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in the
-// upper bits of a byte, the hologram where `placement` says.
+// Creates image `number` of those that the modulator's driver takes, at the modulator's resolution. It contains the
+// levels in the upper bits of a byte; `placement` positions the hologram.
 enum PfStatus pf_hologram_output(const struct PfHologram *hologram,
                                  const struct PfPlacement *placement,
                                  uint32_t number,
                                  struct PfImage **image);
 
-// Ends a hologram; its memory goes back to its session.
+// Frees a hologram. Its memory returns to its session.
 void pf_hologram_free(struct PfHologram *hologram);
 
-// What an image is, and where it lies.
+// Returns the memory and size of an image.
 enum PfStatus pf_image_info(const struct PfImage *image, struct PfImageInfo *info);
 
-// Ends an image.
+// Frees an image.
 void pf_image_free(struct PfImage *image);
 
-// Sends messages of `level`, a PfLogLevel, and above to `on_log`; NULL for silence. A call on another thread that is
-// under way when this returns still has the `context` of before, so let each context live as long as the process.
+// Sends messages of `level`, a PfLogLevel, and above to `on_log`. With NULL, no messages are sent. A call on another
+// thread that is in progress when this returns still uses the previous `context`, so each context must live as long as
+// the process.
 enum PfStatus pf_set_log_listener(uint32_t level, PfOnLog on_log, void *context);
 
-// A network in int8 that is bundled, by name, as "rgbd-8".
+// Creates the bundled int8 network of a name, such as "rgbd-8".
 enum PfStatus pf_network_built_in(const char *name, struct PfNetwork **network);
 
-// The bytes of an ONNX file.
+// Reads a network from the bytes of an ONNX file.
 enum PfStatus pf_network_from_bytes(const uint8_t *onnx, size_t length, struct PfNetwork **network);
 
-// An ONNX file.
+// Reads a network from an ONNX file.
 enum PfStatus pf_network_from_file(const char *path, struct PfNetwork **network);
 
-// Ends a network. Sessions and options that take it go on.
+// Frees a network. Sessions and options that use it are not affected.
 void pf_network_free(struct PfNetwork *network);
 
-// The default options for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for
-// those that take one, else NULL.
+// Creates the default options for `target`: holograms at its modulator's resolution by `method`, a PfMethod. `network`
+// is the method's network, or NULL for methods without one.
 enum PfStatus pf_options_new(const struct PfTarget *target,
                              uint32_t method,
                              const struct PfNetwork *network,
                              struct PfOptions **options);
 
-// Ends options. Sessions that were made by them go on.
+// Frees options. Sessions that were created from them are not affected.
 void pf_options_free(struct PfOptions *options);
 
-// Removes all quality levels; push at least one afterwards.
+// Removes all quality levels. Push at least one afterwards.
 enum PfStatus pf_options_clear_quality_levels(struct PfOptions *options);
 
-// Adds a quality level, below those that are there; a session takes 16 at most.
+// Adds a quality level below the existing ones. A session takes at most 16.
 enum PfStatus pf_options_push_quality_level(struct PfOptions *options, const struct PfQualityLevel *quality_level);
 
-// Frames a second that are aimed at; 0 takes every frame and never changes the quality level.
+// Sets the target rate in frames per second. With 0, a session takes every frame and does not adapt its quality level
+// to frame times.
 enum PfStatus pf_options_set_target_rate_hz(struct PfOptions *options, double rate_hz);
 
-// Encodes by double phase on the field as it is.
+// Selects double phase of the unchanged field.
 enum PfStatus pf_options_set_double_phase(struct PfOptions *options);
 
-// Encodes behind a small Gaussian blur of `sigma` pixels, `width` taps (AA-DPM); 0.7 and 3 as published.
+// Selects double phase after a small Gaussian blur of `sigma` pixels with `width` taps (AA-DPM); 0.7 and 3 in the
+// paper.
 enum PfStatus pf_options_set_anti_alias(struct PfOptions *options, float sigma, uint32_t width);
 
-// Encodes with high diagonal frequencies cut (BL-DPM): the bound of |tan(pi*fx)*tan(pi*fy)|; 1 as published.
+// Selects double phase after a filter that removes high diagonal frequencies (BL-DPM). `k` is the bound of
+// |tan(pi*fx)*tan(pi*fy)|; 1 in the paper.
 enum PfStatus pf_options_set_band_limit(struct PfOptions *options, float k);
 
-// Encodes behind a pre-filter network (DDPM), trained for the display's offset together with the hologram network.
+// Selects double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
+// offset of the display.
 enum PfStatus pf_options_set_deep(struct PfOptions *options, const struct PfNetwork *prefilter);
 
-// Full light stands near the frame's largest amplitude, moving smoothly from frame to frame. The default.
+// Maps an amplitude near the frame's largest to full light. It changes smoothly from frame to frame. This is the
+// default.
 enum PfStatus pf_options_set_brightness_smoothed(struct PfOptions *options);
 
-// Full light stands for the amplitude `scale`; what is brighter is clipped.
+// Maps the amplitude `scale` to full light. Larger amplitudes are clipped.
 enum PfStatus pf_options_set_brightness_fixed(struct PfOptions *options, float scale);
 
-// Full light stands for the frame's largest amplitude.
+// Maps the frame's largest amplitude to full light.
 enum PfStatus pf_options_set_brightness_frame_max(struct PfOptions *options);
 
-// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
-// the dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
+// Sets the share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark
+// areas. The encoding's default is 0.4, and 0 with a pre-filter.
 enum PfStatus pf_options_set_dark_threshold(struct PfOptions *options, float threshold);
 
-// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted. Not set, they
-// suit the encoding: 1, and 0 with a pre-filter.
+// Sets the number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. The
+// encoding's default is 1, and 0 with a pre-filter.
 enum PfStatus pf_options_set_local_steps(struct PfOptions *options, uint32_t steps);
 
-// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
-// video, where it goes on from the frame before.
+// Sets the number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
+// stills; 1 suits video, where each frame continues from the previous one.
 enum PfStatus pf_options_set_midpoint_steps(struct PfOptions *options, uint32_t steps);
 
-// Shows these metres at the ends of the volume. Not set, they are the 1st and 99th percentile of the readings.
+// Sets the distances, in metres, that map to the ends of the volume. The default is the 1st and 99th percentile of the
+// readings.
 enum PfStatus pf_options_set_depth_range(struct PfOptions *options, float near_m, float far_m);
 
-// Readings less sure than this, in 0 to 1, are none. ARKit's "low" is 0, "medium" 0.5, "high" 1.
+// Sets the confidence, in 0 to 1, below which readings are ignored. ARKit's "low" is 0, "medium" 0.5, "high" 1.
 enum PfStatus pf_options_set_least_confidence(struct PfOptions *options, float confidence);
 
-// Threads to compute with, 1 to 256. Not set, as many as the device has.
+// Sets the number of threads to compute with, 1 to 256. The default is as many as the device has.
 enum PfStatus pf_options_set_threads(struct PfOptions *options, uint32_t threads);
 
-// Most pixels of a quality level and of the modulator, 8192x4096 unless it is set: what a session allocates is a
-// multiple.
+// Sets the maximum number of pixels of a quality level and of the modulator; 8192x4096 by default. The memory of a
+// session is a multiple of it.
 enum PfStatus pf_options_set_most_pixels(struct PfOptions *options, uint64_t pixels);
 
-// Where frames are computed: a PfBackend.
+// Sets the backend that computes frames, a PfBackend.
 enum PfStatus pf_options_set_backend(struct PfOptions *options, uint32_t backend);
 
-// A session that runs in `mode`, a PfRunningMode. A live one needs a `listener`, which is copied; for the others it is
-// NULL.
+// Creates a session that runs in `mode`, a PfRunningMode. A live session needs a `listener`, which is copied; for
+// other sessions it is NULL.
 enum PfStatus pf_session_new(const struct PfOptions *options,
                              uint32_t mode,
                              const struct PfListener *listener,
                              struct PfSession **session);
 
-// Takes no more frames, waits until the listener has heard everything, and ends the session. Called by a listener, of
-// this session or another, or by a log handler while a session computes, it does not wait: on_closed says when the
-// listener has heard everything. Its holograms live on. It is the last call with this session, and never made during
-// another one with it.
+// Closes and frees a session: it accepts no more frames and waits until the listener has received all events. A call
+// from a listener of any session, or from a log handler while a session computes, does not wait; on_closed then
+// reports that the listener has received all events. The session's holograms stay valid. This must be the last call
+// with the session, and no other call with it may be in progress.
 void pf_session_free(struct PfSession *session);
 
-// The hologram of a frame, in an image or a video session.
+// Creates the hologram of a frame, in an image or a video session.
 enum PfStatus pf_session_process(const struct PfSession *session,
                                  const struct PfFrame *frame,
                                  struct PfHologram **hologram);
 
-// Hands a frame to a live session, which copies it and goes on by itself. `dropped` says whether it was dropped at
-// once, and why; the listener hears of it too.
+// Submits a frame to a live session, which copies it, without waiting for its hologram. `dropped` receives the reason
+// if the frame is dropped at once, which the listener receives too.
 enum PfStatus pf_session_submit(const struct PfSession *session,
                                 const struct PfFrame *frame,
                                 enum PfDropReason *dropped);
 
-// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones.
 enum PfStatus pf_session_warm_up(const struct PfSession *session);
 
-// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
+// Forgets all previous frames, including one that is being processed. The next frame may have any timestamp.
 enum PfStatus pf_session_reset(const struct PfSession *session);
 
-// Takes no frames until pf_session_resume.
+// Accepts no frames until pf_session_resume.
 enum PfStatus pf_session_pause(const struct PfSession *session);
 
-// Takes frames again.
+// Accepts frames again.
 enum PfStatus pf_session_resume(const struct PfSession *session);
 
-// Says how hot the device is: a PfThermal.
+// Sets the thermal state of the device, a PfThermal.
 enum PfStatus pf_session_set_thermal(const struct PfSession *session, uint32_t thermal);
 
-// Stays at this quality level, 0 the best.
+// Keeps the session at a quality level; 0 is the best.
 enum PfStatus pf_session_fix_quality_level(const struct PfSession *session, uint32_t quality_level);
 
-// Changes the quality level by itself: down where frames take longer than the target rate allows or the device is hot,
-// up where there is room.
+// Lets the session change its quality level: it lowers the level if frames take longer than the target rate allows or
+// the device is hot, and raises it if there is time left.
 enum PfStatus pf_session_step_by_itself(const struct PfSession *session);
 
-// What the session has done so far. Never waits for a frame.
+// Returns the statistics of a session. Never waits for a frame.
 enum PfStatus pf_session_statistics(const struct PfSession *session, struct PfStatistics *statistics);
 
-// What was wrong with the last call of this thread that was not PF_STATUS_OK, one line; empty before the first. Valid
-// until the next such call of this thread.
+// Returns one line about the last call of this thread that did not return PF_STATUS_OK; an empty line if there was
+// none. It is valid until the next such call of this thread.
 const char *pf_last_error(void);
 
-// The version of the library, as "0.1.0". Valid for ever.
+// Returns the version of the library, such as "0.1.0". It is always valid.
 const char *pf_version(void);
 
-// A display with levels in equal steps of phase, in TOML, as "width = 1920\npitch_um = 8.0"; what is left out has the
-// default value, so "" is the default display.
+// Creates the target for a display in TOML, such as "width = 1920\npitch_um = 8.0", whose levels are equal steps of
+// phase. Missing keys have default values, so "" is the default display.
 enum PfStatus pf_target_from_toml(const char *toml, struct PfTarget **target);
 
-// A display, as in pf_target_from_toml, whose modulator was calibrated as a whole: of 256 levels the one at i shows
-// the phase 2*pi*i/256.
+// Creates the target for a display in TOML whose modulator was calibrated as a whole. There are 256 levels; the level
+// at i displays the phase 2*pi*i/256.
 enum PfStatus pf_target_with_look_up_table(const char *toml,
                                            const uint8_t *levels,
                                            size_t count,
                                            struct PfTarget **target);
 
-// The bytes of a calibration's file, as `phasefront calibrate pack` writes it.
+// Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
 enum PfStatus pf_target_from_bytes(const uint8_t *file, size_t length, struct PfTarget **target);
 
-// A calibration's file.
+// Reads a target from a calibration file.
 enum PfStatus pf_target_from_file(const char *path, struct PfTarget **target);
 
-// Pixels of its modulator.
+// Returns the number of pixels of the modulator along x and y.
 enum PfStatus pf_target_size(const struct PfTarget *target, uint32_t *width, uint32_t *height);
 
-// Ends a target. Sessions and options that were made for it go on.
+// Frees a target. Sessions and options that were created for it are not affected.
 void pf_target_free(struct PfTarget *target);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-//! Camera frames: what lies where in memory.
+//! Camera frames and their layout in memory.
 
 use crate::pointer::{bytes, pick, read};
 use crate::status::Result;
@@ -7,17 +7,17 @@ use phasefront_ffi::{
     Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
 };
 
-/// How a colour image lies in memory.
+/// The memory layout of a colour image.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfColourFormat {
-    /// One plane; bytes red, green, blue, alpha (which is not looked at).
+    /// One plane with the bytes red, green, blue, alpha. Alpha is ignored.
     Rgba = 0,
-    /// One plane; bytes blue, green, red, alpha (which is not looked at).
+    /// One plane with the bytes blue, green, red, alpha. Alpha is ignored.
     Bgra = 1,
-    /// One plane; bytes red, green, blue.
+    /// One plane with the bytes red, green, blue.
     Rgb = 2,
-    /// Two planes: luma; and at half the resolution blue and red chroma side by side.
+    /// Two planes: luma, and interleaved blue and red chroma at half the resolution.
     Nv12 = 3,
     /// Three planes: luma, and at half the resolution blue chroma (U) and red chroma (V). Android's YUV_420_888.
     Yuv420 = 4,
@@ -31,38 +31,38 @@ const COLOUR_FORMATS: [ColourFormat; 5] = [
     ColourFormat::Yuv420,
 ];
 
-/// The matrix between luma, chroma and colour.
+/// The matrix that converts luma and chroma to colour.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfYuvMatrix {
-    /// ITU-R BT.601: standard definition, JPEG, most Android cameras.
+    /// ITU-R BT.601, for standard definition, JPEG and most Android cameras.
     Bt601 = 0,
-    /// ITU-R BT.709: high definition.
+    /// ITU-R BT.709, for high definition.
     Bt709 = 1,
 }
 
 const YUV_MATRICES: [YuvMatrix; 2] = [YuvMatrix::Bt601, YuvMatrix::Bt709];
 
-/// How a depth image lies in memory. But for the normalized ones, 0, negative numbers and what is not finite mean no
-/// reading.
+/// The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
+/// are not finite mean no reading.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfDepthFormat {
-    /// Metres, 32-bit floats.
+    /// Metres as 32-bit floats.
     MetresF32 = 0,
-    /// Metres, 16-bit floats.
+    /// Metres as 16-bit floats.
     MetresF16 = 1,
-    /// Inverse metres, 32-bit floats.
+    /// Inverse metres as 32-bit floats.
     DisparityF32 = 2,
-    /// Inverse metres, 16-bit floats.
+    /// Inverse metres as 16-bit floats.
     DisparityF16 = 3,
-    /// Millimetres, all 16 bits.
+    /// Millimetres in all 16 bits.
     MillimetresU16 = 4,
-    /// Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3.
+    /// Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits.
     AndroidDepth16 = 5,
-    /// 0 nearest to 255 farthest; every pixel is a reading.
+    /// Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
     NormalizedU8 = 6,
-    /// 0 nearest to 65535 farthest; every pixel is a reading.
+    /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16 = 7,
 }
 
@@ -77,29 +77,29 @@ const DEPTH_FORMATS: [DepthFormat; 8] = [
     DepthFormat::NormalizedU16,
 ];
 
-/// How a confidence map lies in memory.
+/// The memory layout of a confidence map.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfConfidenceFormat {
-    /// 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
+    /// 0 low, 1 medium, 2 high, as in ARKit's ARConfidenceLevel.
     LowMediumHigh = 0,
-    /// 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+    /// 0 none to 255 full, as in ARCore's acquireRawDepthConfidenceImage.
     U8 = 1,
 }
 
 const CONFIDENCE_FORMATS: [ConfidenceFormat; 2] = [ConfidenceFormat::LowMediumHigh, ConfidenceFormat::U8];
 
-/// How far a sensor's picture must be turned clockwise to stand upright.
+/// The clockwise rotation that turns a sensor's image upright.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfRotation {
-    /// Not at all.
+    /// No rotation.
     Upright = 0,
     /// A quarter turn.
     Clockwise90 = 1,
     /// Half a turn.
     Half = 2,
-    /// Three quarters.
+    /// Three quarters of a turn.
     Clockwise270 = 3,
 }
 
@@ -110,17 +110,17 @@ const ROTATIONS: [Rotation; 4] = [
     Rotation::Clockwise270,
 ];
 
-/// One plane of an image.
+/// A plane of an image.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfPlane {
-    /// Its first byte; NULL where there is no such plane.
+    /// The first byte; NULL if there is no such plane.
     pub data: *const u8,
-    /// Bytes from there to its end.
+    /// The number of bytes of the plane.
     pub length: usize,
-    /// Bytes from one row to the next.
+    /// The number of bytes from one row to the next.
     pub row_stride: u32,
-    /// Bytes from one pixel to the next in a row.
+    /// The number of bytes from one pixel to the next in a row.
     pub pixel_stride: u32,
 }
 
@@ -128,17 +128,17 @@ pub struct PfPlane {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfColour {
-    /// How it lies in memory: a PfColourFormat.
+    /// The memory layout, a PfColourFormat.
     pub format: u32,
-    /// Pixels along x, as the sensor gives them.
+    /// The width of the sensor's image, in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height of the sensor's image, in pixels.
     pub height: u32,
-    /// A PfYuvMatrix; only formats of luma and chroma look at it.
+    /// The matrix of luma and chroma, a PfYuvMatrix. Other formats ignore it.
     pub matrix: u32,
-    /// Whether luma runs over 16 to 235 and chroma over 16 to 240, not both over 0 to 255; the same.
+    /// Whether luma spans 16 to 235 and chroma 16 to 240 instead of 0 to 255 for both. Other formats ignore it.
     pub video_range: bool,
-    /// Its planes, in the format's order.
+    /// The planes, in the format's order.
     pub planes: [PfPlane; 3],
 }
 
@@ -146,13 +146,13 @@ pub struct PfColour {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfDepth {
-    /// How it lies in memory: a PfDepthFormat.
+    /// The memory layout, a PfDepthFormat.
     pub format: u32,
-    /// Pixels along x, as the sensor gives them.
+    /// The width of the sensor's image, in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height of the sensor's image, in pixels.
     pub height: u32,
-    /// Its plane.
+    /// The plane.
     pub plane: PfPlane,
 }
 
@@ -160,67 +160,67 @@ pub struct PfDepth {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfConfidence {
-    /// How it lies in memory: a PfConfidenceFormat.
+    /// The memory layout, a PfConfidenceFormat.
     pub format: u32,
-    /// Pixels along x: as many as the depth has.
+    /// The width in pixels, equal to the depth image's.
     pub width: u32,
-    /// Pixels along y: as many as the depth has.
+    /// The height in pixels, equal to the depth image's.
     pub height: u32,
-    /// Its plane; without data there is no map.
+    /// The plane. Without data there is no map.
     pub plane: PfPlane,
 }
 
-/// The pinhole model of a camera, in pixels of its image before it is turned upright. The middle of the first pixel is
-/// (0, 0).
+/// The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
+/// pixel is (0, 0).
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfIntrinsics {
-    /// Focal length along x.
+    /// The focal length along x.
     pub fx: f64,
-    /// Focal length along y.
+    /// The focal length along y.
     pub fy: f64,
-    /// x of the principal point.
+    /// The x of the principal point.
     pub cx: f64,
-    /// y of the principal point.
+    /// The y of the principal point.
     pub cy: f64,
 }
 
-/// How the depth camera and the colour camera stand to each other: a point p of the depth camera (x right, y down, z
-/// forward) is at R*p + t for the colour camera.
+/// The intrinsics and the relative pose of the depth camera and the colour camera. A point p of the depth camera (x
+/// right, y down, z forward) is at R*p + t of the colour camera.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfCameras {
-    /// Of the colour image.
+    /// The intrinsics of the colour camera.
     pub colour: PfIntrinsics,
-    /// Of the depth image.
+    /// The intrinsics of the depth camera.
     pub depth: PfIntrinsics,
-    /// R, row by row; 1, 0, 0, 0, 1, 0, 0, 0, 1 for cameras that look one way.
+    /// R, row by row; 1, 0, 0, 0, 1, 0, 0, 0, 1 for cameras with the same orientation.
     pub rotation: [f64; 9],
-    /// t, metres.
+    /// t, in metres.
     pub translation_m: [f64; 3],
 }
 
-/// A frame: colour, depth, and how they belong together. Start from zeros.
+/// A frame: colour, depth, and their relation. Initialize it with zeros.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfFrame {
-    /// When it was taken, in nanoseconds of any clock that runs forward.
+    /// The time at which the frame was taken, in nanoseconds of any clock that runs forward.
     pub timestamp_ns: u64,
     /// The colour image.
     pub colour: PfColour,
     /// The depth image.
     pub depth: PfDepth,
-    /// The confidence map of the depth.
+    /// The confidence map of the depth image.
     pub confidence: PfConfidence,
-    /// How all must be turned to stand upright: a PfRotation.
+    /// The clockwise rotation that turns all images upright, a PfRotation.
     pub rotation: u32,
-    /// Whether left and right are exchanged after the turn, as front cameras need.
+    /// Whether left and right are exchanged after the rotation, as front cameras need.
     pub mirrored: bool,
-    /// NULL where depth and colour show the same field of view.
+    /// The cameras; NULL if depth and colour have the same field of view.
     pub cameras: *const PfCameras,
 }
 
-/// The memory of a frame, and what it is.
+/// The memory and the description of a frame.
 pub(crate) struct Taken<'a> {
     pub(crate) colour: [&'a [u8]; 3],
     pub(crate) depth: &'a [u8],
@@ -230,20 +230,22 @@ pub(crate) struct Taken<'a> {
 
 impl PfFrame {
     /// # Safety
-    /// Its planes and cameras are NULL, or valid as long as `self`.
+    /// The planes and cameras are NULL, or valid as long as `self`.
     pub(crate) unsafe fn take(&self) -> Result<Taken<'_>> {
         // SAFETY: the caller's promise, here and below.
         let memory = |plane: &PfPlane, name: &str| unsafe { bytes(plane.data, plane.length, name) };
         let [luma, chroma, chroma_v] = &self.colour.planes;
         let planes = (self.colour.planes.iter()).take_while(|plane| !plane.data.is_null());
-        let confidence = match self.confidence.plane.data.is_null() {
-            true => None,
-            false => Some(self.confidence.info()?),
+        let confidence = if self.confidence.plane.data.is_null() {
+            None
+        } else {
+            Some(self.confidence.info()?)
         };
-        let cameras = match self.cameras.is_null() {
-            true => None,
+        let cameras = if self.cameras.is_null() {
+            None
+        } else {
             // SAFETY: as above.
-            false => Some(unsafe { read(self.cameras, "cameras") }?.into()),
+            Some(unsafe { read(self.cameras, "cameras") }?.into())
         };
         Ok(Taken {
             colour: [
@@ -324,7 +326,7 @@ mod tests {
     use super::*;
     use std::fmt::Debug;
 
-    /// What C calls a number is what it is here.
+    /// Checks that a number has the same name in C and here.
     fn same(ours: &[&dyn Debug], theirs: &[&dyn Debug]) {
         let names = |all: &[&dyn Debug]| all.iter().map(|one| format!("{one:?}")).collect::<Vec<_>>();
         assert_eq!(names(ours), names(theirs));

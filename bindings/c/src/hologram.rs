@@ -8,21 +8,21 @@ use std::sync::Arc;
 /// The hologram of one frame: modulator levels of its colours.
 pub struct PfHologram(pub(crate) Arc<RawHologram>);
 
-/// How long each stage of a frame took, milliseconds.
+/// The time that each stage of a frame took, in milliseconds.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfFrameTimes {
-    /// Colour to amplitudes of the display's resolution.
+    /// Rotating, converting and resizing the colour image.
     pub colour_ms: f64,
-    /// Depth to normalized depth of the display's resolution.
+    /// Reading, aligning, temporally smoothing and refining the depth.
     pub depth_ms: f64,
-    /// The midpoint hologram.
+    /// Computing the midpoint hologram from the frame.
     pub method_ms: f64,
-    /// From the midpoint to the modulator.
+    /// Propagating from the midpoint to the modulator.
     pub propagate_ms: f64,
-    /// From the field to levels.
+    /// Encoding the field into levels.
     pub encode_ms: f64,
-    /// All together.
+    /// The sum of all stages.
     pub total_ms: f64,
 }
 
@@ -39,106 +39,106 @@ impl From<FrameTimes> for PfFrameTimes {
     }
 }
 
-/// What is known of a hologram.
+/// The properties of a hologram.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfHologramInfo {
-    /// The frame's timestamp.
+    /// The timestamp of the frame.
     pub timestamp_ns: u64,
-    /// Pixels along x.
+    /// The width in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height in pixels.
     pub height: u32,
-    /// How many colours its levels have: 3, or 1 for a display of one laser.
+    /// The number of colours of the levels: 3, or 1 for a display with one laser.
     pub colours: u32,
-    /// The quality level that it was made at, 0 the best.
+    /// The quality level of the hologram; 0 is the best.
     pub quality_level: u32,
-    /// The amplitude that full light stands for.
+    /// The amplitude that maps to full light.
     pub scale: f32,
-    /// Metres at the near end of the volume; NaN for normalized depth.
+    /// The distance of the near end of the volume in metres; NaN for normalized depth.
     pub near_m: f32,
-    /// Metres at the far end of the volume; NaN for normalized depth.
+    /// The distance of the far end of the volume in metres; NaN for normalized depth.
     pub far_m: f32,
     /// The share of the depth sensor's pixels that had a usable reading.
     pub valid_depth: f32,
-    /// How long each stage took.
+    /// The time that each stage took.
     pub times: PfFrameTimes,
 }
 
-/// How the levels of the colours lie in images for a modulator's driver.
+/// The arrangement of the colours' levels in images for a modulator's driver.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfLayout {
-    /// One image, bytes red, green, blue.
+    /// One image with bytes red, green, blue.
     Rgb = 0,
-    /// One image, bytes red, green, blue, alpha 255.
+    /// One image with bytes red, green, blue, alpha 255.
     Rgba = 1,
-    /// One image, bytes blue, green, red, alpha 255.
+    /// One image with bytes blue, green, red, alpha 255.
     Bgra = 2,
-    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
+    /// One image for each colour in the order red, green, blue, with one byte for each pixel.
     Grey = 3,
 }
 
 const LAYOUTS: [Layout; 4] = [Layout::Rgb, Layout::Rgba, Layout::Bgra, Layout::Grey];
 
-/// How a hologram is put on its modulator.
+/// The placement of a hologram on its modulator.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfPlacement {
-    /// How colours lie in images: a PfLayout.
+    /// The arrangement of colours in images, a PfLayout.
     pub layout: u32,
-    /// Whether left and right are exchanged, of the whole image.
+    /// Whether the whole image is flipped left to right.
     pub flip_x: bool,
-    /// Whether top and bottom are exchanged, of the whole image.
+    /// Whether the whole image is flipped top to bottom.
     pub flip_y: bool,
-    /// How many pixels to the right of the middle the hologram stands, before flips.
+    /// The hologram's shift to the right of the middle in pixels, before flips.
     pub shift_x: i32,
-    /// How many pixels below the middle it stands, before flips.
+    /// The hologram's shift below the middle in pixels, before flips.
     pub shift_y: i32,
 }
 
-/// An image, row by row without gaps.
+/// An image without gaps between rows.
 pub struct PfImage(Arc<RawImage>);
 
-/// What an image is.
+/// The memory and size of an image.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfImageInfo {
-    /// Its first byte. Valid until pf_image_free.
+    /// The first byte. It is valid until pf_image_free.
     pub data: *const u8,
-    /// How many bytes lie there.
+    /// The number of bytes.
     pub length: usize,
-    /// Pixels along x.
+    /// The width in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height in pixels.
     pub height: u32,
-    /// Bytes of a pixel.
+    /// The number of bytes of a pixel.
     pub pixel_bytes: u32,
 }
 
 /// Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
 pub struct PfPlanes(Arc<RawPlanes>);
 
-/// What planes are.
+/// The memory and size of planes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfPlanesInfo {
-    /// The first plane's first number, row by row without gaps; the planes of the other colours follow it. Valid until
-    /// pf_planes_free.
+    /// The first number of the first plane. There are no gaps between rows, and the planes of the other colours follow.
+    /// It is valid until pf_planes_free.
     pub data: *const f32,
-    /// How many numbers lie there.
+    /// The number of numbers.
     pub length: usize,
-    /// Pixels along x.
+    /// The width in pixels.
     pub width: u32,
-    /// Pixels along y.
+    /// The height in pixels.
     pub height: u32,
-    /// How many planes there are: 3, or 1 of a display of one laser.
+    /// The number of planes: 3, or 1 for a display with one laser.
     pub colours: u32,
-    /// Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.
+    /// The number of numbers of a pixel: 1 for an amplitude, 2 for a real and an imaginary part.
     pub numbers: u32,
 }
 
-/// What is known of a hologram.
+/// Returns the properties of a hologram.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mut PfHologramInfo) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -161,8 +161,8 @@ pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mu
     })
 }
 
-/// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one laser.
-/// The colours follow one another without gaps, too. Valid until pf_hologram_free.
+/// Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a byte;
+/// there are no gaps between rows or between colours. The address is valid until pf_hologram_free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_levels(
     hologram: *const PfHologram,
@@ -181,15 +181,15 @@ pub unsafe extern "C" fn pf_hologram_levels(
     })
 }
 
-/// z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, mm: where to focus when it is
-/// tapped on.
+/// Returns the z in mm of the scene point at (x, y) of the picture, for example to focus where the user taps.
+/// Coordinates run from 0 to 1 from the upper left corner.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_z_at(hologram: *const PfHologram, x: f64, y: f64, z_mm: *mut f64) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe { give(z_mm, "z_mm", || read(hologram, "hologram")?.0.z_at(x, y)) })
 }
 
-/// What an eye focused at z sees, 4 bytes a pixel: red, green, blue, 255.
+/// Creates the view of an eye focused at z, with 4 bytes for each pixel: red, green, blue, 255.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_preview(
     hologram: *const PfHologram,
@@ -207,8 +207,8 @@ pub unsafe extern "C" fn pf_hologram_preview(
     })
 }
 
-/// What an eye focused at z sees of the whole hologram: amplitudes, of which 1 is white. It transforms all of it: not
-/// for every frame. A z too far away is refused.
+/// Creates the view of an eye focused at z at full resolution, as amplitudes where 1 is white. This transforms the
+/// whole hologram; do not use it for every frame. A z too far away is refused.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_refocus(
     hologram: *const PfHologram,
@@ -223,8 +223,9 @@ pub unsafe extern "C" fn pf_hologram_refocus(
     })
 }
 
-/// The complex field that the levels make behind the aperture at z, 0 the midpoint, without the carrier: real and
-/// imaginary part of each pixel. It transforms all of the hologram: not for every frame. A z too far away is refused.
+/// Creates the complex field that the levels produce behind the aperture at z, where 0 is the midpoint: the real and
+/// the imaginary part of each pixel. The carrier is left out. This transforms the whole hologram; do not use it for
+/// every frame. A z too far away is refused.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_field(
     hologram: *const PfHologram,
@@ -239,7 +240,7 @@ pub unsafe extern "C" fn pf_hologram_field(
     })
 }
 
-/// What planes are, and where they lie.
+/// Returns the memory and size of planes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_planes_info(planes: *const PfPlanes, info: *mut PfPlanesInfo) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -260,15 +261,15 @@ pub unsafe extern "C" fn pf_planes_info(planes: *const PfPlanes, info: *mut PfPl
     })
 }
 
-/// Ends planes.
+/// Frees planes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_planes_free(planes: *mut PfPlanes) {
     // SAFETY: the rules of this border.
     unsafe { free(planes) };
 }
 
-/// Image `number` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in the
-/// upper bits of a byte, the hologram where `placement` says.
+/// Creates image `number` of those that the modulator's driver takes, at the modulator's resolution. It contains the
+/// levels in the upper bits of a byte; `placement` positions the hologram.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_output(
     hologram: *const PfHologram,
@@ -293,14 +294,14 @@ pub unsafe extern "C" fn pf_hologram_output(
     })
 }
 
-/// Ends a hologram; its memory goes back to its session.
+/// Frees a hologram. Its memory returns to its session.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_free(hologram: *mut PfHologram) {
     // SAFETY: the rules of this border.
     unsafe { free(hologram) };
 }
 
-/// What an image is, and where it lies.
+/// Returns the memory and size of an image.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_image_info(image: *const PfImage, info: *mut PfImageInfo) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -318,7 +319,7 @@ pub unsafe extern "C" fn pf_image_info(image: *const PfImage, info: *mut PfImage
     })
 }
 
-/// Ends an image.
+/// Frees an image.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_image_free(image: *mut PfImage) {
     // SAFETY: the rules of this border.

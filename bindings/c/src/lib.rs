@@ -1,10 +1,10 @@
-//! Phasefront for C, and for what speaks C: C++, C#, Unity, Unreal, Flutter, Qt. It only translates to
-//! `phasefront-ffi`, which serves the other languages. `include/phasefront.h` is made from here by cbindgen, and says
-//! the rules of this border. What is a number in C is checked before it is an enum here.
+//! Phasefront for C, and for languages and frameworks that call C: C++, C#, Unity, Unreal, Flutter, Qt. This crate only
+//! translates calls to `phasefront-ffi`, which serves the other languages. cbindgen generates `include/phasefront.h`
+//! from this crate; the header states the rules. Numbers of C are checked before they become enums.
 //!
 //! # Safety
-//! Of every call: pointers are NULL, which is refused, or point to what their type says, as many of it as the length
-//! beside them says, for as long as the call takes; objects were given by this library and are not yet freed.
+//! In every call, pointers are NULL, which is refused, or they point to as many values of their type as the length
+//! beside them states, for the duration of the call. Objects were created by this library and are not yet freed.
 #![allow(clippy::missing_safety_doc)]
 
 mod frame;

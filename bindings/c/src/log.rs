@@ -1,4 +1,4 @@
-//! Log messages of the library, to whoever listens.
+//! Log messages of the library.
 
 use crate::pointer::pick;
 use crate::status::{PfStatus, c_text, call};
@@ -6,15 +6,15 @@ use phasefront_ffi::{ListenerError, LogLevel, LogListener, set_log_listener};
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
-/// How much a message matters.
+/// The severity of a log message.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfLogLevel {
-    /// What went wrong.
+    /// An error.
     Error = 0,
-    /// What looks wrong.
+    /// Something that may be wrong.
     Warning = 1,
-    /// What is done.
+    /// An action of the library.
     Info = 2,
     /// Details.
     Debug = 3,
@@ -22,9 +22,9 @@ pub enum PfLogLevel {
 
 const LEVELS: [LogLevel; 4] = [LogLevel::Error, LogLevel::Warning, LogLevel::Info, LogLevel::Debug];
 
-/// Hears log messages, on any thread. The message ends with the call. It may call the library, but where a session
-/// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview
-/// are refused there.
+/// A receiver of log messages, which is called on any thread. The message is valid during the call. The receiver may
+/// call the library. On a thread that computes for a session it cannot wait for a frame: pf_session_process,
+/// pf_session_warm_up and pf_hologram_preview are refused.
 pub type PfOnLog = Option<unsafe extern "C" fn(context: *mut c_void, level: PfLogLevel, message: *const c_char)>;
 
 struct Listener {
@@ -32,7 +32,7 @@ struct Listener {
     on_log: unsafe extern "C" fn(*mut c_void, PfLogLevel, *const c_char),
 }
 
-// SAFETY: whoever listens says that the context may be used on any thread.
+// SAFETY: the caller of pf_set_log_listener promises that the context may be used on any thread.
 unsafe impl Send for Listener {}
 // SAFETY: the same.
 unsafe impl Sync for Listener {}
@@ -52,8 +52,9 @@ impl LogListener for Listener {
     }
 }
 
-/// Sends messages of `level`, a PfLogLevel, and above to `on_log`; NULL for silence. A call on another thread that is
-/// under way when this returns still has the `context` of before, so let each context live as long as the process.
+/// Sends messages of `level`, a PfLogLevel, and above to `on_log`. With NULL, no messages are sent. A call on another
+/// thread that is in progress when this returns still uses the previous `context`, so each context must live as long as
+/// the process.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_set_log_listener(level: u32, on_log: PfOnLog, context: *mut c_void) -> PfStatus {
     call(|| {

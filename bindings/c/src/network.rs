@@ -1,4 +1,4 @@
-//! Networks: built in, from a file, or from bytes.
+//! Built-in networks, and networks from files or bytes.
 
 use crate::pointer::{bytes, free, give, object, text};
 use crate::status::{PfStatus, call};
@@ -6,14 +6,14 @@ use phasefront_ffi::Network;
 use std::ffi::c_char;
 use std::sync::Arc;
 
-/// A hologram network or a pre-filter. Immutable; one serves many sessions.
+/// A hologram network or a pre-filter. It is immutable and can be used by several sessions.
 pub struct PfNetwork(pub(crate) Arc<Network>);
 
 fn given(network: Arc<Network>) -> *mut PfNetwork {
     object(PfNetwork(network))
 }
 
-/// A network in int8 that is bundled, by name, as "rgbd-8".
+/// Creates the bundled int8 network of a name, such as "rgbd-8".
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_network_built_in(name: *const c_char, network: *mut *mut PfNetwork) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -24,7 +24,7 @@ pub unsafe extern "C" fn pf_network_built_in(name: *const c_char, network: *mut 
     })
 }
 
-/// The bytes of an ONNX file.
+/// Reads a network from the bytes of an ONNX file.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_network_from_bytes(
     onnx: *const u8,
@@ -39,7 +39,7 @@ pub unsafe extern "C" fn pf_network_from_bytes(
     })
 }
 
-/// An ONNX file.
+/// Reads a network from an ONNX file.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_network_from_file(path: *const c_char, network: *mut *mut PfNetwork) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn pf_network_from_file(path: *const c_char, network: *mut
     })
 }
 
-/// Ends a network. Sessions and options that take it go on.
+/// Frees a network. Sessions and options that use it are not affected.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_network_free(network: *mut PfNetwork) {
     // SAFETY: the rules of this border.

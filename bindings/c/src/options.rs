@@ -1,4 +1,4 @@
-//! What a session makes, and how.
+//! The options of a session.
 
 use crate::network::PfNetwork;
 use crate::pointer::{change, free, give, object, pick, read};
@@ -8,51 +8,52 @@ use phasefront_ffi::{
     Backend, Brightness, DepthRange, Encoding, Method, PhasefrontError, QualityLevel, SessionOptions, session_options,
 };
 
-/// What makes holograms.
+/// The method that computes holograms.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfMethod {
-    /// The network that is built in, or the plane sweep where it was not trained for the display.
+    /// The built-in network, or the plane sweep if that network was not trained for the display.
     Default = 0,
     /// A trained network.
     Trained = 1,
-    /// The plane sweep, for any display: slower, and nothing needs to be trained.
+    /// The plane sweep, which suits any display. It is slower and needs no training.
     Sweep = 2,
-    /// For each frame what suits its depth: the plane sweep where it is clean, the network where it is noisy.
+    /// The plane sweep for frames with clean depth, and the network for frames with noisy or incomplete depth.
     Auto = 3,
 }
 
-/// Where frames are computed.
+/// The backend that computes frames.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfBackend {
-    /// On the CPU.
+    /// Computes on the CPU.
     Cpu = 0,
-    /// On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
+    /// Computes on the GPU if this library was built with GPU support, a GPU exists and its results agree with the
+    /// CPU's; otherwise on the CPU.
     Gpu = 1,
 }
 
 const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
 
-/// One quality: a method, a resolution, and how the displayed image is corrected.
+/// A quality level: a method, a resolution and the number of correction steps.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfQualityLevel {
-    /// A PfMethod but for PF_METHOD_DEFAULT.
+    /// The method, a PfMethod except PF_METHOD_DEFAULT.
     pub method: u32,
-    /// Of PF_METHOD_TRAINED and PF_METHOD_AUTO; else NULL.
+    /// The network of PF_METHOD_TRAINED and PF_METHOD_AUTO; otherwise NULL.
     pub network: *const PfNetwork,
-    /// Width of the hologram, pixels.
+    /// The width of the hologram in pixels.
     pub width: u32,
-    /// Height of the hologram, pixels.
+    /// The height of the hologram in pixels.
     pub height: u32,
-    /// Local steps of this quality level; below 0 the session's.
+    /// The number of local steps; negative for the session's number.
     pub local_steps: i32,
-    /// Steps at the midpoint of this quality level; below 0 the session's.
+    /// The number of steps at the midpoint; negative for the session's number.
     pub midpoint_steps: i32,
 }
 
-/// What a session makes, and how.
+/// The options of a session.
 pub struct PfOptions(pub(crate) SessionOptions);
 
 /// # Safety
@@ -69,8 +70,8 @@ unsafe fn method_of(method: u32, network: *const PfNetwork) -> Result<Option<Met
     })
 }
 
-/// The default options for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for
-/// those that take one, else NULL.
+/// Creates the default options for `target`: holograms at its modulator's resolution by `method`, a PfMethod. `network`
+/// is the method's network, or NULL for methods without one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_new(
     target: *const PfTarget,
@@ -87,7 +88,7 @@ pub unsafe extern "C" fn pf_options_new(
     })
 }
 
-/// Ends options. Sessions that were made by them go on.
+/// Frees options. Sessions that were created from them are not affected.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_free(options: *mut PfOptions) {
     // SAFETY: the rules of this border.
@@ -113,14 +114,14 @@ unsafe fn set(options: *mut PfOptions, how: impl FnOnce(&mut SessionOptions)) ->
     }
 }
 
-/// Removes all quality levels; push at least one afterwards.
+/// Removes all quality levels. Push at least one afterwards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_clear_quality_levels(options: *mut PfOptions) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.quality_levels.clear()) }
 }
 
-/// Adds a quality level, below those that are there; a session takes 16 at most.
+/// Adds a quality level below the existing ones. A session takes at most 16.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_push_quality_level(
     options: *mut PfOptions,
@@ -147,7 +148,8 @@ pub unsafe extern "C" fn pf_options_push_quality_level(
     }
 }
 
-/// Frames a second that are aimed at; 0 takes every frame and never changes the quality level.
+/// Sets the target rate in frames per second. With 0, a session takes every frame and does not adapt its quality level
+/// to frame times.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_target_rate_hz(options: *mut PfOptions, rate_hz: f64) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -165,28 +167,31 @@ unsafe fn encode(options: *mut PfOptions, encoding: Encoding) -> PfStatus {
     unsafe { set(options, |options| options.encoding = encoding) }
 }
 
-/// Encodes by double phase on the field as it is.
+/// Selects double phase of the unchanged field.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_double_phase(options: *mut PfOptions) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { encode(options, Encoding::DoublePhase) }
 }
 
-/// Encodes behind a small Gaussian blur of `sigma` pixels, `width` taps (AA-DPM); 0.7 and 3 as published.
+/// Selects double phase after a small Gaussian blur of `sigma` pixels with `width` taps (AA-DPM); 0.7 and 3 in the
+/// paper.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_anti_alias(options: *mut PfOptions, sigma: f32, width: u32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { encode(options, Encoding::AntiAlias { sigma, width }) }
 }
 
-/// Encodes with high diagonal frequencies cut (BL-DPM): the bound of |tan(pi*fx)*tan(pi*fy)|; 1 as published.
+/// Selects double phase after a filter that removes high diagonal frequencies (BL-DPM). `k` is the bound of
+/// |tan(pi*fx)*tan(pi*fy)|; 1 in the paper.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_band_limit(options: *mut PfOptions, k: f32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { encode(options, Encoding::BandLimit { k }) }
 }
 
-/// Encodes behind a pre-filter network (DDPM), trained for the display's offset together with the hologram network.
+/// Selects double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
+/// offset of the display.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_deep(options: *mut PfOptions, prefilter: *const PfNetwork) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -206,52 +211,54 @@ unsafe fn brighten(options: *mut PfOptions, brightness: Brightness) -> PfStatus 
     unsafe { set(options, |options| options.brightness = brightness) }
 }
 
-/// Full light stands near the frame's largest amplitude, moving smoothly from frame to frame. The default.
+/// Maps an amplitude near the frame's largest to full light. It changes smoothly from frame to frame. This is the
+/// default.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_brightness_smoothed(options: *mut PfOptions) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { brighten(options, Brightness::Smoothed) }
 }
 
-/// Full light stands for the amplitude `scale`; what is brighter is clipped.
+/// Maps the amplitude `scale` to full light. Larger amplitudes are clipped.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_brightness_fixed(options: *mut PfOptions, scale: f32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { brighten(options, Brightness::Fixed { scale }) }
 }
 
-/// Full light stands for the frame's largest amplitude.
+/// Maps the frame's largest amplitude to full light.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_brightness_frame_max(options: *mut PfOptions) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { brighten(options, Brightness::FrameMax) }
 }
 
-/// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
-/// the dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
+/// Sets the share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark
+/// areas. The encoding's default is 0.4, and 0 with a pre-filter.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_dark_threshold(options: *mut PfOptions, threshold: f32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.dark_threshold = Some(threshold)) }
 }
 
-/// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted. Not set, they
-/// suit the encoding: 1, and 0 with a pre-filter.
+/// Sets the number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. The
+/// encoding's default is 1, and 0 with a pre-filter.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_local_steps(options: *mut PfOptions, steps: u32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.local_steps = Some(steps)) }
 }
 
-/// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
-/// video, where it goes on from the frame before.
+/// Sets the number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
+/// stills; 1 suits video, where each frame continues from the previous one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_midpoint_steps(options: *mut PfOptions, steps: u32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.midpoint_steps = steps) }
 }
 
-/// Shows these metres at the ends of the volume. Not set, they are the 1st and 99th percentile of the readings.
+/// Sets the distances, in metres, that map to the ends of the volume. The default is the 1st and 99th percentile of the
+/// readings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_depth_range(options: *mut PfOptions, near_m: f32, far_m: f32) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -262,29 +269,29 @@ pub unsafe extern "C" fn pf_options_set_depth_range(options: *mut PfOptions, nea
     }
 }
 
-/// Readings less sure than this, in 0 to 1, are none. ARKit's "low" is 0, "medium" 0.5, "high" 1.
+/// Sets the confidence, in 0 to 1, below which readings are ignored. ARKit's "low" is 0, "medium" 0.5, "high" 1.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_least_confidence(options: *mut PfOptions, confidence: f32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.least_confidence = confidence) }
 }
 
-/// Threads to compute with, 1 to 256. Not set, as many as the device has.
+/// Sets the number of threads to compute with, 1 to 256. The default is as many as the device has.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_threads(options: *mut PfOptions, threads: u32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.threads = Some(threads)) }
 }
 
-/// Most pixels of a quality level and of the modulator, 8192x4096 unless it is set: what a session allocates is a
-/// multiple.
+/// Sets the maximum number of pixels of a quality level and of the modulator; 8192x4096 by default. The memory of a
+/// session is a multiple of it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_most_pixels(options: *mut PfOptions, pixels: u64) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { set(options, |options| options.most_pixels = pixels) }
 }
 
-/// Where frames are computed: a PfBackend.
+/// Sets the backend that computes frames, a PfBackend.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_backend(options: *mut PfOptions, backend: u32) -> PfStatus {
     // SAFETY: the rules of this border.

@@ -1,4 +1,4 @@
-//! What C points at, checked as far as a pointer can be.
+//! Access to memory that C points at. Pointers are checked as far as possible.
 
 use crate::status::Result;
 use phasefront_ffi::{PhasefrontError, guard};
@@ -8,7 +8,7 @@ fn null(name: &str) -> PhasefrontError {
     PhasefrontError::Setting(format!("{name} is NULL; point it at what the call takes"))
 }
 
-/// What `pointer` points at.
+/// Returns the value that `pointer` points at.
 ///
 /// # Safety
 /// It is NULL, or valid for reads as long as `'a`.
@@ -17,19 +17,19 @@ pub(crate) unsafe fn read<'a, T>(pointer: *const T, name: &str) -> Result<&'a T>
     unsafe { pointer.as_ref() }.ok_or_else(|| null(name))
 }
 
-/// What `pointer` points at, to be changed.
+/// Returns the value that `pointer` points at, to be changed.
 ///
 /// # Safety
-/// It is NULL, or valid for reads and writes as long as `'a`, by nobody else.
+/// It is NULL, or valid for reads and writes as long as `'a`, and nobody else uses it.
 pub(crate) unsafe fn change<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut T> {
     // SAFETY: the caller's promise.
     unsafe { pointer.as_mut() }.ok_or_else(|| null(name))
 }
 
-/// Writes what `make` gives to `to`; nothing is made where there is no place for it.
+/// Writes the result of `make` to `to`. If `to` is NULL, `make` is not called.
 ///
 /// # Safety
-/// `to` is NULL, or valid for a write; what lies there before need not be initialized.
+/// `to` is NULL, or valid for a write. Its memory need not be initialized.
 pub(crate) unsafe fn give<T>(to: *mut T, name: &str, make: impl FnOnce() -> Result<T>) -> Result<()> {
     if to.is_null() {
         return Err(null(name));
@@ -40,18 +40,18 @@ pub(crate) unsafe fn give<T>(to: *mut T, name: &str, make: impl FnOnce() -> Resu
     Ok(())
 }
 
-/// An object that is the caller's until [`free`].
+/// Creates an object that belongs to the caller until [`free`].
 pub(crate) fn object<T>(value: T) -> *mut T {
     Box::into_raw(Box::new(value))
 }
 
-/// Ends an object.
+/// Frees an object.
 ///
 /// # Safety
-/// It is NULL, or was given by [`object`] and not freed before.
+/// It is NULL, or was created by [`object`] and not freed before.
 pub(crate) unsafe fn free<T>(pointer: *mut T) {
     if !pointer.is_null() {
-        // SAFETY: the caller's promise. What its end does wrong stays here.
+        // SAFETY: the caller's promise. A panic of its destructor ends here.
         let value = unsafe { Box::from_raw(pointer) };
         let _ = guard(|| {
             drop(value);
@@ -60,7 +60,7 @@ pub(crate) unsafe fn free<T>(pointer: *mut T) {
     }
 }
 
-/// The bytes at `data`; none at NULL where there are none.
+/// Returns the bytes at `data`; none if it is NULL and there are none.
 ///
 /// # Safety
 /// It is NULL, or valid for `length` bytes as long as `'a`.
@@ -76,7 +76,7 @@ pub(crate) unsafe fn bytes<'a>(data: *const u8, length: usize, name: &str) -> Re
     }
 }
 
-/// The text at `text`.
+/// Returns the text at `text`.
 ///
 /// # Safety
 /// It is NULL, or points at bytes that end with a zero and live as long as `'a`.
@@ -90,7 +90,7 @@ pub(crate) unsafe fn text<'a>(text: *const c_char, name: &str) -> Result<&'a str
         .map_err(|_| PhasefrontError::Setting(format!("{name} is no UTF-8; give it as that")))
 }
 
-/// The one of `all` that C calls `number`.
+/// Returns the one of `all` that has `number` in C.
 pub(crate) fn pick<T: Copy>(all: &[T], number: u32, name: &str) -> Result<T> {
     all.get(number as usize).copied().ok_or_else(|| {
         PhasefrontError::Setting(format!(

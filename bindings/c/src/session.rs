@@ -1,4 +1,4 @@
-//! Sessions: frames in, holograms out.
+//! Sessions, which turn frames into holograms.
 
 use crate::frame::PfFrame;
 use crate::hologram::{PfFrameTimes, PfHologram};
@@ -12,53 +12,53 @@ use phasefront_ffi::{
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
-/// How a session runs; fixed when it is made.
+/// The running mode of a session. It is fixed when the session is created.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfRunningMode {
-    /// Each frame is answered by itself.
+    /// The session answers each frame independently of all others.
     Image = 0,
-    /// Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
+    /// The session answers each frame, and smooths depth and brightness over time. Timestamps must increase.
     Video = 1,
-    /// Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+    /// The app submits frames without waiting, and the listener receives the outcome of each. Timestamps must increase.
     Live = 2,
 }
 
 const RUNNING_MODES: [RunningMode; 3] = [RunningMode::Image, RunningMode::Video, RunningMode::Live];
 
-/// How hot the device is, as its system says.
+/// The thermal state of the device as reported by its system.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfThermal {
-    /// Not warm: nothing is limited.
+    /// The device is not warm; nothing is limited.
     Nominal = 0,
-    /// Warm: frames may take a little less time.
+    /// The device is warm; frames may take a little less time.
     Fair = 1,
-    /// Hot: half the time.
+    /// The device is hot; frames may take half the time.
     Serious = 2,
-    /// Too hot: the lowest quality level.
+    /// The device is too hot; the session uses the lowest quality level.
     Critical = 3,
 }
 
 const THERMALS: [Thermal; 4] = [Thermal::Nominal, Thermal::Fair, Thermal::Serious, Thermal::Critical];
 
-/// Why a frame was not made into a hologram, without fault.
+/// The reason why a session dropped a frame without an error.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfDropReason {
-    /// It was not dropped.
+    /// The frame was not dropped.
     Not = 0,
-    /// A newer frame came while it waited.
+    /// A newer frame arrived while this one waited.
     Superseded = 1,
-    /// It came sooner than the target rate asks for.
+    /// The frame arrived sooner than the target rate allows.
     AboveTargetRate = 2,
     /// The session was paused.
     Paused = 3,
-    /// The session was reset before it was done.
+    /// The session was reset before the frame was finished.
     Reset = 4,
-    /// The session was closed before it was done.
+    /// The session was closed before the frame was finished.
     Closed = 5,
-    /// For a reason that this version does not know.
+    /// A reason that this version does not know.
     Other = 6,
 }
 
@@ -75,22 +75,22 @@ impl From<DropReason> for PfDropReason {
     }
 }
 
-/// Why a session changed its quality.
+/// The reason why a session changed its quality level.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfQualityReason {
     /// Frames took longer than the target rate allows.
     TooSlow = 0,
-    /// There was room for more.
+    /// There was time left.
     Room = 1,
     /// The device is hot.
     Thermal = 2,
-    /// The caller said so.
+    /// The app asked for it.
     Asked = 3,
-    /// The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+    /// The next quality level cannot be planned. The session keeps the previous one and does not try the next one
     /// again.
     Refused = 4,
-    /// For a reason that this version does not know.
+    /// A reason that this version does not know.
     Other = 5,
 }
 
@@ -98,11 +98,11 @@ pub enum PfQualityReason {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfQualityChange {
-    /// The quality level before.
+    /// The previous quality level.
     pub from_quality_level: u32,
-    /// The quality level now; the one before where the step was refused.
+    /// The new quality level; the previous one if the reason is PF_QUALITY_REASON_REFUSED.
     pub to_quality_level: u32,
-    /// Why.
+    /// The reason.
     pub reason: PfQualityReason,
 }
 
@@ -123,36 +123,36 @@ impl From<QualityChange> for PfQualityChange {
     }
 }
 
-/// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
-/// order in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No
-/// exception may leave a call.
+/// A receiver of the events of a live session. Calls arrive one after another, on the session's own thread, in the
+/// order of the events. No frame is processed while the listener is busy. A function that is NULL is not called.
+/// Functions must not throw exceptions.
 ///
-/// `context` must live until on_closed was called; that call may free it. Where pf_session_new fails, no call is made,
-/// and the context is the caller's.
+/// `context` must live until on_closed is called, which may free it. If pf_session_new fails, no function is called and
+/// the context still belongs to the caller.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PfListener {
-    /// Given to each call.
+    /// The first argument of each function.
     pub context: *mut c_void,
-    /// A frame became a hologram, which is the listener's until pf_hologram_free.
+    /// Reports that a frame became a hologram. The listener must free it with pf_hologram_free.
     pub on_processed: Option<unsafe extern "C" fn(context: *mut c_void, hologram: *mut PfHologram)>,
-    /// A frame was dropped.
+    /// Reports that a frame was dropped.
     pub on_dropped: Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, reason: PfDropReason)>,
-    /// A frame could not be processed. The session goes on. The message ends with the call.
+    /// Reports that a frame could not be processed. The session continues. The message is valid during the call.
     pub on_failed: Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, message: *const c_char)>,
-    /// The frames after this one are made at another quality level.
+    /// Reports that the session uses another quality level after the frame of `timestamp_ns`.
     pub on_quality_changed:
         Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, change: PfQualityChange)>,
-    /// The session has ended. This is the last call, made exactly once: before pf_session_free returns, or after it
-    /// where that does not wait.
+    /// Reports that the session is closed. This is the last call. It is made exactly once, before pf_session_free
+    /// returns, or after it if pf_session_free does not wait.
     pub on_closed: Option<unsafe extern "C" fn(context: *mut c_void)>,
 }
 
 struct Listener(PfListener);
 
-// SAFETY: whoever makes a live session says that its context may be used on the session's thread.
+// SAFETY: the caller of pf_session_new promises that the context may be used on the session's thread.
 unsafe impl Send for Listener {}
-// SAFETY: calls come one after another.
+// SAFETY: calls arrive one after another.
 unsafe impl Sync for Listener {}
 
 impl SessionListener for Listener {
@@ -198,31 +198,32 @@ impl SessionListener for Listener {
     }
 }
 
-/// What a session has done so far. Submitted frames are processed, failed, refused, dropped or pending.
+/// The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
+/// pending.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfStatistics {
-    /// Frames that were given to the session.
+    /// Frames that were submitted.
     pub submitted: u64,
     /// Frames that became holograms.
     pub processed: u64,
     /// Frames that could not be processed.
     pub failed: u64,
-    /// Frames that came late.
+    /// Frames that were refused because they were late or the session was closed.
     pub refused: u64,
     /// Frames that were dropped.
     pub dropped: u64,
-    /// Frames that wait or are in flight.
+    /// Frames that wait or are being processed.
     pub pending: u64,
-    /// The quality level, 0 the best.
+    /// The quality level; 0 is the best.
     pub quality_level: u32,
-    /// Holograms a second, of late.
+    /// Holograms per second over the last 30.
     pub rate_hz: f64,
-    /// Mean times, of late.
+    /// The mean times of the stages over the last 30 holograms.
     pub times: PfFrameTimes,
-    /// What computes, as text; cut where it is longer.
+    /// The name of the backend that computes the frames, cut if it is longer.
     pub backend: [c_char; 64],
-    /// Why that.
+    /// The reason for using this backend, cut if it is longer.
     pub backend_why: [c_char; 256],
 }
 
@@ -244,7 +245,7 @@ impl From<Statistics> for PfStatistics {
     }
 }
 
-/// `text` with a zero behind it, cut between two characters where it is too long.
+/// Returns `text` with a zero at its end, cut between two characters if it is too long.
 fn cut<const N: usize>(text: &str) -> [c_char; N] {
     let mut to = [0; N];
     let end = text.floor_char_boundary(N - 1);
@@ -254,12 +255,12 @@ fn cut<const N: usize>(text: &str) -> [c_char; N] {
     to
 }
 
-/// A session. Every call may come from any thread, at any moment, but for pf_session_free, which is the last.
+/// A session. All functions except pf_session_free can be called from any thread at any time.
 pub struct PfSession(Arc<RawSession>);
 
 impl Drop for PfSession {
     fn drop(&mut self) {
-        // It only fails by a fault of ours, which nobody is left to hear of.
+        // It fails only because of a bug of ours, which cannot be reported anywhere.
         let _ = self.0.shut_down();
     }
 }
@@ -271,8 +272,8 @@ unsafe fn with(session: *const PfSession, how: impl FnOnce(&RawSession) -> Resul
     call(|| how(&unsafe { read(session, "session") }?.0))
 }
 
-/// A session that runs in `mode`, a PfRunningMode. A live one needs a `listener`, which is copied; for the others it is
-/// NULL.
+/// Creates a session that runs in `mode`, a PfRunningMode. A live session needs a `listener`, which is copied; for
+/// other sessions it is NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_new(
     options: *const PfOptions,
@@ -293,17 +294,17 @@ pub unsafe extern "C" fn pf_session_new(
     })
 }
 
-/// Takes no more frames, waits until the listener has heard everything, and ends the session. Called by a listener, of
-/// this session or another, or by a log handler while a session computes, it does not wait: on_closed says when the
-/// listener has heard everything. Its holograms live on. It is the last call with this session, and never made during
-/// another one with it.
+/// Closes and frees a session: it accepts no more frames and waits until the listener has received all events. A call
+/// from a listener of any session, or from a log handler while a session computes, does not wait; on_closed then
+/// reports that the listener has received all events. The session's holograms stay valid. This must be the last call
+/// with the session, and no other call with it may be in progress.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_free(session: *mut PfSession) {
     // SAFETY: the rules of this border.
     unsafe { free(session) };
 }
 
-/// The hologram of a frame, in an image or a video session.
+/// Creates the hologram of a frame, in an image or a video session.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_process(
     session: *const PfSession,
@@ -328,8 +329,8 @@ pub unsafe extern "C" fn pf_session_process(
     })
 }
 
-/// Hands a frame to a live session, which copies it and goes on by itself. `dropped` says whether it was dropped at
-/// once, and why; the listener hears of it too.
+/// Submits a frame to a live session, which copies it, without waiting for its hologram. `dropped` receives the reason
+/// if the frame is dropped at once, which the listener receives too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_submit(
     session: *const PfSession,
@@ -354,35 +355,35 @@ pub unsafe extern "C" fn pf_session_submit(
     })
 }
 
-/// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+/// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_warm_up(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { with(session, RawSession::warm_up) }
 }
 
-/// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
+/// Forgets all previous frames, including one that is being processed. The next frame may have any timestamp.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_reset(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { with(session, RawSession::reset) }
 }
 
-/// Takes no frames until pf_session_resume.
+/// Accepts no frames until pf_session_resume.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_pause(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { with(session, RawSession::pause) }
 }
 
-/// Takes frames again.
+/// Accepts frames again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_resume(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { with(session, RawSession::resume) }
 }
 
-/// Says how hot the device is: a PfThermal.
+/// Sets the thermal state of the device, a PfThermal.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_set_thermal(session: *const PfSession, thermal: u32) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -393,22 +394,22 @@ pub unsafe extern "C" fn pf_session_set_thermal(session: *const PfSession, therm
     }
 }
 
-/// Stays at this quality level, 0 the best.
+/// Keeps the session at a quality level; 0 is the best.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_fix_quality_level(session: *const PfSession, quality_level: u32) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { with(session, |session| session.set_quality(Quality::Fixed { quality_level })) }
 }
 
-/// Changes the quality level by itself: down where frames take longer than the target rate allows or the device is hot,
-/// up where there is room.
+/// Lets the session change its quality level: it lowers the level if frames take longer than the target rate allows or
+/// the device is hot, and raises it if there is time left.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_step_by_itself(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe { with(session, |session| session.set_quality(Quality::Adaptive)) }
 }
 
-/// What the session has done so far. Never waits for a frame.
+/// Returns the statistics of a session. Never waits for a frame.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_statistics(session: *const PfSession, statistics: *mut PfStatistics) -> PfStatus {
     // SAFETY: the rules of this border.

@@ -1,30 +1,30 @@
-//! What a call gives: a number, and one line about what went wrong.
+//! The result of a call: a number, and one line about what went wrong.
 
 use phasefront_ffi::{PhasefrontError, guard};
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 
-/// Whether a call did what it says, and else why not.
+/// The result of a call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfStatus {
-    /// It did.
+    /// The call succeeded.
     Ok = 0,
-    /// A display whose physics is impossible or out of range.
+    /// The physics of a display is impossible or out of range.
     Display = 1,
-    /// A frame, plane or image of the wrong shape or with unusable values.
+    /// A frame, plane or image has the wrong shape or unusable values.
     Frame = 2,
-    /// A frame that is not later than the last one. It is refused; what follows is not harmed.
+    /// A frame is not later than the previous one. It is refused; later frames are not affected.
     Timestamp = 3,
-    /// A setting or an argument that cannot be meant or planned for.
+    /// A setting or an argument is invalid or cannot be planned.
     Setting = 4,
-    /// What is not a hologram network, or one for another display.
+    /// A file is not a hologram network, or the network is for another display.
     Network = 5,
-    /// A file that cannot be read.
+    /// A file cannot be read.
     File = 6,
-    /// A call that a session cannot answer in its mode or state.
+    /// A session cannot answer the call in its mode or state.
     Session = 7,
-    /// A fault of Phasefront. The call had no effect, or the frame is lost; please report it.
+    /// Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
     Internal = 8,
 }
 
@@ -34,7 +34,7 @@ thread_local! {
     static LAST: RefCell<CString> = RefCell::default();
 }
 
-/// The status of `body`, its message kept for [`pf_last_error`].
+/// Returns the status of `body`, and keeps its message for [`pf_last_error`].
 pub(crate) fn call(body: impl FnOnce() -> Result<()>) -> PfStatus {
     let Err(error) = guard(body) else {
         return PfStatus::Ok;
@@ -52,19 +52,19 @@ pub(crate) fn call(body: impl FnOnce() -> Result<()>) -> PfStatus {
     }
 }
 
-/// `text` for C; a zero in it would end it early.
+/// Converts `text` for C. Spaces replace zeros in it, which would end it early.
 pub(crate) fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// What was wrong with the last call of this thread that was not PF_STATUS_OK, one line; empty before the first. Valid
-/// until the next such call of this thread.
+/// Returns one line about the last call of this thread that did not return PF_STATUS_OK; an empty line if there was
+/// none. It is valid until the next such call of this thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn pf_last_error() -> *const c_char {
     LAST.with_borrow(|text| text.as_ptr())
 }
 
-/// The version of the library, as "0.1.0". Valid for ever.
+/// Returns the version of the library, such as "0.1.0". It is always valid.
 #[unsafe(no_mangle)]
 pub extern "C" fn pf_version() -> *const c_char {
     const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");

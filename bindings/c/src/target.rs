@@ -1,4 +1,4 @@
-//! What holograms are made for.
+//! The target of holograms.
 
 use crate::pointer::{bytes, free, give, object, read, text};
 use crate::status::{PfStatus, Result, call};
@@ -6,8 +6,8 @@ use phasefront_ffi::{Display, Target, display_from_toml};
 use std::ffi::c_char;
 use std::sync::Arc;
 
-/// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
-/// lasers' light, what corrects its optics. Immutable; one serves many sessions.
+/// The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+/// light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
 pub struct PfTarget(pub(crate) Arc<Target>);
 
 fn given(target: Arc<Target>) -> *mut PfTarget {
@@ -21,16 +21,16 @@ unsafe fn display(toml: *const c_char) -> Result<Display> {
     display_from_toml(unsafe { text(toml, "toml") }?.to_owned())
 }
 
-/// A display with levels in equal steps of phase, in TOML, as "width = 1920\npitch_um = 8.0"; what is left out has the
-/// default value, so "" is the default display.
+/// Creates the target for a display in TOML, such as "width = 1920\npitch_um = 8.0", whose levels are equal steps of
+/// phase. Missing keys have default values, so "" is the default display.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_from_toml(toml: *const c_char, target: *mut *mut PfTarget) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe { give(target, "target", || Ok(given(Target::of_display(display(toml)?)?))) })
 }
 
-/// A display, as in pf_target_from_toml, whose modulator was calibrated as a whole: of 256 levels the one at i shows
-/// the phase 2*pi*i/256.
+/// Creates the target for a display in TOML whose modulator was calibrated as a whole. There are 256 levels; the level
+/// at i displays the phase 2*pi*i/256.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_with_look_up_table(
     toml: *const c_char,
@@ -47,7 +47,7 @@ pub unsafe extern "C" fn pf_target_with_look_up_table(
     })
 }
 
-/// The bytes of a calibration's file, as `phasefront calibrate pack` writes it.
+/// Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_from_bytes(file: *const u8, length: usize, target: *mut *mut PfTarget) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn pf_target_from_bytes(file: *const u8, length: usize, ta
     })
 }
 
-/// A calibration's file.
+/// Reads a target from a calibration file.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_from_file(path: *const c_char, target: *mut *mut PfTarget) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -69,7 +69,7 @@ pub unsafe extern "C" fn pf_target_from_file(path: *const c_char, target: *mut *
     })
 }
 
-/// Pixels of its modulator.
+/// Returns the number of pixels of the modulator along x and y.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_size(target: *const PfTarget, width: *mut u32, height: *mut u32) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn pf_target_size(target: *const PfTarget, width: *mut u32
     })
 }
 
-/// Ends a target. Sessions and options that were made for it go on.
+/// Frees a target. Sessions and options that were created for it are not affected.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_free(target: *mut PfTarget) {
     // SAFETY: the rules of this border.

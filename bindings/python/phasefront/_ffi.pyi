@@ -3,13 +3,13 @@
 import enum
 
 class ColourFormat(enum.Enum):
-    """How a colour image lies in memory.
+    """The memory layout of a colour image.
 
     Values:
-        RGBA: One plane; bytes red, green, blue, alpha (which is not looked at).
-        BGRA: One plane; bytes blue, green, red, alpha (which is not looked at). iOS' 32BGRA.
-        RGB: One plane; bytes red, green, blue.
-        NV12: Two planes: luma; and at half the resolution blue and red chroma side by side. iOS' 420f and 420v.
+        RGBA: One plane with the bytes red, green, blue, alpha. Alpha is ignored.
+        BGRA: One plane with the bytes blue, green, red, alpha, as in iOS' 32BGRA. Alpha is ignored.
+        RGB: One plane with the bytes red, green, blue.
+        NV12: Two planes: luma, and interleaved blue and red chroma at half the resolution. iOS' 420f and 420v.
         YUV420: Three planes: luma, and at half the resolution blue chroma (U) and red chroma (V). Android's YUV_420_888.
     """
     RGBA = 0
@@ -19,68 +19,68 @@ class ColourFormat(enum.Enum):
     YUV420 = 4
 
 class YuvMatrix(enum.Enum):
-    """The matrix between luma, chroma and colour.
+    """The matrix that converts luma and chroma to colour.
 
     Values:
-        BT601: ITU-R BT.601: standard definition, JPEG, most Android cameras.
-        BT709: ITU-R BT.709: high definition.
+        BT601: ITU-R BT.601, for standard definition, JPEG and most Android cameras.
+        BT709: ITU-R BT.709, for high definition.
     """
     BT601 = 0
     BT709 = 1
 
 class ConfidenceFormat(enum.Enum):
-    """How a confidence map lies in memory.
+    """The memory layout of a confidence map.
 
     Values:
-        LOW_MEDIUM_HIGH: 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
-        U8: 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+        LOW_MEDIUM_HIGH: 0 low, 1 medium, 2 high, as in ARKit's ARConfidenceLevel.
+        U8: 0 none to 255 full, as in ARCore's acquireRawDepthConfidenceImage.
     """
     LOW_MEDIUM_HIGH = 0
     U8 = 1
 
 class PhasefrontError(Exception):
-    """Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right.
+    """The error of a call. The message is one line that names what is wrong and what would be right.
 
     Kinds:
-        Display: A display whose physics is impossible or out of range.
-        Frame: A frame, plane or image of the wrong shape or with unusable values.
-        Timestamp: A frame that is not later than the last one. It is refused; what follows is not harmed.
-        Setting: A setting or an argument that cannot be meant or planned for.
-        Network: What is not a hologram network, or one for another display.
-        File: A file that cannot be read.
-        Session: A call that a session cannot answer in its mode or state.
-        Internal: A fault of Phasefront. The call had no effect, or the frame is lost; please report it.
+        Display: The physics of a display is impossible or out of range.
+        Frame: A frame, plane or image has the wrong shape or unusable values.
+        Timestamp: A frame is not later than the previous one. It is refused; later frames are not affected.
+        Setting: A setting or an argument is invalid or cannot be planned.
+        Network: A file is not a hologram network, or the network is for another display.
+        File: A file cannot be read.
+        Session: A session cannot answer the call in its mode or state.
+        Internal: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
     """
     class Display(PhasefrontError):
-        """A display whose physics is impossible or out of range."""
+        """The physics of a display is impossible or out of range."""
     class Frame(PhasefrontError):
-        """A frame, plane or image of the wrong shape or with unusable values."""
+        """A frame, plane or image has the wrong shape or unusable values."""
     class Timestamp(PhasefrontError):
-        """A frame that is not later than the last one. It is refused; what follows is not harmed."""
+        """A frame is not later than the previous one. It is refused; later frames are not affected."""
     class Setting(PhasefrontError):
-        """A setting or an argument that cannot be meant or planned for."""
+        """A setting or an argument is invalid or cannot be planned."""
     class Network(PhasefrontError):
-        """What is not a hologram network, or one for another display."""
+        """A file is not a hologram network, or the network is for another display."""
     class File(PhasefrontError):
-        """A file that cannot be read."""
+        """A file cannot be read."""
     class Session(PhasefrontError):
-        """A call that a session cannot answer in its mode or state."""
+        """A session cannot answer the call in its mode or state."""
     class Internal(PhasefrontError):
-        """A fault of Phasefront. The call had no effect, or the frame is lost; please report it."""
+        """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
 
 class DepthFormat(enum.Enum):
-    """How a depth image lies in memory. But for the normalized ones, 0, negative numbers and what is not finite mean no
-    reading.
+    """The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
+    are not finite mean no reading.
 
     Values:
-        METRES_F32: Metres, 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
-        METRES_F16: Metres, 16-bit floats: AVFoundation's DepthFloat16.
-        DISPARITY_F32: Inverse metres, 32-bit floats: AVFoundation's DisparityFloat32.
-        DISPARITY_F16: Inverse metres, 16-bit floats: AVFoundation's DisparityFloat16.
-        MILLIMETRES_U16: Millimetres, all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
-        ANDROID_DEPTH16: Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3. Not the same as millimetres in all 16.
-        NORMALIZED_U8: 0 nearest to 255 farthest; every pixel is a reading.
-        NORMALIZED_U16: 0 nearest to 65535 farthest; every pixel is a reading.
+        METRES_F32: Metres as 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
+        METRES_F16: Metres as 16-bit floats: AVFoundation's DepthFloat16.
+        DISPARITY_F32: Inverse metres as 32-bit floats: AVFoundation's DisparityFloat32.
+        DISPARITY_F16: Inverse metres as 16-bit floats: AVFoundation's DisparityFloat16.
+        MILLIMETRES_U16: Millimetres in all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
+        ANDROID_DEPTH16: Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits. It differs from millimetres in all 16 bits.
+        NORMALIZED_U8: Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
+        NORMALIZED_U16: 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     """
     METRES_F32 = 0
     METRES_F16 = 1
@@ -92,13 +92,13 @@ class DepthFormat(enum.Enum):
     NORMALIZED_U16 = 7
 
 class Rotation(enum.Enum):
-    """How far a sensor's picture must be turned clockwise to stand upright.
+    """The clockwise rotation that turns a sensor's image upright.
 
     Values:
-        UPRIGHT: Not at all.
+        UPRIGHT: No rotation.
         CLOCKWISE90: A quarter turn.
         HALF: Half a turn.
-        CLOCKWISE270: Three quarters.
+        CLOCKWISE270: Three quarters of a turn.
     """
     UPRIGHT = 0
     CLOCKWISE90 = 1
@@ -106,13 +106,13 @@ class Rotation(enum.Enum):
     CLOCKWISE270 = 3
 
 class Layout(enum.Enum):
-    """How the levels of the colours lie in images for a modulator's driver.
+    """The arrangement of the colours' levels in images for a modulator's driver.
 
     Values:
-        RGB: One image, bytes red, green, blue.
-        RGBA: One image, bytes red, green, blue, alpha 255.
-        BGRA: One image, bytes blue, green, red, alpha 255.
-        GREY: An image for each colour, one after another: red, green, blue; a byte a pixel.
+        RGB: One image with bytes red, green, blue.
+        RGBA: One image with bytes red, green, blue, alpha 255.
+        BGRA: One image with bytes blue, green, red, alpha 255.
+        GREY: One image for each colour in the order red, green, blue, with one byte for each pixel.
     """
     RGB = 0
     RGBA = 1
@@ -120,15 +120,15 @@ class Layout(enum.Enum):
     GREY = 3
 
 class QualityReason(enum.Enum):
-    """Why a session changed its quality.
+    """The reason why a session changed its quality level.
 
     Values:
         TOO_SLOW: Frames took longer than the target rate allows.
-        ROOM: There was room for more.
+        ROOM: There was time left.
         THERMAL: The device is hot.
-        ASKED: The caller said so.
-        REFUSED: The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it again.
-        OTHER: For a reason that this version of the bindings does not know.
+        ASKED: The app asked for it.
+        REFUSED: The next quality level cannot be planned. The session keeps the previous one and does not try the next one again.
+        OTHER: A reason that this version of the bindings does not know.
     """
     TOO_SLOW = 0
     ROOM = 1
@@ -138,30 +138,30 @@ class QualityReason(enum.Enum):
     OTHER = 5
 
 class Method:
-    """What makes holograms.
+    """The method that computes holograms.
 
     One of:
         TRAINED: A trained network.
-        SWEEP: The plane sweep, for any display: slower, and nothing needs to be trained.
-        AUTO: For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained network where it is noisy or incomplete, as sensors' depth is.
+        SWEEP: The plane sweep, which suits any display. It is slower and needs no training.
+        AUTO: The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with noisy or incomplete depth, such as depth from sensors.
     """
     class TRAINED(Method):
         """A trained network.
 
         Fields:
-            network: The network, for the session's display.
+            network: The network, which must suit the session's display.
         """
         network: Network
         def __init__(self, network: Network) -> None: ...
     class SWEEP(Method):
-        """The plane sweep, for any display: slower, and nothing needs to be trained."""
+        """The plane sweep, which suits any display. It is slower and needs no training."""
         def __init__(self) -> None: ...
     class AUTO(Method):
-        """For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained
-        network where it is noisy or incomplete, as sensors' depth is.
+        """The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
+        noisy or incomplete depth, such as depth from sensors.
 
         Fields:
-            network: The network, for the session's display.
+            network: The network, which must suit the session's display.
         """
         network: Network
         def __init__(self, network: Network) -> None: ...
@@ -173,22 +173,22 @@ class Method:
     def is_auto(self) -> bool: ...
 
 class Quality:
-    """Whether a session may change its quality.
+    """Determines whether a session may change its quality level.
 
     One of:
-        ADAPTIVE: It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up where there is room.
-        FIXED: It stays at this quality level.
+        ADAPTIVE: The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and raises it if there is time left.
+        FIXED: The session stays at this quality level.
     """
     class ADAPTIVE(Quality):
-        """It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
-        where there is room.
+        """The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and
+        raises it if there is time left.
         """
         def __init__(self) -> None: ...
     class FIXED(Quality):
-        """It stays at this quality level.
+        """The session stays at this quality level.
 
         Fields:
-            quality_level: 0 the best.
+            quality_level: The quality level; 0 is the best.
         """
         quality_level: int
         def __init__(self, quality_level: int) -> None: ...
@@ -198,37 +198,38 @@ class Quality:
     def is_fixed(self) -> bool: ...
 
 class Encoding:
-    """How the field becomes phases.
+    """The conversion of a field to phases.
 
     One of:
-        DOUBLE_PHASE: Double phase on the field as it is.
-        ANTI_ALIAS: A small Gaussian blur first (AA-DPM).
-        BAND_LIMIT: High diagonal frequencies cut first (BL-DPM).
-        DEEP: A pre-filter network first (DDPM), trained for the display's offset together with the hologram network.
+        DOUBLE_PHASE: Double phase of the unchanged field.
+        ANTI_ALIAS: Double phase after a small Gaussian blur (AA-DPM).
+        BAND_LIMIT: Double phase after a filter that removes high diagonal frequencies (BL-DPM).
+        DEEP: Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the offset of the display.
     """
     class DOUBLE_PHASE(Encoding):
-        """Double phase on the field as it is."""
+        """Double phase of the unchanged field."""
         def __init__(self) -> None: ...
     class ANTI_ALIAS(Encoding):
-        """A small Gaussian blur first (AA-DPM).
+        """Double phase after a small Gaussian blur (AA-DPM).
 
         Fields:
-            sigma: Standard deviation, pixels; 0.7 as published.
-            width: Taps, an odd number; 3 as published.
+            sigma: The standard deviation in pixels; 0.7 in the paper.
+            width: The number of taps, an odd number; 3 in the paper.
         """
         sigma: float
         width: int
         def __init__(self, sigma: float, width: int) -> None: ...
     class BAND_LIMIT(Encoding):
-        """High diagonal frequencies cut first (BL-DPM).
+        """Double phase after a filter that removes high diagonal frequencies (BL-DPM).
 
         Fields:
-            k: The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel; 1 as published.
+            k: The bound of |tan(πfx)·tan(πfy)|, where f is in cycles per pixel; 1 in the paper.
         """
         k: float
         def __init__(self, k: float) -> None: ...
     class DEEP(Encoding):
-        """A pre-filter network first (DDPM), trained for the display's offset together with the hologram network.
+        """Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
+        offset of the display.
 
         Fields:
             prefilter: The pre-filter.
@@ -245,18 +246,18 @@ class Encoding:
     def is_deep(self) -> bool: ...
 
 class Brightness:
-    """Which amplitude full light stands for.
+    """The amplitude that maps to full light.
 
     One of:
-        SMOOTHED: Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
-        FIXED: This one; what is brighter is clipped.
-        FRAME_MAX: The frame's largest.
+        SMOOTHED: An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
+        FIXED: A fixed amplitude. Larger amplitudes are clipped.
+        FRAME_MAX: The largest amplitude of the frame.
     """
     class SMOOTHED(Brightness):
-        """Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker."""
+        """An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker."""
         def __init__(self) -> None: ...
     class FIXED(Brightness):
-        """This one; what is brighter is clipped.
+        """A fixed amplitude. Larger amplitudes are clipped.
 
         Fields:
             scale: The amplitude.
@@ -264,7 +265,7 @@ class Brightness:
         scale: float
         def __init__(self, scale: float) -> None: ...
     class FRAME_MAX(Brightness):
-        """The frame's largest."""
+        """The largest amplitude of the frame."""
         def __init__(self) -> None: ...
     def is_SMOOTHED(self) -> bool: ...
     def is_smoothed(self) -> bool: ...
@@ -274,21 +275,21 @@ class Brightness:
     def is_frame_max(self) -> bool: ...
 
 class DepthRange:
-    """Which metres are shown at the ends of the volume.
+    """The distances that map to the ends of the volume.
 
     One of:
-        PERCENTILES: The 1st and 99th percentile of the readings, in video smoothed.
-        FIXED: These.
+        PERCENTILES: The 1st and 99th percentile of the readings, smoothed over time in video.
+        FIXED: Fixed distances.
     """
     class PERCENTILES(DepthRange):
-        """The 1st and 99th percentile of the readings, in video smoothed."""
+        """The 1st and 99th percentile of the readings, smoothed over time in video."""
         def __init__(self) -> None: ...
     class FIXED(DepthRange):
-        """These.
+        """Fixed distances.
 
         Fields:
-            near_m: Metres shown nearest.
-            far_m: Metres shown farthest.
+            near_m: The distance of the near end, in metres.
+            far_m: The distance of the far end, in metres.
         """
         near_m: float
         far_m: float
@@ -299,26 +300,26 @@ class DepthRange:
     def is_fixed(self) -> bool: ...
 
 class Backend(enum.Enum):
-    """Where frames are computed.
+    """The backend that computes frames.
 
     Values:
-        CPU: On the CPU.
-        GPU: On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU. The statistics' `backend` and `backend_why` say which it is, and why.
+        CPU: Computes on the CPU.
+        GPU: Computes on the GPU if this library was built with GPU support, a GPU exists and its results agree with the CPU's; otherwise on the CPU. `backend` and `backend_why` in the statistics name the backend in use and the reason.
     """
     CPU = 0
     GPU = 1
 
 class DropReason(enum.Enum):
-    """Why a frame was not made into a hologram, without fault.
+    """The reason why a session dropped a frame without an error.
 
     Values:
-        SUPERSEDED: A newer frame came while it waited.
-        ABOVE_TARGET_RATE: It came sooner than the target rate asks for.
+        SUPERSEDED: A newer frame arrived while this one waited.
+        ABOVE_TARGET_RATE: The frame arrived sooner than the target rate allows.
         PAUSED: The session was paused.
-        RESET: The session was reset before it was done.
-        CLOSED: The session was closed before it was done.
-        UNREAD: It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages' streams say so.
-        OTHER: For a reason that this version of the bindings does not know.
+        RESET: The session was reset before the frame was finished.
+        CLOSED: The session was closed before the frame was finished.
+        UNREAD: The frame became a hologram, but newer ones arrived before the app took it from the stream of events. Only the streams of the packages report this reason.
+        OTHER: A reason that this version of the bindings does not know.
     """
     SUPERSEDED = 0
     ABOVE_TARGET_RATE = 1
@@ -329,12 +330,12 @@ class DropReason(enum.Enum):
     OTHER = 6
 
 class LogLevel(enum.Enum):
-    """How much a message matters.
+    """The severity of a log message.
 
     Values:
-        ERROR: What went wrong.
-        WARNING: What looks wrong.
-        INFO: What is done.
+        ERROR: An error.
+        WARNING: Something that may be wrong.
+        INFO: An action of the library.
         DEBUG: Details.
     """
     ERROR = 0
@@ -343,12 +344,12 @@ class LogLevel(enum.Enum):
     DEBUG = 3
 
 class RunningMode(enum.Enum):
-    """How a session runs; fixed when it is made.
+    """The running mode of a session. It is fixed when the session is created.
 
     Values:
-        IMAGE: Each frame is answered by itself.
-        VIDEO: Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
-        LIVE: Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+        IMAGE: The session answers each frame independently of all others.
+        VIDEO: The session answers each frame, and smooths depth and brightness over time. Timestamps must increase.
+        LIVE: The app submits frames without waiting, and the listener receives the outcome of each. Timestamps must increase.
     """
     IMAGE = 0
     VIDEO = 1
@@ -358,16 +359,16 @@ class Stage(enum.Enum):
     """A part of the work on a frame.
 
     Values:
-        FRAME: All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
-        COLOUR: Colour: turned, converted, resized.
-        DEPTH: Depth: read, aligned, smoothed over time, refined.
-        METHOD: From the frame to the midpoint hologram.
-        PROPAGATE: From the midpoint to the modulator.
-        ENCODE: From the field to levels.
-        MIDPOINT: Steps at the midpoint, within `Encode`.
-        GPU: A frame that a GPU computes, with the ways there and back.
-        PLAN: Plans and memory of a quality level are made.
-        PREVIEW: A small view.
+        FRAME: The whole work on a frame on the session's threads. It contains all other stages except `Plan` and `Preview`.
+        COLOUR: Rotating, converting and resizing the colour image.
+        DEPTH: Reading, aligning, temporally smoothing and refining the depth.
+        METHOD: Computing the midpoint hologram from the frame.
+        PROPAGATE: Propagating from the midpoint to the modulator.
+        ENCODE: Encoding the field into levels.
+        MIDPOINT: Correction steps at the midpoint, inside `Encode`.
+        GPU: Computing a frame on a GPU, including both transfers.
+        PLAN: Creating the plans and memory of a quality level.
+        PREVIEW: Computing a preview.
     """
     FRAME = 0
     COLOUR = 1
@@ -381,13 +382,13 @@ class Stage(enum.Enum):
     PREVIEW = 9
 
 class Thermal(enum.Enum):
-    """How hot the device is, as its system says.
+    """The thermal state of the device as reported by its system.
 
     Values:
-        NOMINAL: Not warm: nothing is limited.
-        FAIR: Warm: frames may take a little less time.
-        SERIOUS: Hot: half the time.
-        CRITICAL: Too hot: the lowest quality level.
+        NOMINAL: The device is not warm; nothing is limited.
+        FAIR: The device is warm; frames may take a little less time.
+        SERIOUS: The device is hot; frames may take half the time.
+        CRITICAL: The device is too hot; the session uses the lowest quality level.
     """
     NOMINAL = 0
     FAIR = 1
@@ -395,14 +396,14 @@ class Thermal(enum.Enum):
     CRITICAL = 3
 
 class Intrinsics:
-    """The pinhole model of a camera, in pixels of its image before it is turned upright. The middle of the first pixel is
-    (0, 0).
+    """The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
+    pixel is (0, 0).
 
     Fields:
-        fx: Focal length along x.
-        fy: Focal length along y.
-        cx: x of the principal point.
-        cy: y of the principal point.
+        fx: The focal length along x.
+        fy: The focal length along y.
+        cx: The x of the principal point.
+        cy: The y of the principal point.
     """
     fx: float
     fy: float
@@ -411,23 +412,24 @@ class Intrinsics:
     def __init__(self, *, fx: float, fy: float, cx: float, cy: float) -> None: ...
 
 class Pose:
-    """Where a point p of the depth camera (x right, y down, z forward) is for the colour camera: R·p + t.
+    """The pose of the depth camera. A point p of the depth camera (x right, y down, z forward) is at R·p + t of the colour
+    camera.
 
     Fields:
-        rotation: R, its 9 numbers row by row.
-        translation_m: t, 3 numbers, metres.
+        rotation: R: 9 numbers, row by row.
+        translation_m: t: 3 numbers, in metres.
     """
     rotation: list[float]
     translation_m: list[float]
     def __init__(self, *, rotation: list[float], translation_m: list[float]) -> None: ...
 
 class Cameras:
-    """How the depth camera and the colour camera stand to each other.
+    """The intrinsics and the relative pose of the depth camera and the colour camera.
 
     Fields:
-        colour: Of the colour image.
-        depth: Of the depth image.
-        pose: From depth to colour; none for cameras at one place that look one way.
+        colour: The intrinsics of the colour camera.
+        depth: The intrinsics of the depth camera.
+        pose: The pose from the depth camera to the colour camera; none for cameras with the same position and orientation.
     """
     colour: Intrinsics
     depth: Intrinsics
@@ -435,26 +437,26 @@ class Cameras:
     def __init__(self, *, colour: Intrinsics, depth: Intrinsics, pose: Pose | None = ...) -> None: ...
 
 class PlaneInfo:
-    """Where the pixels of one plane lie.
+    """The strides of a plane.
 
     Fields:
-        row_stride: Bytes from one row to the next.
-        pixel_stride: Bytes from one pixel to the next in a row.
+        row_stride: The number of bytes from one row to the next.
+        pixel_stride: The number of bytes from one pixel to the next in a row.
     """
     row_stride: int
     pixel_stride: int
     def __init__(self, *, row_stride: int, pixel_stride: int) -> None: ...
 
 class ColourInfo:
-    """What a colour image is.
+    """The format and size of a colour image.
 
     Fields:
-        format: How it lies in memory.
-        width: Pixels along x, as the sensor gives them.
-        height: Pixels along y.
-        planes: Its planes, in the format's order.
-        matrix: The matrix of luma and chroma; other formats do not look at it.
-        video_range: Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at it.
+        format: The memory layout.
+        width: The width of the sensor's image, in pixels.
+        height: The height of the sensor's image, in pixels.
+        planes: The planes, in the format's order.
+        matrix: The matrix of luma and chroma. Other formats ignore it.
+        video_range: Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
     """
     format: ColourFormat
     width: int
@@ -465,13 +467,13 @@ class ColourInfo:
     def __init__(self, *, format: ColourFormat, width: int, height: int, planes: list[PlaneInfo], matrix: YuvMatrix, video_range: bool) -> None: ...
 
 class ConfidenceInfo:
-    """What a confidence map is.
+    """The format and size of a confidence map.
 
     Fields:
-        format: How it lies in memory.
-        width: Pixels along x: as many as the depth has.
-        height: Pixels along y: as many as the depth has.
-        plane: Its plane.
+        format: The memory layout.
+        width: The width in pixels, equal to the depth image's.
+        height: The height in pixels, equal to the depth image's.
+        plane: The plane.
     """
     format: ConfidenceFormat
     width: int
@@ -480,14 +482,14 @@ class ConfidenceInfo:
     def __init__(self, *, format: ConfidenceFormat, width: int, height: int, plane: PlaneInfo) -> None: ...
 
 class NetworkInfo:
-    """What a network is, and the display that it was trained for.
+    """The properties of a network and of the display that it was trained for.
 
     Fields:
-        layers: How many convolutions.
-        filters: Filters of each hidden layer.
-        precision: The numbers that its layers compute in.
-        pitch_um: Distance between neighbouring pixels, µm.
-        volume_depth_mm: Depth of the volume, mm.
+        layers: The number of convolutions.
+        filters: The number of filters of each hidden layer.
+        precision: The number format of the layers.
+        pitch_um: The distance between neighbouring pixels, in µm.
+        volume_depth_mm: The depth of the volume, in mm.
     """
     layers: int
     filters: int
@@ -500,21 +502,21 @@ class DeepPair:
     """A hologram network and the pre-filter that was trained with it, for the deep double phase method.
 
     Fields:
-        hologram: Makes the hologram.
-        prefilter: Prepares it for its encoding.
+        hologram: The hologram network.
+        prefilter: The pre-filter.
     """
     hologram: Network
     prefilter: Network
     def __init__(self, *, hologram: Network, prefilter: Network) -> None: ...
 
 class DepthInfo:
-    """What a depth image is.
+    """The format and size of a depth image.
 
     Fields:
-        format: How it lies in memory.
-        width: Pixels along x, as the sensor gives them.
-        height: Pixels along y.
-        plane: Its plane.
+        format: The memory layout.
+        width: The width of the sensor's image, in pixels.
+        height: The height of the sensor's image, in pixels.
+        plane: The plane.
     """
     format: DepthFormat
     width: int
@@ -523,20 +525,20 @@ class DepthInfo:
     def __init__(self, *, format: DepthFormat, width: int, height: int, plane: PlaneInfo) -> None: ...
 
 class Display:
-    """One modulator, its lasers, and the volume it shows. It is checked where it is used.
+    """A modulator, its lasers, and the display volume. It is checked when it is used.
 
     Fields:
-        width: Pixels along x.
-        height: Pixels along y.
-        pitch_um: Distance between neighbouring pixels, µm.
-        red_nm: Wavelength of the red laser, nm.
-        green_nm: Wavelength of the green laser, nm.
-        blue_nm: Wavelength of the blue laser, nm.
-        laser_nm: Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
-        volume_depth_mm: Depth of the volume, mm.
-        offset_mm: z of the modulator against the middle of the volume, mm, positive toward the viewer.
-        bits: Bits of a modulator level.
-        aperture_radius: Radius of the aperture in the Fourier plane; 1 is the whole first order.
+        width: The number of pixels along x.
+        height: The number of pixels along y.
+        pitch_um: The distance between neighbouring pixels, in µm.
+        red_nm: The wavelength of the red laser, in nm.
+        green_nm: The wavelength of the green laser, in nm.
+        blue_nm: The wavelength of the blue laser, in nm.
+        laser_nm: The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three wavelengths; none for a display with three lasers.
+        volume_depth_mm: The depth of the volume, in mm.
+        offset_mm: The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
+        bits: The number of bits of a modulator level.
+        aperture_radius: The radius of the aperture in the Fourier plane; 1 is the whole first order.
     """
     width: int
     height: int
@@ -552,15 +554,15 @@ class Display:
     def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, laser_nm: float | None = ..., volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0) -> None: ...
 
 class Drops:
-    """Dropped frames by reason.
+    """The number of dropped frames for each reason.
 
     Fields:
-        superseded: A newer frame came while they waited.
-        above_target_rate: They came sooner than the target rate asks for.
-        paused: The session was paused.
-        reset: The session was reset before they were done.
-        closed: The session was closed before they were done.
-        total: All together.
+        superseded: Frames that waited when a newer frame arrived.
+        above_target_rate: Frames that arrived sooner than the target rate allows.
+        paused: Frames that arrived while the session was paused.
+        reset: Frames that were not finished when the session was reset.
+        closed: Frames that were not finished when the session was closed.
+        total: The sum of all reasons.
     """
     superseded: int
     above_target_rate: int
@@ -571,26 +573,26 @@ class Drops:
     def __init__(self, *, superseded: int, above_target_rate: int, paused: int, reset: int, closed: int, total: int) -> None: ...
 
 class Orientation:
-    """How a sensor's picture becomes the one that is shown: turned, then mirrored.
+    """The transformation from a sensor's image to the upright image: a rotation, then mirroring.
 
     Fields:
-        rotation: The turn.
-        mirrored: Whether left and right are exchanged after the turn, as front cameras need.
+        rotation: The rotation.
+        mirrored: Whether left and right are exchanged after the rotation, as front cameras need.
     """
     rotation: Rotation
     mirrored: bool
     def __init__(self, *, rotation: Rotation, mirrored: bool = False) -> None: ...
 
 class FrameInfo:
-    """What a frame is; its memory comes beside it.
+    """The description of a frame. Its memory is passed with it.
 
     Fields:
-        timestamp_ns: When it was taken, in nanoseconds of any clock that runs forward.
+        timestamp_ns: The time at which the frame was taken, in nanoseconds of any clock that runs forward.
         colour: The colour image.
         depth: The depth image.
-        confidence: The confidence map of the depth, where there is one.
-        orientation: How all must be turned to stand upright.
-        cameras: How the pixels of depth and colour correspond; none where both show the same field of view.
+        confidence: The confidence map of the depth image; none if there is no map.
+        orientation: The transformation of all images to upright ones.
+        cameras: The correspondence of the pixels of depth and colour; none if both images have the same field of view.
     """
     timestamp_ns: int
     colour: ColourInfo
@@ -601,15 +603,15 @@ class FrameInfo:
     def __init__(self, *, timestamp_ns: int, colour: ColourInfo, depth: DepthInfo, confidence: ConfidenceInfo | None, orientation: Orientation, cameras: Cameras | None) -> None: ...
 
 class FrameTimes:
-    """How long each stage of a frame took, milliseconds.
+    """The time that each stage of a frame took, in milliseconds.
 
     Fields:
-        colour_ms: Colour to amplitudes of the display's resolution.
-        depth_ms: Depth to normalized depth of the display's resolution.
-        method_ms: The midpoint hologram.
-        propagate_ms: From the midpoint to the modulator.
-        encode_ms: From the field to levels.
-        total_ms: All together.
+        colour_ms: Rotating, converting and resizing the colour image.
+        depth_ms: Reading, aligning, temporally smoothing and refining the depth.
+        method_ms: Computing the midpoint hologram from the frame.
+        propagate_ms: Propagating from the midpoint to the modulator.
+        encode_ms: Encoding the field into levels.
+        total_ms: The sum of all stages.
     """
     colour_ms: float
     depth_ms: float
@@ -620,19 +622,19 @@ class FrameTimes:
     def __init__(self, *, colour_ms: float, depth_ms: float, method_ms: float, propagate_ms: float, encode_ms: float, total_ms: float) -> None: ...
 
 class HologramInfo:
-    """What is known of a hologram.
+    """The properties of a hologram.
 
     Fields:
-        timestamp_ns: The frame's timestamp.
-        width: Pixels along x.
-        height: Pixels along y.
-        colours: How many colours its levels have: 3, or 1 for a display of one laser.
-        scale: The amplitude that full light stands for.
-        near_m: Metres at the near end of the volume; none for normalized depth.
-        far_m: Metres at the far end of the volume; none for normalized depth.
+        timestamp_ns: The timestamp of the frame.
+        width: The width in pixels.
+        height: The height in pixels.
+        colours: The number of colours of the levels: 3, or 1 for a display with one laser.
+        scale: The amplitude that maps to full light.
+        near_m: The distance of the near end of the volume in metres; none for normalized depth.
+        far_m: The distance of the far end of the volume in metres; none for normalized depth.
         valid_depth: The share of the depth sensor's pixels that had a usable reading.
-        quality_level: The quality level that it was made at, 0 the best.
-        times: How long each stage took.
+        quality_level: The quality level of the hologram; 0 is the best.
+        times: The time that each stage took.
     """
     timestamp_ns: int
     width: int
@@ -647,14 +649,14 @@ class HologramInfo:
     def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, quality_level: int, times: FrameTimes) -> None: ...
 
 class Placement:
-    """How a hologram is put on its modulator.
+    """The placement of a hologram on its modulator.
 
     Fields:
-        layout: How colours lie in images.
-        flip_x: Whether left and right are exchanged, of the whole image.
-        flip_y: Whether top and bottom are exchanged, of the whole image.
-        shift_x: How many pixels to the right of the middle the hologram stands, before flips.
-        shift_y: How many pixels below the middle it stands, before flips.
+        layout: The arrangement of colours in images.
+        flip_x: Whether the whole image is flipped left to right.
+        flip_y: Whether the whole image is flipped top to bottom.
+        shift_x: The hologram's shift to the right of the middle in pixels, before flips.
+        shift_y: The hologram's shift below the middle in pixels, before flips.
     """
     layout: Layout
     flip_x: bool
@@ -667,9 +669,9 @@ class QualityChange:
     """A change of the quality level.
 
     Fields:
-        from_quality_level: The quality level before.
-        to_quality_level: The quality level now; the one before where the step was refused.
-        reason: Why.
+        from_quality_level: The previous quality level.
+        to_quality_level: The new quality level; the previous one if the reason is `Refused`.
+        reason: The reason.
     """
     from_quality_level: int
     to_quality_level: int
@@ -677,15 +679,15 @@ class QualityChange:
     def __init__(self, *, from_quality_level: int, to_quality_level: int, reason: QualityReason) -> None: ...
 
 class QualityLevel:
-    """One quality: a method, a resolution, and how the displayed image is corrected. A hologram smaller than the modulator
-    is shown in its middle.
+    """A quality level: a method, a resolution and the number of correction steps. A hologram smaller than the modulator is
+    displayed in its centre.
 
     Fields:
-        method: What makes the hologram.
-        width: Width of the hologram, pixels.
-        height: Height of the hologram, pixels.
-        local_steps: Local steps of this quality level; none for the session's.
-        midpoint_steps: Steps at the midpoint of this quality level; none for the session's.
+        method: The method that computes the hologram.
+        width: The width of the hologram in pixels.
+        height: The height of the hologram in pixels.
+        local_steps: The number of local steps; none for the session's number.
+        midpoint_steps: The number of steps at the midpoint; none for the session's number.
     """
     method: Method
     width: int
@@ -695,23 +697,23 @@ class QualityLevel:
     def __init__(self, *, method: Method, width: int, height: int, local_steps: int | None = ..., midpoint_steps: int | None = ...) -> None: ...
 
 class SessionOptions:
-    """What a session makes, and how. `session_options` gives the defaults; change what differs.
+    """The options of a session. `session_options` returns the defaults.
 
     Fields:
-        target: What holograms are for.
-        quality_levels: Quality levels, the best first: 1 to 16.
+        target: The target of the holograms.
+        quality_levels: The quality levels, best first: 1 to 16.
         quality: Whether the session may change its quality level by itself.
-        target_rate_hz: Frames a second that are aimed at; none takes every frame and never steps.
-        encoding: How the field becomes phases.
-        brightness: Which amplitude full light stands for.
-        dark_threshold: Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
-        local_steps: Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for what suits the encoding: 1, and 0 with a pre-filter.
-        midpoint_steps: Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for video, where it goes on from the frame before.
-        depth_range: Which metres are shown at the ends of the volume.
-        least_confidence: Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
-        threads: Threads to compute with, at most 256; none for as many as the device has.
-        most_pixels: Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple of them.
-        backend: Where frames are computed.
+        target_rate_hz: The target rate in frames per second; none if the session takes every frame and does not adapt its quality level to frame times.
+        encoding: The conversion of fields to phases.
+        brightness: The amplitude that maps to full light.
+        dark_threshold: The share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark areas; none for the encoding's default: 0.4, and 0 with a pre-filter.
+        local_steps: The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for the encoding's default: 1, and 0 with a pre-filter.
+        midpoint_steps: The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit stills; 1 suits video, where each frame continues from the previous one.
+        depth_range: The distances that map to the ends of the volume.
+        least_confidence: The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
+        threads: The number of threads to compute with, at most 256; none for as many as the device has.
+        most_pixels: The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a session is a multiple of it.
+        backend: The backend that computes frames.
     """
     target: Target
     quality_levels: list[QualityLevel]
@@ -730,21 +732,22 @@ class SessionOptions:
     def __init__(self, *, target: Target, quality_levels: list[QualityLevel], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend) -> None: ...
 
 class Statistics:
-    """What a session has done so far. Submitted frames are processed, failed, refused, dropped or pending.
+    """The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
+    pending.
 
     Fields:
-        submitted: Frames that were given to the session.
+        submitted: Frames that were submitted.
         processed: Frames that became holograms.
         failed: Frames that could not be processed.
-        refused: Frames that came late.
+        refused: Frames that were refused because they were late or the session was closed.
         dropped: Frames that were dropped.
-        pending: Frames that wait or are in flight.
-        rate_hz: Holograms a second, of late.
-        times: Mean times, of late.
-        backend: What runs the network.
-        backend_why: Why that.
-        quality_level: The quality level, 0 the best.
-        listener_failures: How often the listener threw.
+        pending: Frames that wait or are being processed.
+        rate_hz: Holograms per second over the last 30.
+        times: The mean times of the stages over the last 30 holograms.
+        backend: The backend that computes the frames.
+        backend_why: The reason for using this backend.
+        quality_level: The quality level; 0 is the best.
+        listener_failures: The number of errors that the listener threw.
     """
     submitted: int
     processed: int
@@ -761,254 +764,255 @@ class Statistics:
     def __init__(self, *, submitted: int, processed: int, failed: int, refused: int, dropped: Drops, pending: int, rate_hz: float, times: FrameTimes, backend: str, backend_why: str, quality_level: int, listener_failures: int) -> None: ...
 
 def built_in_pair(offset_mm: float) -> DeepPair:
-    """The pair in int8 that is bundled for a modulator at `offset_mm` and the default display's pitch, colours and
-    volume.
+    """Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
 
-    Errors: Another offset, or a library that was built without them.
+    Errors: Returns an error for other offsets, and if the library was built without networks.
     """
 
 def display_from_toml(text: str) -> Display:
-    """Reads a display from its TOML form; what is left out has the default value.
+    """Reads a display from its TOML form. Missing keys have default values.
 
-    Errors: Text that is not TOML, an unknown key, or a value out of its range.
+    Errors: Returns an error if the text is not TOML, a key is unknown, or a value is out of its range.
     """
 
 def session_options(target: Target, method: Method | None = ...) -> SessionOptions:
-    """The default options for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
-    correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
-    the display; smoothed brightness, near and far by percentiles.
+    """Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
+    correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
+    built-in network, or the plane sweep if that network was not trained for the display.
     """
 
 def set_log_listener(level: LogLevel, listener: LogListener | None) -> None:
-    """Sends messages of `level` and above to `listener`; none for silence. Of the libraries underneath, warnings and
-    errors are sent.
+    """Sends messages of `level` and above to `listener`, and warnings and errors of the libraries that Phasefront uses.
+    Without a listener, no messages are sent.
 
-    Errors: A process that already logs elsewhere.
+    Errors: Returns an error if the process already has another logger of Rust's `log`.
     """
 
 def set_stage_listener(listener: StageListener | None) -> None:
-    """Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a
-    stage that is under way it may hear the end alone.
+    """Reports every stage of every session to `listener`. Without a listener, nothing is reported and nothing is spent.
+    Set it between frames, because it may receive only the end of a stage that has already begun.
 
-    Errors: A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
+    Errors: Returns an error if the process already collects Rust's `tracing` elsewhere, where the spans of stages go.
     """
 
 def version() -> str:
-    """The version of the library."""
+    """Returns the version of the library."""
 
 class Network:
-    """A hologram network. Immutable; one serves many sessions."""
+    """A hologram network. It is immutable and can be used by several sessions."""
     @classmethod
     def built_in(cls, name: str = 'rgbd-8') -> Network:
-        """A network in int8 that is bundled, by `name`: that of 8 layers unless another is named. For the default
+        """Returns the bundled int8 network called `name`, by default the one with 8 layers. It is for the default
         display's pitch, colours and volume.
 
-        Errors: A name that none has, or a library that was built without them.
+        Errors: Returns an error if there is no such network, and if the library was built without networks.
         """
     @classmethod
     def from_bytes(cls, onnx: bytes) -> Network:
-        """Reads an ONNX file's bytes.
+        """Reads a network from the bytes of an ONNX file.
 
-        Errors: What is not a hologram network, with what is not so and what would be right.
+        Errors: Returns an error that says what is wrong and what would be right if the bytes are not a hologram network.
         """
     @classmethod
     def from_file(cls, path: str) -> Network:
-        """Reads an ONNX file.
+        """Reads a network from an ONNX file.
 
-        Errors: A file that cannot be read; as `from_bytes`.
+        Errors: Returns an error if the file cannot be read, and the errors of `from_bytes`.
         """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def info(self) -> NetworkInfo:
-        """What it is."""
+        """Returns the properties of the network."""
 
 class Target:
-    """What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
-    lasers' light, what corrects its optics. Immutable; one serves many sessions.
+    """The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+    light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
     """
     @classmethod
     def from_bytes(cls, file: bytes) -> Target:
-        """Reads the bytes of a calibration's file, as `phasefront calibrate pack` writes it.
+        """Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
 
-        Errors: What is not such a file, with what is not so.
+        Errors: Returns an error that says what is wrong if the bytes are not such a file.
         """
     @classmethod
     def from_file(cls, path: str) -> Target:
-        """Reads a calibration's file.
+        """Reads a target from a calibration file.
 
-        Errors: A file that cannot be read; as `from_bytes`.
+        Errors: Returns an error if the file cannot be read, and the errors of `from_bytes`.
         """
     @classmethod
     def of_display(cls, display: Display) -> Target:
-        """A display with levels in equal steps of phase, as many as its bits have.
+        """Creates a target whose levels are equal steps of phase, with as many levels as the display's bits allow.
 
-        Errors: A display that cannot be.
+        Errors: Returns an error if the display is impossible.
         """
     @classmethod
     def with_look_up_table(cls, display: Display, levels: bytes) -> Target:
-        """A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+        """Creates a target whose modulator was calibrated as a whole. `levels` has 256 entries; the level at i displays
+        the phase 2πi/256.
 
-        Errors: A display that cannot be, or another number of levels.
+        Errors: Returns an error if the display is impossible or there are not 256 levels.
         """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def display(self) -> Display:
-        """The display itself."""
+        """Returns the display."""
 
 class LogListener:
-    """Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
-    wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
-    ignored.
+    """A receiver of log messages, which is called on any thread. It may call the library. On a thread that computes for a
+    session it cannot wait for a frame: `process`, `warm_up` and previews are refused, and closing does not wait. Errors
+    that it throws are ignored.
     """
     def on_log(self, level: LogLevel, message: str) -> None:
-        """One message."""
+        """Receives a message."""
 
 class RawPlanes:
-    """Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
-    by hand.
+    """Numbers of 32 bits at each pixel of each colour, without gaps between rows or planes. The layers written by hand
+    read them.
     """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def colours(self) -> int:
-        """Planes: 3, or 1 of a display of one laser."""
+        """Returns the number of planes: 3, or 1 for a display with one laser."""
     def height(self) -> int:
-        """Pixels along y."""
+        """Returns the height in pixels."""
     def pixel_bytes(self) -> int:
-        """Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part."""
+        """Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part."""
     def plane_address(self, colour: int) -> int:
-        """Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+        """Returns the address of the plane of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. The address is valid
+        as long as this object.
 
-        Errors: Another colour.
+        Errors: Returns an error for other colours.
         """
     def share(self) -> RawPlanes:
-        """Another handle to the same planes: whoever reads their memory holds one."""
+        """Returns another handle to the same planes. Each reader of their memory holds one."""
     def width(self) -> int:
-        """Pixels along x."""
+        """Returns the width in pixels."""
 
 class RawImage:
-    """An image, row by row without gaps. For the layers by hand."""
+    """An image without gaps between rows. The layers written by hand read it."""
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def address(self) -> int:
-        """Where its bytes lie. Valid as long as this object."""
+        """Returns the address of the bytes. It is valid as long as this object."""
     def byte_len(self) -> int:
-        """How many bytes lie there."""
+        """Returns the number of bytes."""
     def height(self) -> int:
-        """Pixels along y."""
+        """Returns the height in pixels."""
     def pixel_bytes(self) -> int:
-        """Bytes of a pixel."""
+        """Returns the number of bytes of a pixel."""
     def share(self) -> RawImage:
-        """Another handle to the same image: whoever reads its memory holds one."""
+        """Returns another handle to the same image. Each reader of its memory holds one."""
     def width(self) -> int:
-        """Pixels along x."""
+        """Returns the width in pixels."""
 
 class RawHologram:
-    """The hologram of one frame: modulator levels of three colours. For the layers by hand, which keep it alive while its
+    """The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
     planes are read.
     """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def field(self, z_mm: float) -> RawPlanes:
-        """The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
-        and imaginary part of each pixel.
+        """Returns the complex field that the levels produce behind the aperture at `z_mm`, where 0 is the midpoint: the
+        real and the imaginary part of each pixel. The carrier is left out.
 
-        Errors: A z too far away.
+        Errors: Returns an error if z is too far away.
         """
     def info(self) -> HologramInfo:
-        """What is known of it."""
+        """Returns the properties of the hologram."""
     def output(self, placement: Placement, image: int) -> RawImage:
-        """Image `image` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in
-        the upper bits of a byte, the hologram where `placement` says.
+        """Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
+        levels in the upper bits of a byte; `placement` positions the hologram.
 
-        Errors: An image that the layout has not.
+        Errors: Returns an error if the layout does not have this image.
         """
     def plane_address(self, colour: int) -> int:
-        """Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
-        laser. The colours follow one another without gaps, too. Valid as long as this object.
+        """Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
+        byte; there are no gaps between rows or between colours. The address is valid as long as this object.
 
-        Errors: Another colour.
+        Errors: Returns an error for other colours.
         """
     def plane_len(self) -> int:
-        """How many bytes lie there."""
+        """Returns the number of bytes of a plane."""
     def preview(self, z_mm: float, width: int, height: int) -> RawImage:
-        """What an eye focused at `z_mm` sees, `width` × `height` pixels.
+        """Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
 
-        Errors: An empty image, or a z too far away.
+        Errors: Returns an error if the image is empty or z is too far away.
         """
     def refocus(self, z_mm: float) -> RawPlanes:
-        """What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+        """Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
 
-        Errors: A z too far away.
+        Errors: Returns an error if z is too far away.
         """
     def share(self) -> RawHologram:
-        """Another handle to the same hologram: whoever reads its memory holds one."""
+        """Returns another handle to the same hologram. Each reader of its memory holds one."""
     def z_at(self, x: float, y: float) -> float:
-        """z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, mm: where to focus when
-        it is tapped on.
+        """Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
+        Coordinates run from 0 to 1 from the upper left corner.
         """
 
 class RawSession:
-    """A session. Every call may come from any thread, at any moment."""
+    """A session. All its methods can be called from any thread at any time."""
     def __init__(self, options: SessionOptions, mode: RunningMode, listener: SessionListener | None) -> None:
-        """A session that runs in `mode`; live, it needs a `listener`.
+        """Creates a session that runs in `mode`. A live session needs a `listener`.
 
-        Errors: Options that cannot be meant or planned for, a live session without a listener, another with one, or threads
-        that cannot be started.
+        Errors: Returns an error if the options are invalid or cannot be planned, if a live session has no listener or another
+        session has one, or if threads cannot be started.
         """
     def pause(self) -> None:
-        """Takes no frames until `resume`."""
+        """Accepts no frames until `resume`."""
     def process(self, luma_or_colour: bytes, chroma: bytes, chroma_v: bytes, depth: bytes, confidence: bytes, info: FrameInfo) -> RawHologram:
-        """The hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of its colour,
-        `chroma` and `chroma_v` the others; what the frame has not, is empty.
+        """Returns the hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of the
+        colour image; `chroma` and `chroma_v` are the others. Memory that the frame does not have is empty.
 
-        Errors: A frame that is not usable or late, or a session that is live, paused or closed. None of them harms the frames
-        that follow.
+        Errors: Returns an error if the frame is unusable or late, or if the session is live, paused or closed. Later frames are
+        not affected.
         """
     def reset(self) -> None:
-        """Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again."""
+        """Forgets all previous frames, including one that is being processed. The next frame may have any timestamp."""
     def resume(self) -> None:
-        """Takes frames again."""
+        """Accepts frames again."""
     def set_quality(self, quality: Quality) -> None:
         """Allows or forbids changes of the quality level.
 
-        Errors: A quality level that the session does not have.
+        Errors: Returns an error if the session does not have the quality level.
         """
     def set_thermal(self, thermal: Thermal) -> None:
-        """Says how hot the device is."""
+        """Sets the thermal state of the device."""
     def shut_down(self) -> None:
-        """Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
-        last, and will not be called again; called by a listener, of this session or another, or by a log handler while
-        a session computes, it does not wait for that. Closing twice does nothing.
+        """Closes the session: it accepts no more frames and frees its memory. When this returns, the listener has received
+        all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
+        listener while a session computes, does not wait for that. Closing twice does nothing.
         """
     def statistics(self) -> Statistics:
-        """What the session has done so far; of a closed one, what it did. Never waits for a frame."""
+        """Returns the statistics of the session, also after it was closed. Never waits for a frame."""
     def submit(self, luma_or_colour: bytes, chroma: bytes, chroma_v: bytes, depth: bytes, confidence: bytes, info: FrameInfo) -> DropReason | None:
-        """Hands a frame to a live session, which copies it and goes on by itself. Gives why the frame was dropped, if it
-        was at once; the listener hears of it too. Planes as `process` takes them.
+        """Submits a frame to a live session, which copies it, without waiting for its hologram. Returns the reason if the
+        frame is dropped at once, which the listener receives too. The planes are those of `process`.
 
-        Errors: A frame that is not usable or late, or a session that is not live or is closed. None of them harms the frames
-        that follow.
+        Errors: Returns an error if the frame is unusable or late, or if the session is not live or is closed. Later frames are
+        not affected.
         """
     def warm_up(self) -> None:
-        """Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it."""
+        """Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones."""
 
 class SessionListener:
-    """Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
-    order in which things happened. While it is busy no frame is processed. What it throws is counted and logged.
+    """A receiver of the events of a live session. Calls arrive one after another, on the session's own thread, in the
+    order of the events. No frame is processed while the listener is busy. Errors that it throws are counted and logged.
     """
     def on_processed(self, hologram: RawHologram) -> None:
-        """A frame became a hologram."""
+        """Reports that a frame became a hologram."""
     def on_dropped(self, timestamp_ns: int, reason: DropReason) -> None:
-        """A frame was dropped."""
+        """Reports that a frame was dropped."""
     def on_failed(self, timestamp_ns: int, message: str) -> None:
-        """A frame could not be processed. The session goes on."""
+        """Reports that a frame could not be processed. The session continues."""
     def on_quality_changed(self, timestamp_ns: int, change: QualityChange) -> None:
-        """The frames after this one are made at another quality level."""
+        """Reports that the session uses another quality level after the frame of `timestamp_ns`."""
     def on_closed(self) -> None:
-        """The session is closed and its memory is given back. This is the last call, made exactly once, also where
-        shutting down does not wait for it.
+        """Reports that the session is closed and its memory is freed. This is the last call. It is made exactly once, even
+        if shutting down does not wait for it.
         """
 
 class StageListener:
-    """Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
-    must not call the library. What it throws is ignored.
+    """A receiver of the begin and end of stages, which is called on the threads that compute them. The stages of one
+    thread are nested. The receiver must not call the library. Errors that it throws are ignored.
     """
     def on_begin(self, stage: Stage) -> None:
-        """A stage begins on this thread."""
+        """Reports that a stage begins on this thread."""
     def on_end(self, stage: Stage) -> None:
-        """The stage that began last on this thread ends."""
+        """Reports that the stage that began last on this thread ends."""

@@ -640,22 +640,22 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
 
 
 /**
- * Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
- * wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
- * ignored.
+ * A receiver of log messages, which is called on any thread. It may call the library. On a thread that computes for a
+ * session it cannot wait for a frame: `process`, `warm_up` and previews are refused, and closing does not wait. Errors
+ * that it throws are ignored.
  */
 public protocol LogListener: AnyObject, Sendable {
     
     /**
-     * One message.
+     * Receives a message.
      */
     func onLog(level: LogLevel, message: String) throws 
     
 }
 /**
- * Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
- * wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
- * ignored.
+ * A receiver of log messages, which is called on any thread. It may call the library. On a thread that computes for a
+ * session it cannot wait for a frame: `process`, `warm_up` and previews are refused, and closing does not wait. Errors
+ * that it throws are ignored.
  */
 open class LogListenerImpl: LogListener, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -711,7 +711,7 @@ open class LogListenerImpl: LogListener, @unchecked Sendable {
 
     
     /**
-     * One message.
+     * Receives a message.
      */
 open func onLog(level: LogLevel, message: String)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -858,18 +858,18 @@ public func FfiConverterTypeLogListener_lower(_ value: LogListener) -> UInt64 {
 
 
 /**
- * A hologram network. Immutable; one serves many sessions.
+ * A hologram network. It is immutable and can be used by several sessions.
  */
 public protocol NetworkProtocol: AnyObject, Sendable {
     
     /**
-     * What it is.
+     * Returns the properties of the network.
      */
     func info() throws  -> NetworkInfo
     
 }
 /**
- * A hologram network. Immutable; one serves many sessions.
+ * A hologram network. It is immutable and can be used by several sessions.
  */
 open class Network: NetworkProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -923,11 +923,11 @@ open class Network: NetworkProtocol, @unchecked Sendable {
 
     
     /**
-     * A network in int8 that is bundled, by `name`: that of 8 layers unless another is named. For the default
+     * Returns the bundled int8 network called `name`, by default the one with 8 layers. It is for the default
      * display's pitch, colours and volume.
      *
      * # Errors
-     * A name that none has, or a library that was built without them.
+     * Returns an error if there is no such network, and if the library was built without networks.
      */
 public static func builtIn(name: String = "rgbd-8")throws  -> Network  {
     return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -939,10 +939,10 @@ public static func builtIn(name: String = "rgbd-8")throws  -> Network  {
 }
     
     /**
-     * Reads an ONNX file's bytes.
+     * Reads a network from the bytes of an ONNX file.
      *
      * # Errors
-     * What is not a hologram network, with what is not so and what would be right.
+     * Returns an error that says what is wrong and what would be right if the bytes are not a hologram network.
      */
 public static func fromBytes(onnx: Data)throws  -> Network  {
     return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -956,10 +956,10 @@ public static func fromBytes(onnx: Data)throws  -> Network  {
 }
     
     /**
-     * Reads an ONNX file.
+     * Reads a network from an ONNX file.
      *
      * # Errors
-     * A file that cannot be read; as [`Self::from_bytes`].
+     * Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
      */
 public static func fromFile(path: String)throws  -> Network  {
     return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -973,7 +973,7 @@ public static func fromFile(path: String)throws  -> Network  {
 
     
     /**
-     * What it is.
+     * Returns the properties of the network.
      */
 open func info()throws  -> NetworkInfo  {
     return try  FfiConverterTypeNetworkInfo_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1035,78 +1035,78 @@ public func FfiConverterTypeNetwork_lower(_ value: Network) -> UInt64 {
 
 
 /**
- * The hologram of one frame: modulator levels of three colours. For the layers by hand, which keep it alive while its
+ * The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
  * planes are read.
  */
 public protocol RawHologramProtocol: AnyObject, Sendable {
     
     /**
-     * The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
-     * and imaginary part of each pixel.
+     * Returns the complex field that the levels produce behind the aperture at `z_mm`, where 0 is the midpoint: the
+     * real and the imaginary part of each pixel. The carrier is left out.
      *
      * # Errors
-     * A z too far away.
+     * Returns an error if z is too far away.
      */
     func field(zMm: Double) throws  -> RawPlanes
     
     /**
-     * What is known of it.
+     * Returns the properties of the hologram.
      */
     func info() throws  -> HologramInfo
     
     /**
-     * Image `image` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in
-     * the upper bits of a byte, the hologram where `placement` says.
+     * Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
+     * levels in the upper bits of a byte; `placement` positions the hologram.
      *
      * # Errors
-     * An image that the layout has not.
+     * Returns an error if the layout does not have this image.
      */
     func output(placement: Placement, image: UInt32) throws  -> RawImage
     
     /**
-     * Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
-     * laser. The colours follow one another without gaps, too. Valid as long as this object.
+     * Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
+     * byte; there are no gaps between rows or between colours. The address is valid as long as this object.
      *
      * # Errors
-     * Another colour.
+     * Returns an error for other colours.
      */
     func planeAddress(colour: UInt32) throws  -> UInt64
     
     /**
-     * How many bytes lie there.
+     * Returns the number of bytes of a plane.
      */
     func planeLen() throws  -> UInt64
     
     /**
-     * What an eye focused at `z_mm` sees, `width` × `height` pixels.
+     * Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
      *
      * # Errors
-     * An empty image, or a z too far away.
+     * Returns an error if the image is empty or z is too far away.
      */
     func preview(zMm: Double, width: UInt32, height: UInt32) throws  -> RawImage
     
     /**
-     * What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+     * Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
      *
      * # Errors
-     * A z too far away.
+     * Returns an error if z is too far away.
      */
     func refocus(zMm: Double) throws  -> RawPlanes
     
     /**
-     * Another handle to the same hologram: whoever reads its memory holds one.
+     * Returns another handle to the same hologram. Each reader of its memory holds one.
      */
     func share() throws  -> RawHologram
     
     /**
-     * z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, mm: where to focus when
-     * it is tapped on.
+     * Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
+     * Coordinates run from 0 to 1 from the upper left corner.
      */
     func zAt(x: Double, y: Double) throws  -> Double
     
 }
 /**
- * The hologram of one frame: modulator levels of three colours. For the layers by hand, which keep it alive while its
+ * The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
  * planes are read.
  */
 open class RawHologram: RawHologramProtocol, @unchecked Sendable {
@@ -1163,11 +1163,11 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
 
     
     /**
-     * The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
-     * and imaginary part of each pixel.
+     * Returns the complex field that the levels produce behind the aperture at `z_mm`, where 0 is the midpoint: the
+     * real and the imaginary part of each pixel. The carrier is left out.
      *
      * # Errors
-     * A z too far away.
+     * Returns an error if z is too far away.
      */
 open func field(zMm: Double)throws  -> RawPlanes  {
     return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1180,7 +1180,7 @@ open func field(zMm: Double)throws  -> RawPlanes  {
 }
     
     /**
-     * What is known of it.
+     * Returns the properties of the hologram.
      */
 open func info()throws  -> HologramInfo  {
     return try  FfiConverterTypeHologramInfo_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1192,11 +1192,11 @@ open func info()throws  -> HologramInfo  {
 }
     
     /**
-     * Image `image` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in
-     * the upper bits of a byte, the hologram where `placement` says.
+     * Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
+     * levels in the upper bits of a byte; `placement` positions the hologram.
      *
      * # Errors
-     * An image that the layout has not.
+     * Returns an error if the layout does not have this image.
      */
 open func output(placement: Placement, image: UInt32)throws  -> RawImage  {
     return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1210,11 +1210,11 @@ open func output(placement: Placement, image: UInt32)throws  -> RawImage  {
 }
     
     /**
-     * Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
-     * laser. The colours follow one another without gaps, too. Valid as long as this object.
+     * Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
+     * byte; there are no gaps between rows or between colours. The address is valid as long as this object.
      *
      * # Errors
-     * Another colour.
+     * Returns an error for other colours.
      */
 open func planeAddress(colour: UInt32)throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1227,7 +1227,7 @@ open func planeAddress(colour: UInt32)throws  -> UInt64  {
 }
     
     /**
-     * How many bytes lie there.
+     * Returns the number of bytes of a plane.
      */
 open func planeLen()throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1239,10 +1239,10 @@ open func planeLen()throws  -> UInt64  {
 }
     
     /**
-     * What an eye focused at `z_mm` sees, `width` × `height` pixels.
+     * Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
      *
      * # Errors
-     * An empty image, or a z too far away.
+     * Returns an error if the image is empty or z is too far away.
      */
 open func preview(zMm: Double, width: UInt32, height: UInt32)throws  -> RawImage  {
     return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1257,10 +1257,10 @@ open func preview(zMm: Double, width: UInt32, height: UInt32)throws  -> RawImage
 }
     
     /**
-     * What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+     * Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
      *
      * # Errors
-     * A z too far away.
+     * Returns an error if z is too far away.
      */
 open func refocus(zMm: Double)throws  -> RawPlanes  {
     return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1273,7 +1273,7 @@ open func refocus(zMm: Double)throws  -> RawPlanes  {
 }
     
     /**
-     * Another handle to the same hologram: whoever reads its memory holds one.
+     * Returns another handle to the same hologram. Each reader of its memory holds one.
      */
 open func share()throws  -> RawHologram  {
     return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1285,8 +1285,8 @@ open func share()throws  -> RawHologram  {
 }
     
     /**
-     * z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, mm: where to focus when
-     * it is tapped on.
+     * Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
+     * Coordinates run from 0 to 1 from the upper left corner.
      */
 open func zAt(x: Double, y: Double)throws  -> Double  {
     return try  FfiConverterDouble.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1350,43 +1350,43 @@ public func FfiConverterTypeRawHologram_lower(_ value: RawHologram) -> UInt64 {
 
 
 /**
- * An image, row by row without gaps. For the layers by hand.
+ * An image without gaps between rows. The layers written by hand read it.
  */
 public protocol RawImageProtocol: AnyObject, Sendable {
     
     /**
-     * Where its bytes lie. Valid as long as this object.
+     * Returns the address of the bytes. It is valid as long as this object.
      */
     func address() throws  -> UInt64
     
     /**
-     * How many bytes lie there.
+     * Returns the number of bytes.
      */
     func byteLen() throws  -> UInt64
     
     /**
-     * Pixels along y.
+     * Returns the height in pixels.
      */
     func height() throws  -> UInt32
     
     /**
-     * Bytes of a pixel.
+     * Returns the number of bytes of a pixel.
      */
     func pixelBytes() throws  -> UInt32
     
     /**
-     * Another handle to the same image: whoever reads its memory holds one.
+     * Returns another handle to the same image. Each reader of its memory holds one.
      */
     func share() throws  -> RawImage
     
     /**
-     * Pixels along x.
+     * Returns the width in pixels.
      */
     func width() throws  -> UInt32
     
 }
 /**
- * An image, row by row without gaps. For the layers by hand.
+ * An image without gaps between rows. The layers written by hand read it.
  */
 open class RawImage: RawImageProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -1442,7 +1442,7 @@ open class RawImage: RawImageProtocol, @unchecked Sendable {
 
     
     /**
-     * Where its bytes lie. Valid as long as this object.
+     * Returns the address of the bytes. It is valid as long as this object.
      */
 open func address()throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1454,7 +1454,7 @@ open func address()throws  -> UInt64  {
 }
     
     /**
-     * How many bytes lie there.
+     * Returns the number of bytes.
      */
 open func byteLen()throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1466,7 +1466,7 @@ open func byteLen()throws  -> UInt64  {
 }
     
     /**
-     * Pixels along y.
+     * Returns the height in pixels.
      */
 open func height()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1478,7 +1478,7 @@ open func height()throws  -> UInt32  {
 }
     
     /**
-     * Bytes of a pixel.
+     * Returns the number of bytes of a pixel.
      */
 open func pixelBytes()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1490,7 +1490,7 @@ open func pixelBytes()throws  -> UInt32  {
 }
     
     /**
-     * Another handle to the same image: whoever reads its memory holds one.
+     * Returns another handle to the same image. Each reader of its memory holds one.
      */
 open func share()throws  -> RawImage  {
     return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1502,7 +1502,7 @@ open func share()throws  -> RawImage  {
 }
     
     /**
-     * Pixels along x.
+     * Returns the width in pixels.
      */
 open func width()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1564,48 +1564,49 @@ public func FfiConverterTypeRawImage_lower(_ value: RawImage) -> UInt64 {
 
 
 /**
- * Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
- * by hand.
+ * Numbers of 32 bits at each pixel of each colour, without gaps between rows or planes. The layers written by hand
+ * read them.
  */
 public protocol RawPlanesProtocol: AnyObject, Sendable {
     
     /**
-     * Planes: 3, or 1 of a display of one laser.
+     * Returns the number of planes: 3, or 1 for a display with one laser.
      */
     func colours() throws  -> UInt32
     
     /**
-     * Pixels along y.
+     * Returns the height in pixels.
      */
     func height() throws  -> UInt32
     
     /**
-     * Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+     * Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part.
      */
     func pixelBytes() throws  -> UInt32
     
     /**
-     * Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+     * Returns the address of the plane of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. The address is valid
+     * as long as this object.
      *
      * # Errors
-     * Another colour.
+     * Returns an error for other colours.
      */
     func planeAddress(colour: UInt32) throws  -> UInt64
     
     /**
-     * Another handle to the same planes: whoever reads their memory holds one.
+     * Returns another handle to the same planes. Each reader of their memory holds one.
      */
     func share() throws  -> RawPlanes
     
     /**
-     * Pixels along x.
+     * Returns the width in pixels.
      */
     func width() throws  -> UInt32
     
 }
 /**
- * Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
- * by hand.
+ * Numbers of 32 bits at each pixel of each colour, without gaps between rows or planes. The layers written by hand
+ * read them.
  */
 open class RawPlanes: RawPlanesProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -1661,7 +1662,7 @@ open class RawPlanes: RawPlanesProtocol, @unchecked Sendable {
 
     
     /**
-     * Planes: 3, or 1 of a display of one laser.
+     * Returns the number of planes: 3, or 1 for a display with one laser.
      */
 open func colours()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1673,7 +1674,7 @@ open func colours()throws  -> UInt32  {
 }
     
     /**
-     * Pixels along y.
+     * Returns the height in pixels.
      */
 open func height()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1685,7 +1686,7 @@ open func height()throws  -> UInt32  {
 }
     
     /**
-     * Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+     * Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part.
      */
 open func pixelBytes()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1697,10 +1698,11 @@ open func pixelBytes()throws  -> UInt32  {
 }
     
     /**
-     * Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+     * Returns the address of the plane of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. The address is valid
+     * as long as this object.
      *
      * # Errors
-     * Another colour.
+     * Returns an error for other colours.
      */
 open func planeAddress(colour: UInt32)throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1713,7 +1715,7 @@ open func planeAddress(colour: UInt32)throws  -> UInt64  {
 }
     
     /**
-     * Another handle to the same planes: whoever reads their memory holds one.
+     * Returns another handle to the same planes. Each reader of their memory holds one.
      */
 open func share()throws  -> RawPlanes  {
     return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1725,7 +1727,7 @@ open func share()throws  -> RawPlanes  {
 }
     
     /**
-     * Pixels along x.
+     * Returns the width in pixels.
      */
 open func width()throws  -> UInt32  {
     return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1787,32 +1789,32 @@ public func FfiConverterTypeRawPlanes_lower(_ value: RawPlanes) -> UInt64 {
 
 
 /**
- * A session. Every call may come from any thread, at any moment.
+ * A session. All its methods can be called from any thread at any time.
  */
 public protocol RawSessionProtocol: AnyObject, Sendable {
     
     /**
-     * Takes no frames until [`Self::resume`].
+     * Accepts no frames until [`Self::resume`].
      */
     func pause() throws 
     
     /**
-     * The hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of its colour,
-     * `chroma` and `chroma_v` the others; what the frame has not, is empty.
+     * Returns the hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of the
+     * colour image; `chroma` and `chroma_v` are the others. Memory that the frame does not have is empty.
      *
      * # Errors
-     * A frame that is not usable or late, or a session that is live, paused or closed. None of them harms the frames
-     * that follow.
+     * Returns an error if the frame is unusable or late, or if the session is live, paused or closed. Later frames are
+     * not affected.
      */
     func process(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, confidence: Data, info: FrameInfo) throws  -> RawHologram
     
     /**
-     * Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
+     * Forgets all previous frames, including one that is being processed. The next frame may have any timestamp.
      */
     func reset() throws 
     
     /**
-     * Takes frames again.
+     * Accepts frames again.
      */
     func resume() throws 
     
@@ -1820,45 +1822,45 @@ public protocol RawSessionProtocol: AnyObject, Sendable {
      * Allows or forbids changes of the quality level.
      *
      * # Errors
-     * A quality level that the session does not have.
+     * Returns an error if the session does not have the quality level.
      */
     func setQuality(quality: Quality) throws 
     
     /**
-     * Says how hot the device is.
+     * Sets the thermal state of the device.
      */
     func setThermal(thermal: Thermal) throws 
     
     /**
-     * Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
-     * last, and will not be called again; called by a listener, of this session or another, or by a log handler while
-     * a session computes, it does not wait for that. Closing twice does nothing.
+     * Closes the session: it accepts no more frames and frees its memory. When this returns, the listener has received
+     * all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
+     * listener while a session computes, does not wait for that. Closing twice does nothing.
      */
     func shutDown() throws 
     
     /**
-     * What the session has done so far; of a closed one, what it did. Never waits for a frame.
+     * Returns the statistics of the session, also after it was closed. Never waits for a frame.
      */
     func statistics() throws  -> Statistics
     
     /**
-     * Hands a frame to a live session, which copies it and goes on by itself. Gives why the frame was dropped, if it
-     * was at once; the listener hears of it too. Planes as [`Self::process`] takes them.
+     * Submits a frame to a live session, which copies it, without waiting for its hologram. Returns the reason if the
+     * frame is dropped at once, which the listener receives too. The planes are those of [`Self::process`].
      *
      * # Errors
-     * A frame that is not usable or late, or a session that is not live or is closed. None of them harms the frames
-     * that follow.
+     * Returns an error if the frame is unusable or late, or if the session is not live or is closed. Later frames are
+     * not affected.
      */
     func submit(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, confidence: Data, info: FrameInfo) throws  -> DropReason?
     
     /**
-     * Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+     * Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones.
      */
     func warmUp() throws 
     
 }
 /**
- * A session. Every call may come from any thread, at any moment.
+ * A session. All its methods can be called from any thread at any time.
  */
 open class RawSession: RawSessionProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -1900,11 +1902,11 @@ open class RawSession: RawSessionProtocol, @unchecked Sendable {
         return try! rustCall { uniffi_phasefront_ffi_fn_clone_rawsession(self.handle, $0) }
     }
     /**
-     * A session that runs in `mode`; live, it needs a `listener`.
+     * Creates a session that runs in `mode`. A live session needs a `listener`.
      *
      * # Errors
-     * Options that cannot be meant or planned for, a live session without a listener, another with one, or threads
-     * that cannot be started.
+     * Returns an error if the options are invalid or cannot be planned, if a live session has no listener or another
+     * session has one, or if threads cannot be started.
      */
 public convenience init(options: SessionOptions, mode: RunningMode, listener: SessionListener?)throws  {
     let handle =
@@ -1932,7 +1934,7 @@ public convenience init(options: SessionOptions, mode: RunningMode, listener: Se
 
     
     /**
-     * Takes no frames until [`Self::resume`].
+     * Accepts no frames until [`Self::resume`].
      */
 open func pause()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -1943,12 +1945,12 @@ open func pause()throws   {try rustCallWithError(FfiConverterTypePhasefrontError
 }
     
     /**
-     * The hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of its colour,
-     * `chroma` and `chroma_v` the others; what the frame has not, is empty.
+     * Returns the hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of the
+     * colour image; `chroma` and `chroma_v` are the others. Memory that the frame does not have is empty.
      *
      * # Errors
-     * A frame that is not usable or late, or a session that is live, paused or closed. None of them harms the frames
-     * that follow.
+     * Returns an error if the frame is unusable or late, or if the session is live, paused or closed. Later frames are
+     * not affected.
      */
 open func process(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, confidence: Data, info: FrameInfo)throws  -> RawHologram  {
     return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1976,7 +1978,7 @@ open func process(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, 
 }
     
     /**
-     * Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
+     * Forgets all previous frames, including one that is being processed. The next frame may have any timestamp.
      */
 open func reset()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -1987,7 +1989,7 @@ open func reset()throws   {try rustCallWithError(FfiConverterTypePhasefrontError
 }
     
     /**
-     * Takes frames again.
+     * Accepts frames again.
      */
 open func resume()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2001,7 +2003,7 @@ open func resume()throws   {try rustCallWithError(FfiConverterTypePhasefrontErro
      * Allows or forbids changes of the quality level.
      *
      * # Errors
-     * A quality level that the session does not have.
+     * Returns an error if the session does not have the quality level.
      */
 open func setQuality(quality: Quality)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2013,7 +2015,7 @@ open func setQuality(quality: Quality)throws   {try rustCallWithError(FfiConvert
 }
     
     /**
-     * Says how hot the device is.
+     * Sets the thermal state of the device.
      */
 open func setThermal(thermal: Thermal)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2025,9 +2027,9 @@ open func setThermal(thermal: Thermal)throws   {try rustCallWithError(FfiConvert
 }
     
     /**
-     * Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
-     * last, and will not be called again; called by a listener, of this session or another, or by a log handler while
-     * a session computes, it does not wait for that. Closing twice does nothing.
+     * Closes the session: it accepts no more frames and frees its memory. When this returns, the listener has received
+     * all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
+     * listener while a session computes, does not wait for that. Closing twice does nothing.
      */
 open func shutDown()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2038,7 +2040,7 @@ open func shutDown()throws   {try rustCallWithError(FfiConverterTypePhasefrontEr
 }
     
     /**
-     * What the session has done so far; of a closed one, what it did. Never waits for a frame.
+     * Returns the statistics of the session, also after it was closed. Never waits for a frame.
      */
 open func statistics()throws  -> Statistics  {
     return try  FfiConverterTypeStatistics_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2050,12 +2052,12 @@ open func statistics()throws  -> Statistics  {
 }
     
     /**
-     * Hands a frame to a live session, which copies it and goes on by itself. Gives why the frame was dropped, if it
-     * was at once; the listener hears of it too. Planes as [`Self::process`] takes them.
+     * Submits a frame to a live session, which copies it, without waiting for its hologram. Returns the reason if the
+     * frame is dropped at once, which the listener receives too. The planes are those of [`Self::process`].
      *
      * # Errors
-     * A frame that is not usable or late, or a session that is not live or is closed. None of them harms the frames
-     * that follow.
+     * Returns an error if the frame is unusable or late, or if the session is not live or is closed. Later frames are
+     * not affected.
      */
 open func submit(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, confidence: Data, info: FrameInfo)throws  -> DropReason?  {
     return try  FfiConverterOptionTypeDropReason.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2083,7 +2085,7 @@ open func submit(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, c
 }
     
     /**
-     * Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+     * Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones.
      */
 open func warmUp()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2144,41 +2146,41 @@ public func FfiConverterTypeRawSession_lower(_ value: RawSession) -> UInt64 {
 
 
 /**
- * Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
- * order in which things happened. While it is busy no frame is processed. What it throws is counted and logged.
+ * A receiver of the events of a live session. Calls arrive one after another, on the session's own thread, in the
+ * order of the events. No frame is processed while the listener is busy. Errors that it throws are counted and logged.
  */
 public protocol SessionListener: AnyObject, Sendable {
     
     /**
-     * A frame became a hologram.
+     * Reports that a frame became a hologram.
      */
     func onProcessed(hologram: RawHologram) throws 
     
     /**
-     * A frame was dropped.
+     * Reports that a frame was dropped.
      */
     func onDropped(timestampNs: UInt64, reason: DropReason) throws 
     
     /**
-     * A frame could not be processed. The session goes on.
+     * Reports that a frame could not be processed. The session continues.
      */
     func onFailed(timestampNs: UInt64, message: String) throws 
     
     /**
-     * The frames after this one are made at another quality level.
+     * Reports that the session uses another quality level after the frame of `timestamp_ns`.
      */
     func onQualityChanged(timestampNs: UInt64, change: QualityChange) throws 
     
     /**
-     * The session is closed and its memory is given back. This is the last call, made exactly once, also where
-     * shutting down does not wait for it.
+     * Reports that the session is closed and its memory is freed. This is the last call. It is made exactly once, even
+     * if shutting down does not wait for it.
      */
     func onClosed() throws 
     
 }
 /**
- * Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
- * order in which things happened. While it is busy no frame is processed. What it throws is counted and logged.
+ * A receiver of the events of a live session. Calls arrive one after another, on the session's own thread, in the
+ * order of the events. No frame is processed while the listener is busy. Errors that it throws are counted and logged.
  */
 open class SessionListenerImpl: SessionListener, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -2234,7 +2236,7 @@ open class SessionListenerImpl: SessionListener, @unchecked Sendable {
 
     
     /**
-     * A frame became a hologram.
+     * Reports that a frame became a hologram.
      */
 open func onProcessed(hologram: RawHologram)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2246,7 +2248,7 @@ open func onProcessed(hologram: RawHologram)throws   {try rustCallWithError(FfiC
 }
     
     /**
-     * A frame was dropped.
+     * Reports that a frame was dropped.
      */
 open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2259,7 +2261,7 @@ open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCa
 }
     
     /**
-     * A frame could not be processed. The session goes on.
+     * Reports that a frame could not be processed. The session continues.
      */
 open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2272,7 +2274,7 @@ open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWi
 }
     
     /**
-     * The frames after this one are made at another quality level.
+     * Reports that the session uses another quality level after the frame of `timestamp_ns`.
      */
 open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2285,8 +2287,8 @@ open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {
 }
     
     /**
-     * The session is closed and its memory is given back. This is the last call, made exactly once, also where
-     * shutting down does not wait for it.
+     * Reports that the session is closed and its memory is freed. This is the last call. It is made exactly once, even
+     * if shutting down does not wait for it.
      */
 open func onClosed()throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2533,25 +2535,25 @@ public func FfiConverterTypeSessionListener_lower(_ value: SessionListener) -> U
 
 
 /**
- * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
- * must not call the library. What it throws is ignored.
+ * A receiver of the begin and end of stages, which is called on the threads that compute them. The stages of one
+ * thread are nested. The receiver must not call the library. Errors that it throws are ignored.
  */
 public protocol StageListener: AnyObject, Sendable {
     
     /**
-     * A stage begins on this thread.
+     * Reports that a stage begins on this thread.
      */
     func onBegin(stage: Stage) throws 
     
     /**
-     * The stage that began last on this thread ends.
+     * Reports that the stage that began last on this thread ends.
      */
     func onEnd(stage: Stage) throws 
     
 }
 /**
- * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
- * must not call the library. What it throws is ignored.
+ * A receiver of the begin and end of stages, which is called on the threads that compute them. The stages of one
+ * thread are nested. The receiver must not call the library. Errors that it throws are ignored.
  */
 open class StageListenerImpl: StageListener, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -2607,7 +2609,7 @@ open class StageListenerImpl: StageListener, @unchecked Sendable {
 
     
     /**
-     * A stage begins on this thread.
+     * Reports that a stage begins on this thread.
      */
 open func onBegin(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2619,7 +2621,7 @@ open func onBegin(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeL
 }
     
     /**
-     * The stage that began last on this thread ends.
+     * Reports that the stage that began last on this thread ends.
      */
 open func onEnd(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2788,20 +2790,20 @@ public func FfiConverterTypeStageListener_lower(_ value: StageListener) -> UInt6
 
 
 /**
- * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
- * lasers' light, what corrects its optics. Immutable; one serves many sessions.
+ * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+ * light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
  */
 public protocol TargetProtocol: AnyObject, Sendable {
     
     /**
-     * The display itself.
+     * Returns the display.
      */
     func display() throws  -> Display
     
 }
 /**
- * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
- * lasers' light, what corrects its optics. Immutable; one serves many sessions.
+ * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+ * light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
  */
 open class Target: TargetProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -2855,10 +2857,10 @@ open class Target: TargetProtocol, @unchecked Sendable {
 
     
     /**
-     * Reads the bytes of a calibration's file, as `phasefront calibrate pack` writes it.
+     * Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
      *
      * # Errors
-     * What is not such a file, with what is not so.
+     * Returns an error that says what is wrong if the bytes are not such a file.
      */
 public static func fromBytes(file: Data)throws  -> Target  {
     return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2872,10 +2874,10 @@ public static func fromBytes(file: Data)throws  -> Target  {
 }
     
     /**
-     * Reads a calibration's file.
+     * Reads a target from a calibration file.
      *
      * # Errors
-     * A file that cannot be read; as [`Self::from_bytes`].
+     * Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
      */
 public static func fromFile(path: String)throws  -> Target  {
     return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2887,10 +2889,10 @@ public static func fromFile(path: String)throws  -> Target  {
 }
     
     /**
-     * A display with levels in equal steps of phase, as many as its bits have.
+     * Creates a target whose levels are equal steps of phase, with as many levels as the display's bits allow.
      *
      * # Errors
-     * A display that cannot be.
+     * Returns an error if the display is impossible.
      */
 public static func ofDisplay(display: Display)throws  -> Target  {
     return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2902,10 +2904,11 @@ public static func ofDisplay(display: Display)throws  -> Target  {
 }
     
     /**
-     * A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+     * Creates a target whose modulator was calibrated as a whole. `levels` has 256 entries; the level at i displays
+     * the phase 2πi/256.
      *
      * # Errors
-     * A display that cannot be, or another number of levels.
+     * Returns an error if the display is impossible or there are not 256 levels.
      */
 public static func withLookUpTable(display: Display, levels: Data)throws  -> Target  {
     return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2920,7 +2923,7 @@ public static func withLookUpTable(display: Display, levels: Data)throws  -> Tar
 
     
     /**
-     * The display itself.
+     * Returns the display.
      */
 open func display()throws  -> Display  {
     return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -2980,19 +2983,19 @@ public func FfiConverterTypeTarget_lower(_ value: Target) -> UInt64 {
 
 
 /**
- * How the depth camera and the colour camera stand to each other.
+ * The intrinsics and the relative pose of the depth camera and the colour camera.
  */
 public struct Cameras: Equatable, Hashable {
     /**
-     * Of the colour image.
+     * The intrinsics of the colour camera.
      */
     public var colour: Intrinsics
     /**
-     * Of the depth image.
+     * The intrinsics of the depth camera.
      */
     public var depth: Intrinsics
     /**
-     * From depth to colour; none for cameras at one place that look one way.
+     * The pose from the depth camera to the colour camera; none for cameras with the same position and orientation.
      */
     public var pose: Pose?
 
@@ -3000,13 +3003,13 @@ public struct Cameras: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * Of the colour image.
+         * The intrinsics of the colour camera.
          */colour: Intrinsics, 
         /**
-         * Of the depth image.
+         * The intrinsics of the depth camera.
          */depth: Intrinsics, 
         /**
-         * From depth to colour; none for cameras at one place that look one way.
+         * The pose from the depth camera to the colour camera; none for cameras with the same position and orientation.
          */pose: Pose? = nil) {
         self.colour = colour
         self.depth = depth
@@ -3059,32 +3062,31 @@ public func FfiConverterTypeCameras_lower(_ value: Cameras) -> RustBuffer {
 
 
 /**
- * What a colour image is.
+ * The format and size of a colour image.
  */
 public struct ColourInfo: Equatable, Hashable {
     /**
-     * How it lies in memory.
+     * The memory layout.
      */
     public var format: ColourFormat
     /**
-     * Pixels along x, as the sensor gives them.
+     * The width of the sensor's image, in pixels.
      */
     public var width: UInt32
     /**
-     * Pixels along y.
+     * The height of the sensor's image, in pixels.
      */
     public var height: UInt32
     /**
-     * Its planes, in the format's order.
+     * The planes, in the format's order.
      */
     public var planes: [PlaneInfo]
     /**
-     * The matrix of luma and chroma; other formats do not look at it.
+     * The matrix of luma and chroma. Other formats ignore it.
      */
     public var matrix: YuvMatrix
     /**
-     * Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at
-     * it.
+     * Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
      */
     public var videoRange: Bool
 
@@ -3092,23 +3094,22 @@ public struct ColourInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * How it lies in memory.
+         * The memory layout.
          */format: ColourFormat, 
         /**
-         * Pixels along x, as the sensor gives them.
+         * The width of the sensor's image, in pixels.
          */width: UInt32, 
         /**
-         * Pixels along y.
+         * The height of the sensor's image, in pixels.
          */height: UInt32, 
         /**
-         * Its planes, in the format's order.
+         * The planes, in the format's order.
          */planes: [PlaneInfo], 
         /**
-         * The matrix of luma and chroma; other formats do not look at it.
+         * The matrix of luma and chroma. Other formats ignore it.
          */matrix: YuvMatrix, 
         /**
-         * Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at
-         * it.
+         * Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
          */videoRange: Bool) {
         self.format = format
         self.width = width
@@ -3170,23 +3171,23 @@ public func FfiConverterTypeColourInfo_lower(_ value: ColourInfo) -> RustBuffer 
 
 
 /**
- * What a confidence map is.
+ * The format and size of a confidence map.
  */
 public struct ConfidenceInfo: Equatable, Hashable {
     /**
-     * How it lies in memory.
+     * The memory layout.
      */
     public var format: ConfidenceFormat
     /**
-     * Pixels along x: as many as the depth has.
+     * The width in pixels, equal to the depth image's.
      */
     public var width: UInt32
     /**
-     * Pixels along y: as many as the depth has.
+     * The height in pixels, equal to the depth image's.
      */
     public var height: UInt32
     /**
-     * Its plane.
+     * The plane.
      */
     public var plane: PlaneInfo
 
@@ -3194,16 +3195,16 @@ public struct ConfidenceInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * How it lies in memory.
+         * The memory layout.
          */format: ConfidenceFormat, 
         /**
-         * Pixels along x: as many as the depth has.
+         * The width in pixels, equal to the depth image's.
          */width: UInt32, 
         /**
-         * Pixels along y: as many as the depth has.
+         * The height in pixels, equal to the depth image's.
          */height: UInt32, 
         /**
-         * Its plane.
+         * The plane.
          */plane: PlaneInfo) {
         self.format = format
         self.width = width
@@ -3263,11 +3264,11 @@ public func FfiConverterTypeConfidenceInfo_lower(_ value: ConfidenceInfo) -> Rus
  */
 public struct DeepPair {
     /**
-     * Makes the hologram.
+     * The hologram network.
      */
     public var hologram: Network
     /**
-     * Prepares it for its encoding.
+     * The pre-filter.
      */
     public var prefilter: Network
 
@@ -3275,10 +3276,10 @@ public struct DeepPair {
     // declare one manually.
     public init(
         /**
-         * Makes the hologram.
+         * The hologram network.
          */hologram: Network, 
         /**
-         * Prepares it for its encoding.
+         * The pre-filter.
          */prefilter: Network) {
         self.hologram = hologram
         self.prefilter = prefilter
@@ -3328,23 +3329,23 @@ public func FfiConverterTypeDeepPair_lower(_ value: DeepPair) -> RustBuffer {
 
 
 /**
- * What a depth image is.
+ * The format and size of a depth image.
  */
 public struct DepthInfo: Equatable, Hashable {
     /**
-     * How it lies in memory.
+     * The memory layout.
      */
     public var format: DepthFormat
     /**
-     * Pixels along x, as the sensor gives them.
+     * The width of the sensor's image, in pixels.
      */
     public var width: UInt32
     /**
-     * Pixels along y.
+     * The height of the sensor's image, in pixels.
      */
     public var height: UInt32
     /**
-     * Its plane.
+     * The plane.
      */
     public var plane: PlaneInfo
 
@@ -3352,16 +3353,16 @@ public struct DepthInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * How it lies in memory.
+         * The memory layout.
          */format: DepthFormat, 
         /**
-         * Pixels along x, as the sensor gives them.
+         * The width of the sensor's image, in pixels.
          */width: UInt32, 
         /**
-         * Pixels along y.
+         * The height of the sensor's image, in pixels.
          */height: UInt32, 
         /**
-         * Its plane.
+         * The plane.
          */plane: PlaneInfo) {
         self.format = format
         self.width = width
@@ -3417,51 +3418,52 @@ public func FfiConverterTypeDepthInfo_lower(_ value: DepthInfo) -> RustBuffer {
 
 
 /**
- * One modulator, its lasers, and the volume it shows. It is checked where it is used.
+ * A modulator, its lasers, and the display volume. It is checked when it is used.
  */
 public struct Display: Equatable, Hashable {
     /**
-     * Pixels along x.
+     * The number of pixels along x.
      */
     public var width: UInt32
     /**
-     * Pixels along y.
+     * The number of pixels along y.
      */
     public var height: UInt32
     /**
-     * Distance between neighbouring pixels, µm.
+     * The distance between neighbouring pixels, in µm.
      */
     public var pitchUm: Double
     /**
-     * Wavelength of the red laser, nm.
+     * The wavelength of the red laser, in nm.
      */
     public var redNm: Double
     /**
-     * Wavelength of the green laser, nm.
+     * The wavelength of the green laser, in nm.
      */
     public var greenNm: Double
     /**
-     * Wavelength of the blue laser, nm.
+     * The wavelength of the blue laser, in nm.
      */
     public var blueNm: Double
     /**
-     * Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
+     * The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
+     * wavelengths; none for a display with three lasers.
      */
     public var laserNm: Double?
     /**
-     * Depth of the volume, mm.
+     * The depth of the volume, in mm.
      */
     public var volumeDepthMm: Double
     /**
-     * z of the modulator against the middle of the volume, mm, positive toward the viewer.
+     * The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
      */
     public var offsetMm: Double
     /**
-     * Bits of a modulator level.
+     * The number of bits of a modulator level.
      */
     public var bits: UInt32
     /**
-     * Radius of the aperture in the Fourier plane; 1 is the whole first order.
+     * The radius of the aperture in the Fourier plane; 1 is the whole first order.
      */
     public var apertureRadius: Double
 
@@ -3469,37 +3471,38 @@ public struct Display: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * Pixels along x.
+         * The number of pixels along x.
          */width: UInt32 = UInt32(1920), 
         /**
-         * Pixels along y.
+         * The number of pixels along y.
          */height: UInt32 = UInt32(1080), 
         /**
-         * Distance between neighbouring pixels, µm.
+         * The distance between neighbouring pixels, in µm.
          */pitchUm: Double = Double(8.0), 
         /**
-         * Wavelength of the red laser, nm.
+         * The wavelength of the red laser, in nm.
          */redNm: Double = Double(638.0), 
         /**
-         * Wavelength of the green laser, nm.
+         * The wavelength of the green laser, in nm.
          */greenNm: Double = Double(520.0), 
         /**
-         * Wavelength of the blue laser, nm.
+         * The wavelength of the blue laser, in nm.
          */blueNm: Double = Double(450.0), 
         /**
-         * Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
+         * The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
+         * wavelengths; none for a display with three lasers.
          */laserNm: Double? = nil, 
         /**
-         * Depth of the volume, mm.
+         * The depth of the volume, in mm.
          */volumeDepthMm: Double = Double(6.0), 
         /**
-         * z of the modulator against the middle of the volume, mm, positive toward the viewer.
+         * The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
          */offsetMm: Double = Double(0.0), 
         /**
-         * Bits of a modulator level.
+         * The number of bits of a modulator level.
          */bits: UInt32 = UInt32(8), 
         /**
-         * Radius of the aperture in the Fourier plane; 1 is the whole first order.
+         * The radius of the aperture in the Fourier plane; 1 is the whole first order.
          */apertureRadius: Double = Double(1.0)) {
         self.width = width
         self.height = height
@@ -3576,31 +3579,31 @@ public func FfiConverterTypeDisplay_lower(_ value: Display) -> RustBuffer {
 
 
 /**
- * Dropped frames by reason.
+ * The number of dropped frames for each reason.
  */
 public struct Drops: Equatable, Hashable {
     /**
-     * A newer frame came while they waited.
+     * Frames that waited when a newer frame arrived.
      */
     public var superseded: UInt64
     /**
-     * They came sooner than the target rate asks for.
+     * Frames that arrived sooner than the target rate allows.
      */
     public var aboveTargetRate: UInt64
     /**
-     * The session was paused.
+     * Frames that arrived while the session was paused.
      */
     public var paused: UInt64
     /**
-     * The session was reset before they were done.
+     * Frames that were not finished when the session was reset.
      */
     public var reset: UInt64
     /**
-     * The session was closed before they were done.
+     * Frames that were not finished when the session was closed.
      */
     public var closed: UInt64
     /**
-     * All together.
+     * The sum of all reasons.
      */
     public var total: UInt64
 
@@ -3608,22 +3611,22 @@ public struct Drops: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * A newer frame came while they waited.
+         * Frames that waited when a newer frame arrived.
          */superseded: UInt64, 
         /**
-         * They came sooner than the target rate asks for.
+         * Frames that arrived sooner than the target rate allows.
          */aboveTargetRate: UInt64, 
         /**
-         * The session was paused.
+         * Frames that arrived while the session was paused.
          */paused: UInt64, 
         /**
-         * The session was reset before they were done.
+         * Frames that were not finished when the session was reset.
          */reset: UInt64, 
         /**
-         * The session was closed before they were done.
+         * Frames that were not finished when the session was closed.
          */closed: UInt64, 
         /**
-         * All together.
+         * The sum of all reasons.
          */total: UInt64) {
         self.superseded = superseded
         self.aboveTargetRate = aboveTargetRate
@@ -3685,11 +3688,11 @@ public func FfiConverterTypeDrops_lower(_ value: Drops) -> RustBuffer {
 
 
 /**
- * What a frame is; its memory comes beside it.
+ * The description of a frame. Its memory is passed with it.
  */
 public struct FrameInfo: Equatable, Hashable {
     /**
-     * When it was taken, in nanoseconds of any clock that runs forward.
+     * The time at which the frame was taken, in nanoseconds of any clock that runs forward.
      */
     public var timestampNs: UInt64
     /**
@@ -3701,15 +3704,15 @@ public struct FrameInfo: Equatable, Hashable {
      */
     public var depth: DepthInfo
     /**
-     * The confidence map of the depth, where there is one.
+     * The confidence map of the depth image; none if there is no map.
      */
     public var confidence: ConfidenceInfo?
     /**
-     * How all must be turned to stand upright.
+     * The transformation of all images to upright ones.
      */
     public var orientation: Orientation
     /**
-     * How the pixels of depth and colour correspond; none where both show the same field of view.
+     * The correspondence of the pixels of depth and colour; none if both images have the same field of view.
      */
     public var cameras: Cameras?
 
@@ -3717,7 +3720,7 @@ public struct FrameInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * When it was taken, in nanoseconds of any clock that runs forward.
+         * The time at which the frame was taken, in nanoseconds of any clock that runs forward.
          */timestampNs: UInt64, 
         /**
          * The colour image.
@@ -3726,13 +3729,13 @@ public struct FrameInfo: Equatable, Hashable {
          * The depth image.
          */depth: DepthInfo, 
         /**
-         * The confidence map of the depth, where there is one.
+         * The confidence map of the depth image; none if there is no map.
          */confidence: ConfidenceInfo?, 
         /**
-         * How all must be turned to stand upright.
+         * The transformation of all images to upright ones.
          */orientation: Orientation, 
         /**
-         * How the pixels of depth and colour correspond; none where both show the same field of view.
+         * The correspondence of the pixels of depth and colour; none if both images have the same field of view.
          */cameras: Cameras?) {
         self.timestampNs = timestampNs
         self.colour = colour
@@ -3794,31 +3797,31 @@ public func FfiConverterTypeFrameInfo_lower(_ value: FrameInfo) -> RustBuffer {
 
 
 /**
- * How long each stage of a frame took, milliseconds.
+ * The time that each stage of a frame took, in milliseconds.
  */
 public struct FrameTimes: Equatable, Hashable {
     /**
-     * Colour to amplitudes of the display's resolution.
+     * Rotating, converting and resizing the colour image.
      */
     public var colourMs: Double
     /**
-     * Depth to normalized depth of the display's resolution.
+     * Reading, aligning, temporally smoothing and refining the depth.
      */
     public var depthMs: Double
     /**
-     * The midpoint hologram.
+     * Computing the midpoint hologram from the frame.
      */
     public var methodMs: Double
     /**
-     * From the midpoint to the modulator.
+     * Propagating from the midpoint to the modulator.
      */
     public var propagateMs: Double
     /**
-     * From the field to levels.
+     * Encoding the field into levels.
      */
     public var encodeMs: Double
     /**
-     * All together.
+     * The sum of all stages.
      */
     public var totalMs: Double
 
@@ -3826,22 +3829,22 @@ public struct FrameTimes: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * Colour to amplitudes of the display's resolution.
+         * Rotating, converting and resizing the colour image.
          */colourMs: Double, 
         /**
-         * Depth to normalized depth of the display's resolution.
+         * Reading, aligning, temporally smoothing and refining the depth.
          */depthMs: Double, 
         /**
-         * The midpoint hologram.
+         * Computing the midpoint hologram from the frame.
          */methodMs: Double, 
         /**
-         * From the midpoint to the modulator.
+         * Propagating from the midpoint to the modulator.
          */propagateMs: Double, 
         /**
-         * From the field to levels.
+         * Encoding the field into levels.
          */encodeMs: Double, 
         /**
-         * All together.
+         * The sum of all stages.
          */totalMs: Double) {
         self.colourMs = colourMs
         self.depthMs = depthMs
@@ -3903,35 +3906,35 @@ public func FfiConverterTypeFrameTimes_lower(_ value: FrameTimes) -> RustBuffer 
 
 
 /**
- * What is known of a hologram.
+ * The properties of a hologram.
  */
 public struct HologramInfo: Equatable, Hashable {
     /**
-     * The frame's timestamp.
+     * The timestamp of the frame.
      */
     public var timestampNs: UInt64
     /**
-     * Pixels along x.
+     * The width in pixels.
      */
     public var width: UInt32
     /**
-     * Pixels along y.
+     * The height in pixels.
      */
     public var height: UInt32
     /**
-     * How many colours its levels have: 3, or 1 for a display of one laser.
+     * The number of colours of the levels: 3, or 1 for a display with one laser.
      */
     public var colours: UInt32
     /**
-     * The amplitude that full light stands for.
+     * The amplitude that maps to full light.
      */
     public var scale: Float
     /**
-     * Metres at the near end of the volume; none for normalized depth.
+     * The distance of the near end of the volume in metres; none for normalized depth.
      */
     public var nearM: Float?
     /**
-     * Metres at the far end of the volume; none for normalized depth.
+     * The distance of the far end of the volume in metres; none for normalized depth.
      */
     public var farM: Float?
     /**
@@ -3939,11 +3942,11 @@ public struct HologramInfo: Equatable, Hashable {
      */
     public var validDepth: Float
     /**
-     * The quality level that it was made at, 0 the best.
+     * The quality level of the hologram; 0 is the best.
      */
     public var qualityLevel: UInt32
     /**
-     * How long each stage took.
+     * The time that each stage took.
      */
     public var times: FrameTimes
 
@@ -3951,34 +3954,34 @@ public struct HologramInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * The frame's timestamp.
+         * The timestamp of the frame.
          */timestampNs: UInt64, 
         /**
-         * Pixels along x.
+         * The width in pixels.
          */width: UInt32, 
         /**
-         * Pixels along y.
+         * The height in pixels.
          */height: UInt32, 
         /**
-         * How many colours its levels have: 3, or 1 for a display of one laser.
+         * The number of colours of the levels: 3, or 1 for a display with one laser.
          */colours: UInt32, 
         /**
-         * The amplitude that full light stands for.
+         * The amplitude that maps to full light.
          */scale: Float, 
         /**
-         * Metres at the near end of the volume; none for normalized depth.
+         * The distance of the near end of the volume in metres; none for normalized depth.
          */nearM: Float?, 
         /**
-         * Metres at the far end of the volume; none for normalized depth.
+         * The distance of the far end of the volume in metres; none for normalized depth.
          */farM: Float?, 
         /**
          * The share of the depth sensor's pixels that had a usable reading.
          */validDepth: Float, 
         /**
-         * The quality level that it was made at, 0 the best.
+         * The quality level of the hologram; 0 is the best.
          */qualityLevel: UInt32, 
         /**
-         * How long each stage took.
+         * The time that each stage took.
          */times: FrameTimes) {
         self.timestampNs = timestampNs
         self.width = width
@@ -4052,24 +4055,24 @@ public func FfiConverterTypeHologramInfo_lower(_ value: HologramInfo) -> RustBuf
 
 
 /**
- * The pinhole model of a camera, in pixels of its image before it is turned upright. The middle of the first pixel is
- * (0, 0).
+ * The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
+ * pixel is (0, 0).
  */
 public struct Intrinsics: Equatable, Hashable {
     /**
-     * Focal length along x.
+     * The focal length along x.
      */
     public var fx: Double
     /**
-     * Focal length along y.
+     * The focal length along y.
      */
     public var fy: Double
     /**
-     * x of the principal point.
+     * The x of the principal point.
      */
     public var cx: Double
     /**
-     * y of the principal point.
+     * The y of the principal point.
      */
     public var cy: Double
 
@@ -4077,16 +4080,16 @@ public struct Intrinsics: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * Focal length along x.
+         * The focal length along x.
          */fx: Double, 
         /**
-         * Focal length along y.
+         * The focal length along y.
          */fy: Double, 
         /**
-         * x of the principal point.
+         * The x of the principal point.
          */cx: Double, 
         /**
-         * y of the principal point.
+         * The y of the principal point.
          */cy: Double) {
         self.fx = fx
         self.fy = fy
@@ -4142,27 +4145,27 @@ public func FfiConverterTypeIntrinsics_lower(_ value: Intrinsics) -> RustBuffer 
 
 
 /**
- * What a network is, and the display that it was trained for.
+ * The properties of a network and of the display that it was trained for.
  */
 public struct NetworkInfo: Equatable, Hashable {
     /**
-     * How many convolutions.
+     * The number of convolutions.
      */
     public var layers: UInt32
     /**
-     * Filters of each hidden layer.
+     * The number of filters of each hidden layer.
      */
     public var filters: UInt32
     /**
-     * The numbers that its layers compute in.
+     * The number format of the layers.
      */
     public var precision: String
     /**
-     * Distance between neighbouring pixels, µm.
+     * The distance between neighbouring pixels, in µm.
      */
     public var pitchUm: Double
     /**
-     * Depth of the volume, mm.
+     * The depth of the volume, in mm.
      */
     public var volumeDepthMm: Double
 
@@ -4170,19 +4173,19 @@ public struct NetworkInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * How many convolutions.
+         * The number of convolutions.
          */layers: UInt32, 
         /**
-         * Filters of each hidden layer.
+         * The number of filters of each hidden layer.
          */filters: UInt32, 
         /**
-         * The numbers that its layers compute in.
+         * The number format of the layers.
          */precision: String, 
         /**
-         * Distance between neighbouring pixels, µm.
+         * The distance between neighbouring pixels, in µm.
          */pitchUm: Double, 
         /**
-         * Depth of the volume, mm.
+         * The depth of the volume, in mm.
          */volumeDepthMm: Double) {
         self.layers = layers
         self.filters = filters
@@ -4241,15 +4244,15 @@ public func FfiConverterTypeNetworkInfo_lower(_ value: NetworkInfo) -> RustBuffe
 
 
 /**
- * How a sensor's picture becomes the one that is shown: turned, then mirrored.
+ * The transformation from a sensor's image to the upright image: a rotation, then mirroring.
  */
 public struct Orientation: Equatable, Hashable {
     /**
-     * The turn.
+     * The rotation.
      */
     public var rotation: Rotation
     /**
-     * Whether left and right are exchanged after the turn, as front cameras need.
+     * Whether left and right are exchanged after the rotation, as front cameras need.
      */
     public var mirrored: Bool
 
@@ -4257,10 +4260,10 @@ public struct Orientation: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * The turn.
+         * The rotation.
          */rotation: Rotation, 
         /**
-         * Whether left and right are exchanged after the turn, as front cameras need.
+         * Whether left and right are exchanged after the rotation, as front cameras need.
          */mirrored: Bool = false) {
         self.rotation = rotation
         self.mirrored = mirrored
@@ -4310,27 +4313,27 @@ public func FfiConverterTypeOrientation_lower(_ value: Orientation) -> RustBuffe
 
 
 /**
- * How a hologram is put on its modulator.
+ * The placement of a hologram on its modulator.
  */
 public struct Placement: Equatable, Hashable {
     /**
-     * How colours lie in images.
+     * The arrangement of colours in images.
      */
     public var layout: Layout
     /**
-     * Whether left and right are exchanged, of the whole image.
+     * Whether the whole image is flipped left to right.
      */
     public var flipX: Bool
     /**
-     * Whether top and bottom are exchanged, of the whole image.
+     * Whether the whole image is flipped top to bottom.
      */
     public var flipY: Bool
     /**
-     * How many pixels to the right of the middle the hologram stands, before flips.
+     * The hologram's shift to the right of the middle in pixels, before flips.
      */
     public var shiftX: Int32
     /**
-     * How many pixels below the middle it stands, before flips.
+     * The hologram's shift below the middle in pixels, before flips.
      */
     public var shiftY: Int32
 
@@ -4338,19 +4341,19 @@ public struct Placement: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * How colours lie in images.
+         * The arrangement of colours in images.
          */layout: Layout, 
         /**
-         * Whether left and right are exchanged, of the whole image.
+         * Whether the whole image is flipped left to right.
          */flipX: Bool = false, 
         /**
-         * Whether top and bottom are exchanged, of the whole image.
+         * Whether the whole image is flipped top to bottom.
          */flipY: Bool = false, 
         /**
-         * How many pixels to the right of the middle the hologram stands, before flips.
+         * The hologram's shift to the right of the middle in pixels, before flips.
          */shiftX: Int32 = 0, 
         /**
-         * How many pixels below the middle it stands, before flips.
+         * The hologram's shift below the middle in pixels, before flips.
          */shiftY: Int32 = 0) {
         self.layout = layout
         self.flipX = flipX
@@ -4409,15 +4412,15 @@ public func FfiConverterTypePlacement_lower(_ value: Placement) -> RustBuffer {
 
 
 /**
- * Where the pixels of one plane lie.
+ * The strides of a plane.
  */
 public struct PlaneInfo: Equatable, Hashable {
     /**
-     * Bytes from one row to the next.
+     * The number of bytes from one row to the next.
      */
     public var rowStride: UInt32
     /**
-     * Bytes from one pixel to the next in a row.
+     * The number of bytes from one pixel to the next in a row.
      */
     public var pixelStride: UInt32
 
@@ -4425,10 +4428,10 @@ public struct PlaneInfo: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * Bytes from one row to the next.
+         * The number of bytes from one row to the next.
          */rowStride: UInt32, 
         /**
-         * Bytes from one pixel to the next in a row.
+         * The number of bytes from one pixel to the next in a row.
          */pixelStride: UInt32) {
         self.rowStride = rowStride
         self.pixelStride = pixelStride
@@ -4478,15 +4481,16 @@ public func FfiConverterTypePlaneInfo_lower(_ value: PlaneInfo) -> RustBuffer {
 
 
 /**
- * Where a point p of the depth camera (x right, y down, z forward) is for the colour camera: R·p + t.
+ * The pose of the depth camera. A point p of the depth camera (x right, y down, z forward) is at R·p + t of the colour
+ * camera.
  */
 public struct Pose: Equatable, Hashable {
     /**
-     * R, its 9 numbers row by row.
+     * R: 9 numbers, row by row.
      */
     public var rotation: [Double]
     /**
-     * t, 3 numbers, metres.
+     * t: 3 numbers, in metres.
      */
     public var translationM: [Double]
 
@@ -4494,10 +4498,10 @@ public struct Pose: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * R, its 9 numbers row by row.
+         * R: 9 numbers, row by row.
          */rotation: [Double], 
         /**
-         * t, 3 numbers, metres.
+         * t: 3 numbers, in metres.
          */translationM: [Double]) {
         self.rotation = rotation
         self.translationM = translationM
@@ -4551,15 +4555,15 @@ public func FfiConverterTypePose_lower(_ value: Pose) -> RustBuffer {
  */
 public struct QualityChange: Equatable, Hashable {
     /**
-     * The quality level before.
+     * The previous quality level.
      */
     public var fromQualityLevel: UInt32
     /**
-     * The quality level now; the one before where the step was refused.
+     * The new quality level; the previous one if the reason is `Refused`.
      */
     public var toQualityLevel: UInt32
     /**
-     * Why.
+     * The reason.
      */
     public var reason: QualityReason
 
@@ -4567,13 +4571,13 @@ public struct QualityChange: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * The quality level before.
+         * The previous quality level.
          */fromQualityLevel: UInt32, 
         /**
-         * The quality level now; the one before where the step was refused.
+         * The new quality level; the previous one if the reason is `Refused`.
          */toQualityLevel: UInt32, 
         /**
-         * Why.
+         * The reason.
          */reason: QualityReason) {
         self.fromQualityLevel = fromQualityLevel
         self.toQualityLevel = toQualityLevel
@@ -4626,28 +4630,28 @@ public func FfiConverterTypeQualityChange_lower(_ value: QualityChange) -> RustB
 
 
 /**
- * One quality: a method, a resolution, and how the displayed image is corrected. A hologram smaller than the modulator
- * is shown in its middle.
+ * A quality level: a method, a resolution and the number of correction steps. A hologram smaller than the modulator is
+ * displayed in its centre.
  */
 public struct QualityLevel {
     /**
-     * What makes the hologram.
+     * The method that computes the hologram.
      */
     public var method: Method
     /**
-     * Width of the hologram, pixels.
+     * The width of the hologram in pixels.
      */
     public var width: UInt32
     /**
-     * Height of the hologram, pixels.
+     * The height of the hologram in pixels.
      */
     public var height: UInt32
     /**
-     * Local steps of this quality level; none for the session's.
+     * The number of local steps; none for the session's number.
      */
     public var localSteps: UInt32?
     /**
-     * Steps at the midpoint of this quality level; none for the session's.
+     * The number of steps at the midpoint; none for the session's number.
      */
     public var midpointSteps: UInt32?
 
@@ -4655,19 +4659,19 @@ public struct QualityLevel {
     // declare one manually.
     public init(
         /**
-         * What makes the hologram.
+         * The method that computes the hologram.
          */method: Method, 
         /**
-         * Width of the hologram, pixels.
+         * The width of the hologram in pixels.
          */width: UInt32, 
         /**
-         * Height of the hologram, pixels.
+         * The height of the hologram in pixels.
          */height: UInt32, 
         /**
-         * Local steps of this quality level; none for the session's.
+         * The number of local steps; none for the session's number.
          */localSteps: UInt32? = nil, 
         /**
-         * Steps at the midpoint of this quality level; none for the session's.
+         * The number of steps at the midpoint; none for the session's number.
          */midpointSteps: UInt32? = nil) {
         self.method = method
         self.width = width
@@ -4726,15 +4730,15 @@ public func FfiConverterTypeQualityLevel_lower(_ value: QualityLevel) -> RustBuf
 
 
 /**
- * What a session makes, and how. [`session_options`] gives the defaults; change what differs.
+ * The options of a session. [`session_options`] returns the defaults.
  */
 public struct SessionOptions {
     /**
-     * What holograms are for.
+     * The target of the holograms.
      */
     public var target: Target
     /**
-     * Quality levels, the best first: 1 to 16.
+     * The quality levels, best first: 1 to 16.
      */
     public var qualityLevels: [QualityLevel]
     /**
@@ -4742,51 +4746,52 @@ public struct SessionOptions {
      */
     public var quality: Quality
     /**
-     * Frames a second that are aimed at; none takes every frame and never steps.
+     * The target rate in frames per second; none if the session takes every frame and does not adapt its quality level
+     * to frame times.
      */
     public var targetRateHz: Double?
     /**
-     * How the field becomes phases.
+     * The conversion of fields to phases.
      */
     public var encoding: Encoding
     /**
-     * Which amplitude full light stands for.
+     * The amplitude that maps to full light.
      */
     public var brightness: Brightness
     /**
-     * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
-     * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+     * The share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark
+     * areas; none for the encoding's default: 0.4, and 0 with a pre-filter.
      */
     public var darkThreshold: Float?
     /**
-     * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
-     * what suits the encoding: 1, and 0 with a pre-filter.
+     * The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for
+     * the encoding's default: 1, and 0 with a pre-filter.
      */
     public var localSteps: UInt32?
     /**
-     * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
-     * video, where it goes on from the frame before.
+     * The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
+     * stills; 1 suits video, where each frame continues from the previous one.
      */
     public var midpointSteps: UInt32
     /**
-     * Which metres are shown at the ends of the volume.
+     * The distances that map to the ends of the volume.
      */
     public var depthRange: DepthRange
     /**
-     * Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
+     * The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
      */
     public var leastConfidence: Float
     /**
-     * Threads to compute with, at most 256; none for as many as the device has.
+     * The number of threads to compute with, at most 256; none for as many as the device has.
      */
     public var threads: UInt32?
     /**
-     * Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a
-     * multiple of them.
+     * The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
+     * session is a multiple of it.
      */
     public var mostPixels: UInt64
     /**
-     * Where frames are computed.
+     * The backend that computes frames.
      */
     public var backend: Backend
 
@@ -4794,50 +4799,51 @@ public struct SessionOptions {
     // declare one manually.
     public init(
         /**
-         * What holograms are for.
+         * The target of the holograms.
          */target: Target, 
         /**
-         * Quality levels, the best first: 1 to 16.
+         * The quality levels, best first: 1 to 16.
          */qualityLevels: [QualityLevel], 
         /**
          * Whether the session may change its quality level by itself.
          */quality: Quality, 
         /**
-         * Frames a second that are aimed at; none takes every frame and never steps.
+         * The target rate in frames per second; none if the session takes every frame and does not adapt its quality level
+         * to frame times.
          */targetRateHz: Double?, 
         /**
-         * How the field becomes phases.
+         * The conversion of fields to phases.
          */encoding: Encoding, 
         /**
-         * Which amplitude full light stands for.
+         * The amplitude that maps to full light.
          */brightness: Brightness, 
         /**
-         * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
-         * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+         * The share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark
+         * areas; none for the encoding's default: 0.4, and 0 with a pre-filter.
          */darkThreshold: Float? = nil, 
         /**
-         * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
-         * what suits the encoding: 1, and 0 with a pre-filter.
+         * The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for
+         * the encoding's default: 1, and 0 with a pre-filter.
          */localSteps: UInt32? = nil, 
         /**
-         * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
-         * video, where it goes on from the frame before.
+         * The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
+         * stills; 1 suits video, where each frame continues from the previous one.
          */midpointSteps: UInt32 = UInt32(0), 
         /**
-         * Which metres are shown at the ends of the volume.
+         * The distances that map to the ends of the volume.
          */depthRange: DepthRange, 
         /**
-         * Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
+         * The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
          */leastConfidence: Float, 
         /**
-         * Threads to compute with, at most 256; none for as many as the device has.
+         * The number of threads to compute with, at most 256; none for as many as the device has.
          */threads: UInt32?, 
         /**
-         * Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a
-         * multiple of them.
+         * The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
+         * session is a multiple of it.
          */mostPixels: UInt64 = UInt64(33554432), 
         /**
-         * Where frames are computed.
+         * The backend that computes frames.
          */backend: Backend) {
         self.target = target
         self.qualityLevels = qualityLevels
@@ -4923,11 +4929,12 @@ public func FfiConverterTypeSessionOptions_lower(_ value: SessionOptions) -> Rus
 
 
 /**
- * What a session has done so far. Submitted frames are processed, failed, refused, dropped or pending.
+ * The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
+ * pending.
  */
 public struct Statistics: Equatable, Hashable {
     /**
-     * Frames that were given to the session.
+     * Frames that were submitted.
      */
     public var submitted: UInt64
     /**
@@ -4939,7 +4946,7 @@ public struct Statistics: Equatable, Hashable {
      */
     public var failed: UInt64
     /**
-     * Frames that came late.
+     * Frames that were refused because they were late or the session was closed.
      */
     public var refused: UInt64
     /**
@@ -4947,31 +4954,31 @@ public struct Statistics: Equatable, Hashable {
      */
     public var dropped: Drops
     /**
-     * Frames that wait or are in flight.
+     * Frames that wait or are being processed.
      */
     public var pending: UInt64
     /**
-     * Holograms a second, of late.
+     * Holograms per second over the last 30.
      */
     public var rateHz: Double
     /**
-     * Mean times, of late.
+     * The mean times of the stages over the last 30 holograms.
      */
     public var times: FrameTimes
     /**
-     * What runs the network.
+     * The backend that computes the frames.
      */
     public var backend: String
     /**
-     * Why that.
+     * The reason for using this backend.
      */
     public var backendWhy: String
     /**
-     * The quality level, 0 the best.
+     * The quality level; 0 is the best.
      */
     public var qualityLevel: UInt32
     /**
-     * How often the listener threw.
+     * The number of errors that the listener threw.
      */
     public var listenerFailures: UInt64
 
@@ -4979,7 +4986,7 @@ public struct Statistics: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * Frames that were given to the session.
+         * Frames that were submitted.
          */submitted: UInt64, 
         /**
          * Frames that became holograms.
@@ -4988,31 +4995,31 @@ public struct Statistics: Equatable, Hashable {
          * Frames that could not be processed.
          */failed: UInt64, 
         /**
-         * Frames that came late.
+         * Frames that were refused because they were late or the session was closed.
          */refused: UInt64, 
         /**
          * Frames that were dropped.
          */dropped: Drops, 
         /**
-         * Frames that wait or are in flight.
+         * Frames that wait or are being processed.
          */pending: UInt64, 
         /**
-         * Holograms a second, of late.
+         * Holograms per second over the last 30.
          */rateHz: Double, 
         /**
-         * Mean times, of late.
+         * The mean times of the stages over the last 30 holograms.
          */times: FrameTimes, 
         /**
-         * What runs the network.
+         * The backend that computes the frames.
          */backend: String, 
         /**
-         * Why that.
+         * The reason for using this backend.
          */backendWhy: String, 
         /**
-         * The quality level, 0 the best.
+         * The quality level; 0 is the best.
          */qualityLevel: UInt32, 
         /**
-         * How often the listener threw.
+         * The number of errors that the listener threw.
          */listenerFailures: UInt64) {
         self.submitted = submitted
         self.processed = processed
@@ -5092,18 +5099,19 @@ public func FfiConverterTypeStatistics_lower(_ value: Statistics) -> RustBuffer 
 
 
 /**
- * Where frames are computed.
+ * The backend that computes frames.
  */
 
 public enum Backend: Equatable, Hashable {
     
     /**
-     * On the CPU.
+     * Computes on the CPU.
      */
     case cpu
     /**
-     * On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
-     * The statistics' `backend` and `backend_why` say which it is, and why.
+     * Computes on the GPU if this library was built with GPU support, a GPU exists and its results agree with the
+     * CPU's; otherwise on the CPU. `backend` and `backend_why` in the statistics name the backend in use and the
+     * reason.
      */
     case gpu
 
@@ -5168,17 +5176,17 @@ public func FfiConverterTypeBackend_lower(_ value: Backend) -> RustBuffer {
 
 
 /**
- * Which amplitude full light stands for.
+ * The amplitude that maps to full light.
  */
 
 public enum Brightness: Equatable, Hashable {
     
     /**
-     * Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
+     * An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
      */
     case smoothed
     /**
-     * This one; what is brighter is clipped.
+     * A fixed amplitude. Larger amplitudes are clipped.
      */
     case fixed(
         /**
@@ -5186,7 +5194,7 @@ public enum Brightness: Equatable, Hashable {
          */scale: Float
     )
     /**
-     * The frame's largest.
+     * The largest amplitude of the frame.
      */
     case frameMax
 
@@ -5259,25 +5267,25 @@ public func FfiConverterTypeBrightness_lower(_ value: Brightness) -> RustBuffer 
 
 
 /**
- * How a colour image lies in memory.
+ * The memory layout of a colour image.
  */
 
 public enum ColourFormat: Equatable, Hashable {
     
     /**
-     * One plane; bytes red, green, blue, alpha (which is not looked at).
+     * One plane with the bytes red, green, blue, alpha. Alpha is ignored.
      */
     case rgba
     /**
-     * One plane; bytes blue, green, red, alpha (which is not looked at). iOS' 32BGRA.
+     * One plane with the bytes blue, green, red, alpha, as in iOS' 32BGRA. Alpha is ignored.
      */
     case bgra
     /**
-     * One plane; bytes red, green, blue.
+     * One plane with the bytes red, green, blue.
      */
     case rgb
     /**
-     * Two planes: luma; and at half the resolution blue and red chroma side by side. iOS' 420f and 420v.
+     * Two planes: luma, and interleaved blue and red chroma at half the resolution. iOS' 420f and 420v.
      */
     case nv12
     /**
@@ -5364,17 +5372,17 @@ public func FfiConverterTypeColourFormat_lower(_ value: ColourFormat) -> RustBuf
 
 
 /**
- * How a confidence map lies in memory.
+ * The memory layout of a confidence map.
  */
 
 public enum ConfidenceFormat: Equatable, Hashable {
     
     /**
-     * 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
+     * 0 low, 1 medium, 2 high, as in ARKit's ARConfidenceLevel.
      */
     case lowMediumHigh
     /**
-     * 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+     * 0 none to 255 full, as in ARCore's acquireRawDepthConfidenceImage.
      */
     case u8
 
@@ -5439,43 +5447,43 @@ public func FfiConverterTypeConfidenceFormat_lower(_ value: ConfidenceFormat) ->
 
 
 /**
- * How a depth image lies in memory. But for the normalized ones, 0, negative numbers and what is not finite mean no
- * reading.
+ * The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
+ * are not finite mean no reading.
  */
 
 public enum DepthFormat: Equatable, Hashable {
     
     /**
-     * Metres, 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
+     * Metres as 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
      */
     case metresF32
     /**
-     * Metres, 16-bit floats: AVFoundation's DepthFloat16.
+     * Metres as 16-bit floats: AVFoundation's DepthFloat16.
      */
     case metresF16
     /**
-     * Inverse metres, 32-bit floats: AVFoundation's DisparityFloat32.
+     * Inverse metres as 32-bit floats: AVFoundation's DisparityFloat32.
      */
     case disparityF32
     /**
-     * Inverse metres, 16-bit floats: AVFoundation's DisparityFloat16.
+     * Inverse metres as 16-bit floats: AVFoundation's DisparityFloat16.
      */
     case disparityF16
     /**
-     * Millimetres, all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
+     * Millimetres in all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
      */
     case millimetresU16
     /**
-     * Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3. Not the same as millimetres
-     * in all 16.
+     * Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits. It differs from
+     * millimetres in all 16 bits.
      */
     case androidDepth16
     /**
-     * 0 nearest to 255 farthest; every pixel is a reading.
+     * Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
      */
     case normalizedU8
     /**
-     * 0 nearest to 65535 farthest; every pixel is a reading.
+     * 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
      */
     case normalizedU16
 
@@ -5576,24 +5584,24 @@ public func FfiConverterTypeDepthFormat_lower(_ value: DepthFormat) -> RustBuffe
 
 
 /**
- * Which metres are shown at the ends of the volume.
+ * The distances that map to the ends of the volume.
  */
 
 public enum DepthRange: Equatable, Hashable {
     
     /**
-     * The 1st and 99th percentile of the readings, in video smoothed.
+     * The 1st and 99th percentile of the readings, smoothed over time in video.
      */
     case percentiles
     /**
-     * These.
+     * Fixed distances.
      */
     case fixed(
         /**
-         * Metres shown nearest.
+         * The distance of the near end, in metres.
          */nearM: Float, 
         /**
-         * Metres shown farthest.
+         * The distance of the far end, in metres.
          */farM: Float
     )
 
@@ -5661,17 +5669,17 @@ public func FfiConverterTypeDepthRange_lower(_ value: DepthRange) -> RustBuffer 
 
 
 /**
- * Why a frame was not made into a hologram, without fault.
+ * The reason why a session dropped a frame without an error.
  */
 
 public enum DropReason: Equatable, Hashable {
     
     /**
-     * A newer frame came while it waited.
+     * A newer frame arrived while this one waited.
      */
     case superseded
     /**
-     * It came sooner than the target rate asks for.
+     * The frame arrived sooner than the target rate allows.
      */
     case aboveTargetRate
     /**
@@ -5679,20 +5687,20 @@ public enum DropReason: Equatable, Hashable {
      */
     case paused
     /**
-     * The session was reset before it was done.
+     * The session was reset before the frame was finished.
      */
     case reset
     /**
-     * The session was closed before it was done.
+     * The session was closed before the frame was finished.
      */
     case closed
     /**
-     * It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages'
-     * streams say so.
+     * The frame became a hologram, but newer ones arrived before the app took it from the stream of events. Only the
+     * streams of the packages report this reason.
      */
     case unread
     /**
-     * For a reason that this version of the bindings does not know.
+     * A reason that this version of the bindings does not know.
      */
     case other
 
@@ -5787,36 +5795,37 @@ public func FfiConverterTypeDropReason_lower(_ value: DropReason) -> RustBuffer 
 
 
 /**
- * How the field becomes phases.
+ * The conversion of a field to phases.
  */
 
 public enum Encoding {
     
     /**
-     * Double phase on the field as it is.
+     * Double phase of the unchanged field.
      */
     case doublePhase
     /**
-     * A small Gaussian blur first (AA-DPM).
+     * Double phase after a small Gaussian blur (AA-DPM).
      */
     case antiAlias(
         /**
-         * Standard deviation, pixels; 0.7 as published.
+         * The standard deviation in pixels; 0.7 in the paper.
          */sigma: Float, 
         /**
-         * Taps, an odd number; 3 as published.
+         * The number of taps, an odd number; 3 in the paper.
          */width: UInt32
     )
     /**
-     * High diagonal frequencies cut first (BL-DPM).
+     * Double phase after a filter that removes high diagonal frequencies (BL-DPM).
      */
     case bandLimit(
         /**
-         * The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel; 1 as published.
+         * The bound of |tan(πfx)·tan(πfy)|, where f is in cycles per pixel; 1 in the paper.
          */k: Float
     )
     /**
-     * A pre-filter network first (DDPM), trained for the display's offset together with the hologram network.
+     * Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
+     * offset of the display.
      */
     case deep(
         /**
@@ -5904,25 +5913,25 @@ public func FfiConverterTypeEncoding_lower(_ value: Encoding) -> RustBuffer {
 
 
 /**
- * How the levels of the colours lie in images for a modulator's driver.
+ * The arrangement of the colours' levels in images for a modulator's driver.
  */
 
 public enum Layout: Equatable, Hashable {
     
     /**
-     * One image, bytes red, green, blue.
+     * One image with bytes red, green, blue.
      */
     case rgb
     /**
-     * One image, bytes red, green, blue, alpha 255.
+     * One image with bytes red, green, blue, alpha 255.
      */
     case rgba
     /**
-     * One image, bytes blue, green, red, alpha 255.
+     * One image with bytes blue, green, red, alpha 255.
      */
     case bgra
     /**
-     * An image for each colour, one after another: red, green, blue; a byte a pixel.
+     * One image for each colour in the order red, green, blue, with one byte for each pixel.
      */
     case grey
 
@@ -5999,8 +6008,8 @@ public func FfiConverterTypeLayout_lower(_ value: Layout) -> RustBuffer {
 
 
 /**
- * What a listener threw, whatever it was. An error that comes in must not be flat: a flat one only goes out, and
- * taking it in would be a panic on the session's thread.
+ * An error that a listener threw. It is not flat, because UniFFI cannot read a flat error and would panic on the
+ * session's thread.
  */
 public 
 enum ListenerError: Swift.Error, Equatable, Hashable {
@@ -6008,11 +6017,11 @@ enum ListenerError: Swift.Error, Equatable, Hashable {
     
     
     /**
-     * With its own words.
+     * The listener threw an error or an exception.
      */
     case Threw(
         /**
-         * What it said.
+         * The message.
          */reason: String
     )
 
@@ -6080,21 +6089,21 @@ public func FfiConverterTypeListenerError_lower(_ value: ListenerError) -> RustB
 
 
 /**
- * How much a message matters.
+ * The severity of a log message.
  */
 
 public enum LogLevel: Equatable, Hashable {
     
     /**
-     * What went wrong.
+     * An error.
      */
     case error
     /**
-     * What looks wrong.
+     * Something that may be wrong.
      */
     case warning
     /**
-     * What is done.
+     * An action of the library.
      */
     case info
     /**
@@ -6175,7 +6184,7 @@ public func FfiConverterTypeLogLevel_lower(_ value: LogLevel) -> RustBuffer {
 
 
 /**
- * What makes holograms.
+ * The method that computes holograms.
  */
 
 public enum Method {
@@ -6185,20 +6194,20 @@ public enum Method {
      */
     case trained(
         /**
-         * The network, for the session's display.
+         * The network, which must suit the session's display.
          */network: Network
     )
     /**
-     * The plane sweep, for any display: slower, and nothing needs to be trained.
+     * The plane sweep, which suits any display. It is slower and needs no training.
      */
     case sweep
     /**
-     * For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained
-     * network where it is noisy or incomplete, as sensors' depth is.
+     * The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
+     * noisy or incomplete depth, such as depth from sensors.
      */
     case auto(
         /**
-         * The network, for the session's display.
+         * The network, which must suit the session's display.
          */network: Network
     )
 
@@ -6273,7 +6282,7 @@ public func FfiConverterTypeMethod_lower(_ value: Method) -> RustBuffer {
 
 
 /**
- * Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right.
+ * The error of a call. The message is one line that names what is wrong and what would be right.
  */
 public 
 enum PhasefrontError: Swift.Error, Equatable, Hashable {
@@ -6281,42 +6290,42 @@ enum PhasefrontError: Swift.Error, Equatable, Hashable {
     
     
     /**
-     * A display whose physics is impossible or out of range.
+     * The physics of a display is impossible or out of range.
      */
     case Display(message: String)
     
     /**
-     * A frame, plane or image of the wrong shape or with unusable values.
+     * A frame, plane or image has the wrong shape or unusable values.
      */
     case Frame(message: String)
     
     /**
-     * A frame that is not later than the last one. It is refused; what follows is not harmed.
+     * A frame is not later than the previous one. It is refused; later frames are not affected.
      */
     case Timestamp(message: String)
     
     /**
-     * A setting or an argument that cannot be meant or planned for.
+     * A setting or an argument is invalid or cannot be planned.
      */
     case Setting(message: String)
     
     /**
-     * What is not a hologram network, or one for another display.
+     * A file is not a hologram network, or the network is for another display.
      */
     case Network(message: String)
     
     /**
-     * A file that cannot be read.
+     * A file cannot be read.
      */
     case File(message: String)
     
     /**
-     * A call that a session cannot answer in its mode or state.
+     * A session cannot answer the call in its mode or state.
      */
     case Session(message: String)
     
     /**
-     * A fault of Phasefront. The call had no effect, or the frame is lost; please report it.
+     * Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
      */
     case Internal(message: String)
     
@@ -6427,22 +6436,22 @@ public func FfiConverterTypePhasefrontError_lower(_ value: PhasefrontError) -> R
 
 
 /**
- * Whether a session may change its quality.
+ * Determines whether a session may change its quality level.
  */
 
 public enum Quality: Equatable, Hashable {
     
     /**
-     * It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
-     * where there is room.
+     * The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and
+     * raises it if there is time left.
      */
     case adaptive
     /**
-     * It stays at this quality level.
+     * The session stays at this quality level.
      */
     case fixed(
         /**
-         * 0 the best.
+         * The quality level; 0 is the best.
          */qualityLevel: UInt32
     )
 
@@ -6509,7 +6518,7 @@ public func FfiConverterTypeQuality_lower(_ value: Quality) -> RustBuffer {
 
 
 /**
- * Why a session changed its quality.
+ * The reason why a session changed its quality level.
  */
 
 public enum QualityReason: Equatable, Hashable {
@@ -6519,7 +6528,7 @@ public enum QualityReason: Equatable, Hashable {
      */
     case tooSlow
     /**
-     * There was room for more.
+     * There was time left.
      */
     case room
     /**
@@ -6527,16 +6536,16 @@ public enum QualityReason: Equatable, Hashable {
      */
     case thermal
     /**
-     * The caller said so.
+     * The app asked for it.
      */
     case asked
     /**
-     * The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+     * The next quality level cannot be planned. The session keeps the previous one and does not try the next one
      * again.
      */
     case refused
     /**
-     * For a reason that this version of the bindings does not know.
+     * A reason that this version of the bindings does not know.
      */
     case other
 
@@ -6625,13 +6634,13 @@ public func FfiConverterTypeQualityReason_lower(_ value: QualityReason) -> RustB
 
 
 /**
- * How far a sensor's picture must be turned clockwise to stand upright.
+ * The clockwise rotation that turns a sensor's image upright.
  */
 
 public enum Rotation: Equatable, Hashable {
     
     /**
-     * Not at all.
+     * No rotation.
      */
     case upright
     /**
@@ -6643,7 +6652,7 @@ public enum Rotation: Equatable, Hashable {
      */
     case half
     /**
-     * Three quarters.
+     * Three quarters of a turn.
      */
     case clockwise270
 
@@ -6720,21 +6729,21 @@ public func FfiConverterTypeRotation_lower(_ value: Rotation) -> RustBuffer {
 
 
 /**
- * How a session runs; fixed when it is made.
+ * The running mode of a session. It is fixed when the session is created.
  */
 
 public enum RunningMode: Equatable, Hashable {
     
     /**
-     * Each frame is answered by itself.
+     * The session answers each frame independently of all others.
      */
     case image
     /**
-     * Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
+     * The session answers each frame, and smooths depth and brightness over time. Timestamps must increase.
      */
     case video
     /**
-     * Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+     * The app submits frames without waiting, and the listener receives the outcome of each. Timestamps must increase.
      */
     case live
 
@@ -6811,43 +6820,43 @@ public func FfiConverterTypeRunningMode_lower(_ value: RunningMode) -> RustBuffe
 public enum Stage: Equatable, Hashable {
     
     /**
-     * All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
+     * The whole work on a frame on the session's threads. It contains all other stages except `Plan` and `Preview`.
      */
     case frame
     /**
-     * Colour: turned, converted, resized.
+     * Rotating, converting and resizing the colour image.
      */
     case colour
     /**
-     * Depth: read, aligned, smoothed over time, refined.
+     * Reading, aligning, temporally smoothing and refining the depth.
      */
     case depth
     /**
-     * From the frame to the midpoint hologram.
+     * Computing the midpoint hologram from the frame.
      */
     case method
     /**
-     * From the midpoint to the modulator.
+     * Propagating from the midpoint to the modulator.
      */
     case propagate
     /**
-     * From the field to levels.
+     * Encoding the field into levels.
      */
     case encode
     /**
-     * Steps at the midpoint, within `Encode`.
+     * Correction steps at the midpoint, inside `Encode`.
      */
     case midpoint
     /**
-     * A frame that a GPU computes, with the ways there and back.
+     * Computing a frame on a GPU, including both transfers.
      */
     case gpu
     /**
-     * Plans and memory of a quality level are made.
+     * Creating the plans and memory of a quality level.
      */
     case plan
     /**
-     * A small view.
+     * Computing a preview.
      */
     case preview
 
@@ -6960,25 +6969,25 @@ public func FfiConverterTypeStage_lower(_ value: Stage) -> RustBuffer {
 
 
 /**
- * How hot the device is, as its system says.
+ * The thermal state of the device as reported by its system.
  */
 
 public enum Thermal: Equatable, Hashable {
     
     /**
-     * Not warm: nothing is limited.
+     * The device is not warm; nothing is limited.
      */
     case nominal
     /**
-     * Warm: frames may take a little less time.
+     * The device is warm; frames may take a little less time.
      */
     case fair
     /**
-     * Hot: half the time.
+     * The device is hot; frames may take half the time.
      */
     case serious
     /**
-     * Too hot: the lowest quality level.
+     * The device is too hot; the session uses the lowest quality level.
      */
     case critical
 
@@ -7055,17 +7064,17 @@ public func FfiConverterTypeThermal_lower(_ value: Thermal) -> RustBuffer {
 
 
 /**
- * The matrix between luma, chroma and colour.
+ * The matrix that converts luma and chroma to colour.
  */
 
 public enum YuvMatrix: Equatable, Hashable {
     
     /**
-     * ITU-R BT.601: standard definition, JPEG, most Android cameras.
+     * ITU-R BT.601, for standard definition, JPEG and most Android cameras.
      */
     case bt601
     /**
-     * ITU-R BT.709: high definition.
+     * ITU-R BT.709, for high definition.
      */
     case bt709
 
@@ -7467,7 +7476,7 @@ fileprivate struct FfiConverterSequenceTypeQualityLevel: FfiConverterRustBuffer 
     }
 }
 /**
- * The version of the library.
+ * Returns the version of the library.
  */
 public func version()throws  -> String  {
     return try  FfiConverterString.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -7477,10 +7486,10 @@ public func version()throws  -> String  {
 })
 }
 /**
- * Reads a display from its TOML form; what is left out has the default value.
+ * Reads a display from its TOML form. Missing keys have default values.
  *
  * # Errors
- * Text that is not TOML, an unknown key, or a value out of its range.
+ * Returns an error if the text is not TOML, a key is unknown, or a value is out of its range.
  */
 public func displayFromToml(text: String)throws  -> Display  {
     return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -7491,11 +7500,11 @@ public func displayFromToml(text: String)throws  -> Display  {
 })
 }
 /**
- * Sends messages of `level` and above to `listener`; none for silence. Of the libraries underneath, warnings and
- * errors are sent.
+ * Sends messages of `level` and above to `listener`, and warnings and errors of the libraries that Phasefront uses.
+ * Without a listener, no messages are sent.
  *
  * # Errors
- * A process that already logs elsewhere.
+ * Returns an error if the process already has another logger of Rust's `log`.
  */
 public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -7506,11 +7515,10 @@ public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try
 }
 }
 /**
- * The pair in int8 that is bundled for a modulator at `offset_mm` and the default display's pitch, colours and
- * volume.
+ * Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
  *
  * # Errors
- * Another offset, or a library that was built without them.
+ * Returns an error for other offsets, and if the library was built without networks.
  */
 public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
     return try  FfiConverterTypeDeepPair_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -7521,9 +7529,9 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
 })
 }
 /**
- * The default options for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
- * correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
- * the display; smoothed brightness, near and far by percentiles.
+ * Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
+ * correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
+ * built-in network, or the plane sweep if that network was not trained for the display.
  */
 public func sessionOptions(target: Target, method: Method? = nil)throws  -> SessionOptions  {
     return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -7535,11 +7543,11 @@ public func sessionOptions(target: Target, method: Method? = nil)throws  -> Sess
 })
 }
 /**
- * Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a
- * stage that is under way it may hear the end alone.
+ * Reports every stage of every session to `listener`. Without a listener, nothing is reported and nothing is spent.
+ * Set it between frames, because it may receive only the end of a stage that has already begun.
  *
  * # Errors
- * A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
+ * Returns an error if the process already collects Rust's `tracing` elsewhere, where the spans of stages go.
  */
 public func setStageListener(listener: StageListener?)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -7564,169 +7572,169 @@ private let initializationResult: InitializationResult = {
     if bindings_contract_version != scaffolding_contract_version {
         return InitializationResult.contractVersionMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_version() != 2201) {
+    if (uniffi_phasefront_ffi_checksum_func_version() != 13103) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_display_from_toml() != 52171) {
+    if (uniffi_phasefront_ffi_checksum_func_display_from_toml() != 13134) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 56383) {
+    if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 38295) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 38623) {
+    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 22076) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_session_options() != 39129) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 39077) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 45085) {
+    if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 4710) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_field() != 38987) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_field() != 60806) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 20279) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_output() != 15573) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_output() != 54920) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 20456) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 35825) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len() != 34224) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len() != 19262) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 24206) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 61711) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_refocus() != 40122) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_refocus() != 61631) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 7272) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 23440) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_z_at() != 8527) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_z_at() != 61239) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_address() != 6720) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_address() != 56412) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_byte_len() != 35294) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_byte_len() != 11697) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_height() != 14308) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_height() != 9220) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_pixel_bytes() != 5010) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_pixel_bytes() != 32474) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_share() != 49831) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_share() != 53876) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 63189) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 13523) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 30921) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 57768) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_height() != 11107) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_height() != 6101) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes() != 24405) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes() != 53355) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address() != 44421) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address() != 3110) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_share() != 4678) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_share() != 2176) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_width() != 48334) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_width() != 10297) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 28371) {
+    if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 36303) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_network_info() != 5350) {
+    if (uniffi_phasefront_ffi_checksum_method_network_info() != 43693) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_pause() != 33776) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_pause() != 858) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_process() != 26197) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_process() != 30036) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_reset() != 47763) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_reset() != 10190) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_resume() != 10084) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_resume() != 45849) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_set_quality() != 859) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_set_quality() != 52962) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_set_thermal() != 56019) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_set_thermal() != 45198) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 45629) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 26363) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_statistics() != 36884) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_statistics() != 51750) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_submit() != 49234) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_submit() != 52858) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_warm_up() != 47343) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_warm_up() != 53252) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_processed() != 15891) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_processed() != 62587) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 43842) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 46500) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 55596) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 39004) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 42183) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 20376) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_closed() != 29025) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_closed() != 26264) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {
+    if (uniffi_phasefront_ffi_checksum_method_target_display() != 58091) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin() != 60919) {
+    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin() != 26666) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 57660) {
+    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 39953) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 39057) {
+    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 54161) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_from_bytes() != 39143) {
+    if (uniffi_phasefront_ffi_checksum_constructor_network_from_bytes() != 56712) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_from_file() != 8535) {
+    if (uniffi_phasefront_ffi_checksum_constructor_network_from_file() != 63750) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_rawsession_new() != 11751) {
+    if (uniffi_phasefront_ffi_checksum_constructor_rawsession_new() != 22536) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_from_bytes() != 3215) {
+    if (uniffi_phasefront_ffi_checksum_constructor_target_from_bytes() != 27479) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_from_file() != 12085) {
+    if (uniffi_phasefront_ffi_checksum_constructor_target_from_file() != 30189) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_of_display() != 26487) {
+    if (uniffi_phasefront_ffi_checksum_constructor_target_of_display() != 14418) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_with_look_up_table() != 26530) {
+    if (uniffi_phasefront_ffi_checksum_constructor_target_with_look_up_table() != 56450) {
         return InitializationResult.apiChecksumMismatch
     }
 
