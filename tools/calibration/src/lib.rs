@@ -12,6 +12,7 @@
 //! [`curves::chart`] produce the figures and charts.
 
 pub mod camera;
+mod cholesky;
 pub mod curves;
 pub mod optics;
 pub mod rehearse;

@@ -15,6 +15,8 @@
 //! For ranges between π and 2π, b still follows from the light. Below π the light never reaches its minimum, so a and b
 //! cannot be separated. The minimum is then assumed to be the light around the modulator.
 
+use crate::cholesky;
+
 /// The number of levels of a modulator.
 pub const LEVELS: usize = 256;
 /// The number of coefficients of a curve.
@@ -27,6 +29,8 @@ const UNKNOWNS: usize = INCREMENTS + 2;
 const N: usize = COEFFICIENTS + 2;
 const A: usize = COEFFICIENTS;
 const B: usize = COEFFICIENTS + 1;
+/// The least square of a pivot of the fits.
+const LEAST_PIVOT: f64 = 1e-12;
 /// The weight of the penalty relative to light of amplitude 1. It corresponds to noise of 1/30 and increments whose
 /// second differences are 0.2 rad.
 const PENALTY: f64 = 0.03;
@@ -101,9 +105,9 @@ impl Basis {
         }
         let mut smoother = [[0.0; COEFFICIENTS]; COEFFICIENTS];
         for (i, column) in smoother.iter_mut().enumerate() {
-            let mut unit = [0.0; COEFFICIENTS];
-            unit[i] = 1.0;
-            *column = cholesky(gram, unit, COEFFICIENTS);
+            column[i] = 1.0;
+            let mut system = gram;
+            cholesky::solve(&mut system, column, LEAST_PIVOT);
         }
         Basis { rows, smoother }
     }
@@ -336,35 +340,15 @@ fn non_negative(system: [[f64; UNKNOWNS]; UNKNOWNS], wanted: [f64; UNKNOWNS]) ->
             now.iter_mut().for_each(|row| row[i] = 0.0);
             (now[i][i], right[i]) = (1.0, 0.0);
         }
-        let next = cholesky(now, right, UNKNOWNS);
+        cholesky::solve(&mut now, &mut right, LEAST_PIVOT);
         let before = held;
         for i in 0..INCREMENTS {
-            held[i] |= next[i] < 0.0;
+            held[i] |= right[i] < 0.0;
         }
         if held == before {
-            return next;
+            return right;
         }
     }
-}
-
-/// Solves a symmetric positive system in its first `n` unknowns. Unknowns with zero weight stay 0.
-pub(crate) fn cholesky<const N: usize>(mut m: [[f64; N]; N], mut right: [f64; N], n: usize) -> [f64; N] {
-    for i in 0..n {
-        for j in 0..=i {
-            let sum = m[i][j] - (0..j).map(|k| m[i][k] * m[j][k]).sum::<f64>();
-            m[i][j] = match i == j {
-                true => sum.max(1e-12).sqrt(),
-                false => sum / m[j][j],
-            };
-        }
-    }
-    for i in 0..n {
-        right[i] = (right[i] - (0..i).map(|k| m[i][k] * right[k]).sum::<f64>()) / m[i][i];
-    }
-    for i in (0..n).rev() {
-        right[i] = (right[i] - (i + 1..n).map(|k| m[k][i] * right[k]).sum::<f64>()) / m[i][i];
-    }
-    right
 }
 
 /// Averages over nine levels, and fewer at the ends.
@@ -445,9 +429,10 @@ pub fn inverse(curve: &[f32; LEVELS]) -> [u8; LEVELS] {
         while level + 1 < LEVELS && (curve[level + 1] - phase).abs() < (curve[level] - phase).abs() {
             level += 1;
         }
-        match phase > last && phase > 0.5 * (last + TAU) {
-            true => 0,
-            false => level as u8,
+        if phase > last && phase > 0.5 * (last + TAU) {
+            0
+        } else {
+            level as u8
         }
     })
 }

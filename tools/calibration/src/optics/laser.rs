@@ -4,6 +4,7 @@
 
 use crate::camera::marks::Registration;
 use crate::camera::photograph::{Photograph, SATURATED_SHARE};
+use crate::cholesky;
 use ndarray::Array2;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
@@ -217,7 +218,8 @@ fn descend(beams: &mut Vec<Gaussian>, seen: &Array2<f64>) -> f64 {
             for (i, row) in damped.iter_mut().enumerate() {
                 row[i] *= 1.0 + damping;
             }
-            let step = solve(damped, right.clone());
+            let mut step = right.clone();
+            cholesky::solve(&mut damped, &mut step, 1e-30);
             let tried: Vec<Gaussian> = (beams.iter().zip(step.chunks_exact(6)))
                 .map(|(b, step)| Gaussian(std::array::from_fn(|i| b.0[i] + step[i])))
                 .collect();
@@ -238,27 +240,6 @@ fn descend(beams: &mut Vec<Gaussian>, seen: &Array2<f64>) -> f64 {
         }
     }
     (now / seen.len() as f64).sqrt()
-}
-
-/// Solves a symmetric positive system, given its lower half, by Cholesky decomposition.
-fn solve(mut m: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
-    let n = right.len();
-    for i in 0..n {
-        for j in 0..=i {
-            let sum = m[i][j] - (0..j).map(|k| m[i][k] * m[j][k]).sum::<f64>();
-            m[i][j] = match i == j {
-                true => sum.max(1e-30).sqrt(),
-                false => sum / m[j][j],
-            };
-        }
-    }
-    for i in 0..n {
-        right[i] = (right[i] - (0..i).map(|k| m[i][k] * right[k]).sum::<f64>()) / m[i][i];
-    }
-    for i in (0..n).rev() {
-        right[i] = (right[i] - (i + 1..n).map(|k| m[k][i] * right[k]).sum::<f64>()) / m[i][i];
-    }
-    right
 }
 
 #[cfg(test)]

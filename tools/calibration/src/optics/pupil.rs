@@ -6,6 +6,7 @@
 //! Levenberg–Marquardt method, together with the scale of the sharpness, which depends on the camera's pixels and stray
 //! light.
 
+use crate::cholesky;
 use ndarray::Array2;
 use num_complex::Complex32;
 use phasefront_core::optics::fft::{Fft2, Scratch};
@@ -159,7 +160,8 @@ impl Pupil {
             for (i, row) in gram.iter_mut().enumerate() {
                 row[i] += damping * (row[i] + 1e-3 * trace);
             }
-            let step = crate::curves::curve::cholesky(gram, right, TERMS);
+            let mut step = right;
+            cholesky::solve(&mut gram, &mut step, 1e-12);
             let next: Coefficients = std::array::from_fn(|j| at[j] + step[j].clamp(-1.0, 1.0));
             let (next_left, next_slopes) = self.residuals(spots, &next, scratch);
             let next_cost = square(&next_left);
@@ -205,9 +207,10 @@ mod tests {
             let at = |i: usize| (2 * i + 1) as f64 / PUPIL as f64 - 1.0;
             let plane = Array2::from_shape_fn((PLANE, PLANE), |(i, j)| {
                 let inside = i < PUPIL && j < PUPIL && at(i).powi(2) + at(j).powi(2) <= 1.0;
-                match inside {
-                    true => num_complex::Complex64::from_polar(1.0, zernike::terms(a, at(j), at(i))),
-                    false => num_complex::Complex64::ZERO,
+                if inside {
+                    num_complex::Complex64::from_polar(1.0, zernike::terms(a, at(j), at(i)))
+                } else {
+                    num_complex::Complex64::ZERO
                 }
             });
             let light = phasefront_core::optics::reference::dft(&plane, -1.0);
