@@ -281,12 +281,13 @@ fn nm(wavelengths_m: &[f64]) -> String {
 /// # Errors
 /// Returns an error if the numbers differ.
 pub(crate) fn check_colours(what: &str, colours: usize, right: usize) -> Result<()> {
-    match colours == right {
-        true => Ok(()),
-        false => Err(Error::Setting(format!(
+    if colours == right {
+        Ok(())
+    } else {
+        Err(Error::Setting(format!(
             "{what} has {colours} {}, the display {right}; both must have as many",
             if colours == 1 { "colour" } else { "colours" }
-        ))),
+        )))
     }
 }
 

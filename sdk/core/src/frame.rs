@@ -66,13 +66,15 @@ impl RgbdFrame {
         }
         // Values already in row-major order are not copied.
         Ok(RgbdFrame {
-            rgb: match rgb.is_standard_layout() {
-                true => rgb,
-                false => rgb.as_standard_layout().into_owned(),
+            rgb: if rgb.is_standard_layout() {
+                rgb
+            } else {
+                rgb.as_standard_layout().into_owned()
             },
-            depth: match depth.is_standard_layout() {
-                true => depth,
-                false => depth.as_standard_layout().into_owned(),
+            depth: if depth.is_standard_layout() {
+                depth
+            } else {
+                depth.as_standard_layout().into_owned()
             },
         })
     }

@@ -60,9 +60,10 @@ impl Method {
 /// the midpoint.
 pub fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) -> Result<SweepPlan> {
     let offset_m = display.offset_m();
-    let z_m = match sweep::reaches(display, offset_m) {
-        true => offset_m,
-        false => 0.0,
+    let z_m = if sweep::reaches(display, offset_m) {
+        offset_m
+    } else {
+        0.0
     };
     SweepPlan::new(height, width, display, sweep, z_m)
 }
@@ -217,9 +218,10 @@ impl MethodPlan {
                     None => measured.is_clean(),
                 };
                 *was_clean = Some(is_clean);
-                match is_clean {
-                    true => sweep.field(frame, field, of_sweep),
-                    false => trained.field(frame, field, of_trained),
+                if is_clean {
+                    sweep.field(frame, field, of_sweep)
+                } else {
+                    trained.field(frame, field, of_trained)
                 }
             }
             _ => panic!("the scratch is another plan's"),

@@ -313,9 +313,12 @@ impl Output {
         assert_eq!(bytes.len(), self.image_bytes());
         self.check_image(image)?;
         let place = layout.place_bits();
-        let placed = |level: u16| match bits <= place {
-            true => level << (place - bits),
-            false => level >> (bits - place),
+        let placed = |level: u16| {
+            if bits <= place {
+                level << (place - bits)
+            } else {
+                level >> (bits - place)
+            }
         };
         let pixel_bytes = layout.pixel_bytes();
         for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
@@ -327,9 +330,10 @@ impl Output {
                 let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
                 let level = |place: usize| {
                     let colour = place % self.colours;
-                    placed(match inside {
-                        true => level((colour * height + y as usize) * width + x as usize),
-                        false => dark((x + y).rem_euclid(2) as usize, colour, (modulator_y, modulator_x)),
+                    placed(if inside {
+                        level((colour * height + y as usize) * width + x as usize)
+                    } else {
+                        dark((x + y).rem_euclid(2) as usize, colour, (modulator_y, modulator_x))
                     })
                 };
                 layout.write_pixel(image, level, pixel);
@@ -406,10 +410,11 @@ mod tests {
         let place = |x: usize, y: usize, p: &Placement| {
             let x = if p.flip_x { 6 - x } else { x } as i32 - 2 - p.shift_x;
             let y = if p.flip_y { 3 - y } else { y } as i32 - 1 - p.shift_y;
-            match (0..3).contains(&x) && (0..2).contains(&y) {
-                true => (100 + 10 * y + x) as u8,
+            if (0..3).contains(&x) && (0..2).contains(&y) {
+                (100 + 10 * y + x) as u8
+            } else {
                 // π/2 and 3π/2 continue the hologram's checkerboard.
-                false => [64, 192][(x + y).rem_euclid(2) as usize],
+                [64, 192][(x + y).rem_euclid(2) as usize]
             }
         };
         for (flip_x, flip_y, shift_x, shift_y) in [

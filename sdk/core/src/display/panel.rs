@@ -166,9 +166,10 @@ impl PanelPlan {
             return Ok(None);
         }
         Ok(Some(PanelPlan {
-            added: match panel.adds() {
-                true => added(panel, display, shape).into(),
-                false => Arc::new([]),
+            added: if panel.adds() {
+                added(panel, display, shape).into()
+            } else {
+                Arc::new([])
             },
             width: shape.1,
             nearest: panel

@@ -160,9 +160,12 @@ impl Taps {
 
 /// Returns sinc(x)·sinc(x/REACH) for |x| < REACH, else 0.
 fn lanczos(x: f64) -> f64 {
-    let sinc = |x: f64| match x == 0.0 {
-        true => 1.0,
-        false => (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x),
+    let sinc = |x: f64| {
+        if x == 0.0 {
+            1.0
+        } else {
+            (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x)
+        }
     };
     if x.abs() < REACH as f64 {
         sinc(x) * sinc(x / REACH as f64)

@@ -79,9 +79,10 @@ impl ColourPlan {
             // near end.
             let from = |from: f64, side: usize, flipped: bool| {
                 from / 2.0
-                    + match flipped {
-                        true => half(side) as f64 - side as f64 / 2.0,
-                        false => 0.0,
+                    + if flipped {
+                        half(side) as f64 - side as f64 / 2.0
+                    } else {
+                        0.0
                     }
             };
             let flips = orientation.flips();
@@ -254,9 +255,10 @@ fn add_samples(bytes: &[u8], first: usize, step: isize, weight: f32, sum: &mut [
             *sum += weight * f32::from(pixel[0]);
         }
         // The memory may end after the last sample.
-        let end = match sum.len() < pixels.len() {
-            true => pixels[sum.len()][0],
-            false => rest[0],
+        let end = if sum.len() < pixels.len() {
+            pixels[sum.len()][0]
+        } else {
+            rest[0]
         };
         *last += weight * f32::from(end);
     }
@@ -308,9 +310,10 @@ pub fn yuv_constants(encoding: YuvEncoding) -> ([f32; 4], [f32; 4]) {
         YuvMatrix::Bt709 => (0.2126, 0.0722),
     };
     let kg = 1.0 - kr - kb;
-    let levels = match encoding.video_range {
-        true => [16.0, 1.0 / 219.0, 128.0, 1.0 / 224.0],
-        false => [0.0, 1.0 / 255.0, 128.0, 1.0 / 255.0],
+    let levels = if encoding.video_range {
+        [16.0, 1.0 / 219.0, 128.0, 1.0 / 224.0]
+    } else {
+        [0.0, 1.0 / 255.0, 128.0, 1.0 / 255.0]
     };
     (
         levels,

@@ -86,9 +86,10 @@ fn rgb_of_yuv([y, u, v]: [f64; 3], encoding: YuvEncoding) -> [f64; 3] {
         YuvMatrix::Bt601 => (0.299, 0.114),
         YuvMatrix::Bt709 => (0.2126, 0.0722),
     };
-    let (y, u, v) = match encoding.video_range {
-        true => ((y - 16.0) / 219.0, (u - 128.0) / 224.0, (v - 128.0) / 224.0),
-        false => (y / 255.0, (u - 128.0) / 255.0, (v - 128.0) / 255.0),
+    let (y, u, v) = if encoding.video_range {
+        ((y - 16.0) / 219.0, (u - 128.0) / 224.0, (v - 128.0) / 224.0)
+    } else {
+        (y / 255.0, (u - 128.0) / 255.0, (v - 128.0) / 255.0)
     };
     let red = y + (2.0 - 2.0 * kr) * v;
     let blue = y + (2.0 - 2.0 * kb) * u;

@@ -289,11 +289,12 @@ impl Packing {
             }
             Packing::BitPlanes(_) => return Ok(()),
         };
-        match bits <= place {
-            true => Ok(()),
-            false => Err(refuse(format!(
+        if bits <= place {
+            Ok(())
+        } else {
+            Err(refuse(format!(
                 "levels of {bits} bits do not fit the packing's {place}"
-            ))),
+            )))
         }
     }
 }

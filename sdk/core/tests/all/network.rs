@@ -18,9 +18,10 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
 /// Returns `size`. For a model at half the resolution, which tract runs only with even sides, returns the next even
 /// sides.
 fn even((height, width): (usize, usize), model: &Model) -> (usize, usize) {
-    match model.halved {
-        true => (height.next_multiple_of(2), width.next_multiple_of(2)),
-        false => (height, width),
+    if model.halved {
+        (height.next_multiple_of(2), width.next_multiple_of(2))
+    } else {
+        (height, width)
     }
 }
 
@@ -235,9 +236,10 @@ fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
             };
             let stock_too = even((height, width), &model) == (height, width);
             for stock in [false, true].into_iter().take(1 + usize::from(stock_too)) {
-                let plan = match stock {
-                    false => network.plan(height, width),
-                    true => network.plan_on_stock_tract(height, width),
+                let plan = if stock {
+                    network.plan_on_stock_tract(height, width)
+                } else {
+                    network.plan(height, width)
                 };
                 let plan = plan.unwrap();
                 let mut scratch = plan.scratch();

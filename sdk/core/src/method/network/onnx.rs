@@ -176,17 +176,19 @@ impl<'a> Reader<'a> {
 
     /// Returns the graph's last step before any tanh.
     fn end(&self) -> Step {
-        match self.halved {
-            true => Step::Pixels,
-            false => Step::Convolution(self.last()),
+        if self.halved {
+            Step::Pixels
+        } else {
+            Step::Convolution(self.last())
         }
     }
 
     /// Returns the input of layer `i` without the concatenation.
     fn features(&self, i: usize) -> Step {
-        match Chain::has_skip(i) {
-            true => Step::Sum(i),
-            false => Step::Relu(i.saturating_sub(1)),
+        if Chain::has_skip(i) {
+            Step::Sum(i)
+        } else {
+            Step::Relu(i.saturating_sub(1))
         }
     }
 
@@ -449,9 +451,10 @@ impl<'a> Reader<'a> {
                 );
             }
             quantisation.input = Some(whole);
-            match Chain::has_skip(i) {
-                true => quantisation.sum = features,
-                false => quantisation.relu = features,
+            if Chain::has_skip(i) {
+                quantisation.sum = features
+            } else {
+                quantisation.relu = features
             }
             self.concat = Some([features, network_input]);
         }
@@ -530,9 +533,12 @@ impl<'a> Reader<'a> {
 
     fn sum(&mut self, node: &Node) -> Read<Value<'a>> {
         let i = self.layers.len();
-        let right = || match Chain::has_skip(i) {
-            true => format!("input[{i}] = output[{}] + input[{}] is right", i - 1, i - 2),
-            false => format!("layer {i} has no skip; only odd layers from 3 on have one"),
+        let right = || {
+            if Chain::has_skip(i) {
+                format!("input[{i}] = output[{}] + input[{}] is right", i - 1, i - 2)
+            } else {
+                format!("layer {i} has no skip; only odd layers from 3 on have one")
+            }
         };
         let (a, b) = (self.activation(node, 0)?, self.activation(node, 1)?);
         if !Chain::has_skip(i) {

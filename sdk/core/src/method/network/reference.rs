@@ -14,13 +14,12 @@ const PIXELS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 /// Panics if `input` does not have `chain.inputs · height · width` values.
 pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
     assert_eq!(input.len(), chain.inputs * height * width);
-    let mut output = match chain.halved {
-        false => layers(chain, input, height, width),
-        true => {
-            let half = (height.div_ceil(2), width.div_ceil(2));
-            let output = layers(chain, &squares(input, height, width), half.0, half.1);
-            pixels(&output, chain.outputs(), height, width)
-        }
+    let mut output = if chain.halved {
+        let half = (height.div_ceil(2), width.div_ceil(2));
+        let output = layers(chain, &squares(input, height, width), half.0, half.1);
+        pixels(&output, chain.outputs(), height, width)
+    } else {
+        layers(chain, input, height, width)
     };
     if chain.tanh {
         output.iter_mut().for_each(|v| *v = v.tanh());
