@@ -158,9 +158,10 @@ impl GpuPipeline {
         let (display, encoder) = (&target.display, &job.encoder);
         let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
         let (sums, parts) = method.sums();
-        let mean = match encoder.encoding.keeps_phase() {
-            true => None,
-            false => Some(MeanPhase::new(device, sums, parts)?),
+        let mean = if encoder.encoding.keeps_phase() {
+            None
+        } else {
+            Some(MeanPhase::new(device, sums, parts)?)
         };
         // The first stage that reads the field applies the turn.
         let mut turn = mean.as_ref().map(|mean| &mean.turn);

@@ -76,9 +76,12 @@ fn frame() -> Result<RgbdFrame> {
         let phase = (c + 1) as f32 * 0.13 * x as f32 + 0.21 * y as f32;
         0.5 + 0.45 * phase.sin()
     });
-    let depth = Array2::from_shape_fn((height, width), |(y, x)| match y < height / 2 {
-        true => (x / 9) as f32 / 5.0,
-        false => x as f32 / width as f32,
+    let depth = Array2::from_shape_fn((height, width), |(y, x)| {
+        if y < height / 2 {
+            (x / 9) as f32 / 5.0
+        } else {
+            x as f32 / width as f32
+        }
     });
     Ok(RgbdFrame::new(rgb, depth)?)
 }

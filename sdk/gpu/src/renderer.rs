@@ -182,10 +182,7 @@ fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> R
             watched("while it was opened", OPENING, open)?
         }
     };
-    let patience = match device.is_software() {
-        true => TRYING_SOFTWARE,
-        false => TRYING,
-    };
+    let patience = if device.is_software() { TRYING_SOFTWARE } else { TRYING };
     let job = job.clone();
     watched("while it was tried out", patience, move || {
         probe(&device, &job)?;

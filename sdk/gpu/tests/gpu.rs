@@ -377,10 +377,7 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     };
     let (float, int8) = (model.bytes(), Model { int8: true, ..model }.bytes());
     let seeded = |bytes: &[u8]| Method::Seeded(Arc::new(Network::from_onnx(bytes).unwrap()));
-    let half = match device.has_half() {
-        true => Float::F16,
-        false => Float::F32,
-    };
+    let half = if device.has_half() { Float::F16 } else { Float::F32 };
     let f32 = Float::F32;
     for (method, (h, w), offset_m, encoding, float, tolerance) in [
         (Method::Sweep(default), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.002),

@@ -13,10 +13,7 @@ pub(crate) struct Constants {
 impl Constants {
     /// Returns the address space in WGSL.
     pub(crate) fn space(&self) -> &'static str {
-        match self.uniform {
-            true => "uniform",
-            false => "storage, read",
-        }
+        if self.uniform { "uniform" } else { "storage, read" }
     }
 }
 
@@ -61,9 +58,10 @@ impl Device {
         if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
             return Err(GpuError::Refused(format!("{what} do not fit {}", self.name())));
         }
-        let usage = match uniform {
-            true => wgpu::BufferUsages::UNIFORM,
-            false => wgpu::BufferUsages::STORAGE,
+        let usage = if uniform {
+            wgpu::BufferUsages::UNIFORM
+        } else {
+            wgpu::BufferUsages::STORAGE
         };
         let buffer = self.inner.create_buffer_init(&BufferInitDescriptor {
             label: Some(what),

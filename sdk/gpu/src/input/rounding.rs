@@ -16,9 +16,12 @@ pub(super) fn steps(device: &Device, chain: &Chain) -> Result<Constants> {
         })
     };
     let (first, last): (Quantisation, Quantisation) = (rounding(0)?, rounding(chain.layers.len() - 1)?);
-    let concatenated = |real: f32| match chain.concat_rounded_input {
-        true => last.quantise(first.dequantise(first.quantise(real))),
-        false => last.quantise(real),
+    let concatenated = |real: f32| {
+        if chain.concat_rounded_input {
+            last.quantise(first.dequantise(first.quantise(real)))
+        } else {
+            last.quantise(real)
+        }
     };
     let mut values = thresholds(|real| first.quantise(real));
     values.extend(thresholds(concatenated));
@@ -43,9 +46,10 @@ fn thresholds(rounded: impl Fn(f32) -> u8) -> Vec<f32> {
             let (mut low, mut high) = (i64::from(key(f32::MIN)), i64::from(key(f32::MAX)));
             while low < high {
                 let middle = (low + high).div_euclid(2);
-                match rounded(float(middle as i32)) >= k {
-                    true => high = middle,
-                    false => low = middle + 1,
+                if rounded(float(middle as i32)) >= k {
+                    high = middle
+                } else {
+                    low = middle + 1
                 }
             }
             float(high as i32)

@@ -118,11 +118,14 @@ impl Reader {
 impl Frames {
     pub(super) fn upload(&self, device: &Device, frame: &Frame<'_>) -> Result<()> {
         let area = self.size.0 * self.size.1;
-        let length = |what: &str, is: usize, right: usize| match is == right {
-            true => Ok(()),
-            false => Err(phasefront_core::runtime::error::Error::Frame(format!(
-                "{what} has {is} values; {right} are right"
-            ))),
+        let length = |what: &str, is: usize, right: usize| {
+            if is == right {
+                Ok(())
+            } else {
+                Err(phasefront_core::runtime::error::Error::Frame(format!(
+                    "{what} has {is} values; {right} are right"
+                )))
+            }
         };
         let other = |what: &str| {
             phasefront_core::runtime::error::Error::Frame(format!("{what} comes in another form than was planned"))

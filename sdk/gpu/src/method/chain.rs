@@ -156,9 +156,10 @@ impl ChainPlan {
             Fusion::Pairs if pairs => (make(Fusion::Pairs)?, Fusion::Pairs),
             Fusion::Measured if pairs && !device.is_software() => {
                 let (layers, fused) = (make(Fusion::Layers)?, make(Fusion::Pairs)?);
-                match time(device, &fused)? < time(device, &layers)? {
-                    true => (fused, Fusion::Pairs),
-                    false => (layers, Fusion::Layers),
+                if time(device, &fused)? < time(device, &layers)? {
+                    (fused, Fusion::Pairs)
+                } else {
+                    (layers, Fusion::Layers)
                 }
             }
             _ => (make(Fusion::Layers)?, Fusion::Layers),
