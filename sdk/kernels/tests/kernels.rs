@@ -172,9 +172,12 @@ impl Int8Case {
                 return real;
             }
             if i + 2 == self.layers.len() {
-                rounded.extend(input.iter().map(|&v| match self.rounded_twice {
-                    true => quantise(self.concatenated, dequantise(self.input, quantise(self.input, v))),
-                    false => quantise(self.concatenated, v),
+                rounded.extend(input.iter().map(|&v| {
+                    if self.rounded_twice {
+                        quantise(self.concatenated, dequantise(self.input, quantise(self.input, v)))
+                    } else {
+                        quantise(self.concatenated, v)
+                    }
                 }));
             }
             x.push(planes(rounded, self.layers[i + 1].zero_point));
@@ -519,13 +522,14 @@ fn extreme_values_saturate_alike() {
 
 /// Runs `work` in a pool of one thread. WebAssembly has no other.
 fn on_one_thread(work: impl FnOnce() + Send) {
-    match cfg!(target_family = "wasm") {
-        true => work(),
-        false => rayon::ThreadPoolBuilder::new()
+    if cfg!(target_family = "wasm") {
+        work()
+    } else {
+        rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
             .unwrap()
-            .install(work),
+            .install(work)
     }
 }
 
