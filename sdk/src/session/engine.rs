@@ -121,9 +121,10 @@ impl Engine {
             if report.name.is_empty() {
                 report.name = "cpu".into();
             }
-            report.why = match report.why.is_empty() {
-                true => refusal.clone(),
-                false => format!("{refusal}; {}", report.why),
+            report.why = if report.why.is_empty() {
+                refusal.clone()
+            } else {
+                format!("{refusal}; {}", report.why)
             };
         }
         report

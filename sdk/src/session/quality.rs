@@ -179,9 +179,10 @@ impl LevelControl {
         let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
         self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
         // A single slow frame with another cause must not reset the count.
-        self.roomy = match used < ROOM {
-            true => self.roomy + 1,
-            false => self.roomy.saturating_sub(TIGHT_FRAME),
+        self.roomy = if used < ROOM {
+            self.roomy + 1
+        } else {
+            self.roomy.saturating_sub(TIGHT_FRAME)
         };
         if let Some(frames) = &mut self.since_up {
             *frames += 1;
@@ -198,9 +199,10 @@ impl LevelControl {
             if self.since_up.take().is_some() {
                 self.roomy_needed = (self.roomy_needed * 2).min(MOST_ROOMY_FRAMES);
             }
-            let reason = match cost <= period? {
-                true => QualityReason::Thermal,
-                false => QualityReason::TooSlow,
+            let reason = if cost <= period? {
+                QualityReason::Thermal
+            } else {
+                QualityReason::TooSlow
             };
             return self.step(below, reason);
         }

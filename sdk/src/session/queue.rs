@@ -348,9 +348,10 @@ mod tests {
 
         fn admit(&mut self) {
             let late = self.clock > 0 && self.random.random_bool(0.1);
-            let timestamp = match late {
-                true => self.random.random_range(0..=self.clock),
-                false => self.clock + self.random.random_range(1..30),
+            let timestamp = if late {
+                self.random.random_range(0..=self.clock)
+            } else {
+                self.clock + self.random.random_range(1..30)
             };
             match self.queue.admit(timestamp) {
                 Err(_) => {
@@ -410,10 +411,7 @@ mod tests {
                 if told {
                     let before = self.told.insert((epoch, timestamp), None);
                     assert!(before.is_none());
-                    match failed {
-                        true => self.failed += 1,
-                        false => self.processed += 1,
-                    }
+                    if failed { self.failed += 1 } else { self.processed += 1 }
                 }
             }
         }

@@ -53,9 +53,10 @@ impl LevelPlan {
             self.colour = Some((colour, scratch));
         }
         let (amplitude, depth) = self.frame.planes_mut();
-        let rgb = match self.picture.is_empty() {
-            true => &mut *amplitude,
-            false => &mut self.picture[..],
+        let rgb = if self.picture.is_empty() {
+            &mut *amplitude
+        } else {
+            &mut self.picture[..]
         };
         if let Some((colour, scratch)) = &mut self.colour {
             colour.convert(&frame.colour, rgb, scratch)?;
@@ -63,9 +64,10 @@ impl LevelPlan {
         if !self.picture.is_empty() {
             luminance(&self.picture, amplitude);
         }
-        let rgb = match self.picture.is_empty() {
-            true => &*amplitude,
-            false => &self.picture,
+        let rgb = if self.picture.is_empty() {
+            &*amplitude
+        } else {
+            &self.picture
         };
         times.colour = stage.end();
         let stage = stage!("depth");
@@ -373,11 +375,12 @@ impl Stages {
 }
 
 fn given_up(cancel: &Cancel) -> Result<()> {
-    match cancel.requested() {
-        false => Ok(()),
-        true => Err(Error::Session(
+    if cancel.requested() {
+        Err(Error::Session(
             "the frame was given up: the session was reset or closed while it was computed".into(),
-        )),
+        ))
+    } else {
+        Ok(())
     }
 }
 

@@ -108,15 +108,21 @@ impl Scene {
             width,
             height,
             rgba: pixels()
-                .flat_map(|(x, y)| match square(x, y) {
-                    true => [250, 200, 40, 255],
-                    false => [30, (x * 255 / width) as u8, 90, 255],
+                .flat_map(|(x, y)| {
+                    if square(x, y) {
+                        [250, 200, 40, 255]
+                    } else {
+                        [30, (x * 255 / width) as u8, 90, 255]
+                    }
                 })
                 .collect(),
             metres: pixels()
-                .map(|(x, y)| match square(x, y) {
-                    true => 1.0,
-                    false => 2.0 + x as f32 / width as f32,
+                .map(|(x, y)| {
+                    if square(x, y) {
+                        1.0
+                    } else {
+                        2.0 + x as f32 / width as f32
+                    }
                 })
                 .collect(),
         }

@@ -37,9 +37,12 @@ mod tests {
 
     fn field(level: f32, spikes: usize) -> Vec<Complex32> {
         (0..34_000)
-            .map(|i| match i / STEP < spikes && i % STEP == 0 {
-                true => Complex32::new(0.0, -3.0),
-                false => Complex32::from_polar(level * (i % 100) as f32 / 99.0, i as f32),
+            .map(|i| {
+                if i / STEP < spikes && i % STEP == 0 {
+                    Complex32::new(0.0, -3.0)
+                } else {
+                    Complex32::from_polar(level * (i % 100) as f32 / 99.0, i as f32)
+                }
             })
             .collect()
     }
