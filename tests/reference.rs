@@ -13,9 +13,12 @@ use std::f64::consts::PI;
 pub fn fft2(plane: &Array2<Complex64>, inverse: bool) -> Array2<Complex64> {
     let (h, w) = plane.dim();
     let mut planner = FftPlanner::<f64>::new();
-    let mut plan = |n| match inverse {
-        false => planner.plan_fft_forward(n),
-        true => planner.plan_fft_inverse(n),
+    let mut plan = |n| {
+        if inverse {
+            planner.plan_fft_inverse(n)
+        } else {
+            planner.plan_fft_forward(n)
+        }
     };
     let (along_x, along_y) = (plan(w), plan(h));
     let mut out = plane.clone();
@@ -29,10 +32,7 @@ pub fn fft2(plane: &Array2<Complex64>, inverse: bool) -> Array2<Complex64> {
         along_y.process(&mut line);
         column.assign(&Array2::from_shape_vec((1, h), line).unwrap().row(0));
     }
-    match inverse {
-        false => out,
-        true => out / (h * w) as f64,
-    }
+    if inverse { out / (h * w) as f64 } else { out }
 }
 
 /// Computes Eq. 2 on a periodic plane, with the carrier: F⁻¹(F(u)·exp(i2πs√(λ⁻² − µ² − ν²))).
@@ -43,9 +43,10 @@ pub fn asm_periodic(u: &Array2<Complex64>, pitch: f64, lambda: f64, s: f64) -> A
     for ((ky, kx), value) in spectrum.indexed_iter_mut() {
         let (mu, nu) = (bin(kx, w) / pitch, bin(ky, h) / pitch);
         let under = lambda.powi(-2) - mu * mu - nu * nu;
-        *value *= match under >= 0.0 {
-            true => Complex64::from_polar(1.0, 2.0 * PI * s * under.sqrt()),
-            false => Complex64::ZERO,
+        *value *= if under >= 0.0 {
+            Complex64::from_polar(1.0, 2.0 * PI * s * under.sqrt())
+        } else {
+            Complex64::ZERO
         };
     }
     fft2(&spectrum, true)
