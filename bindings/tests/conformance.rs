@@ -337,13 +337,14 @@ mod write {
             let yuv = |[r, g, b]: [f64; 3]| {
                 let y = kr * r + (1.0 - kr - kb) * g + kb * b;
                 let (u, v) = ((b - y) / (2.0 - 2.0 * kb), (r - y) / (2.0 - 2.0 * kr));
-                match video_range {
-                    true => [
+                if video_range {
+                    [
                         (16.0 + 219.0 * y) / 255.0,
                         (128.0 + 224.0 * u) / 255.0,
                         (128.0 + 224.0 * v) / 255.0,
-                    ],
-                    false => [y, u + 128.0 / 255.0, v + 128.0 / 255.0],
+                    ]
+                } else {
+                    [y, u + 128.0 / 255.0, v + 128.0 / 255.0]
                 }
             };
             let (half_w, half_h) = (width.div_ceil(2), height.div_ceil(2));
