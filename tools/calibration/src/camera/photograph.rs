@@ -70,16 +70,18 @@ impl Photograph {
     /// Returns an error if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let eight = self.full == 255;
-        let bytes: Vec<u8> = match eight {
-            true => self.values.iter().map(|v| *v as u8).collect(),
-            false => self.values.iter().flat_map(|v| v.to_be_bytes()).collect(),
+        let bytes: Vec<u8> = if eight {
+            self.values.iter().map(|v| *v as u8).collect()
+        } else {
+            self.values.iter().flat_map(|v| v.to_be_bytes()).collect()
         };
         write_atomically(path, |file| {
             let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
             encoder.set_color(png::ColorType::Grayscale);
-            encoder.set_depth(match eight {
-                true => png::BitDepth::Eight,
-                false => png::BitDepth::Sixteen,
+            encoder.set_depth(if eight {
+                png::BitDepth::Eight
+            } else {
+                png::BitDepth::Sixteen
             });
             encoder.set_compression(png::Compression::Fast);
             let other = std::io::Error::other;
@@ -100,12 +102,11 @@ impl Photograph {
                 u32::from(most) == all || u32::from(most) == all << (16 - bits)
             }),
         };
-        match is_end {
-            false => 0.0,
-            true => {
-                let at_end = self.values.iter().filter(|v| **v == most).count();
-                at_end as f64 / self.values.len() as f64
-            }
+        if is_end {
+            let at_end = self.values.iter().filter(|v| **v == most).count();
+            at_end as f64 / self.values.len() as f64
+        } else {
+            0.0
         }
     }
 

@@ -94,9 +94,10 @@ fn span(values: impl Iterator<Item = f64>) -> std::result::Result<(f64, f64), &'
     let (low, high) = values
         .filter(|v| v.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    match low <= high {
-        true => Ok((low, high.max(low + 1e-9 + 1e-6 * low.abs()))),
-        false => Err("nothing to draw"),
+    if low <= high {
+        Ok((low, high.max(low + 1e-9 + 1e-6 * low.abs())))
+    } else {
+        Err("nothing to draw")
     }
 }
 
@@ -122,9 +123,10 @@ fn curves(area: &Area<'_>, panel: &Panel) -> Drawn {
     for (i, curve) in panel.curves.iter().enumerate() {
         let colour = COLOURS[i % COLOURS.len()];
         let points = curve.points.iter().copied();
-        let drawn = match curve.dots {
-            true => chart.draw_series(points.map(|p| Circle::new(p, 1, colour.filled())))?,
-            false => chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?,
+        let drawn = if curve.dots {
+            chart.draw_series(points.map(|p| Circle::new(p, 1, colour.filled())))?
+        } else {
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?
         };
         if !curve.name.is_empty() {
             drawn

@@ -141,9 +141,10 @@ pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coe
     let mut levels = Array2::zeros((height, width));
     for ((y, x), level) in levels.indexed_iter_mut() {
         let within = (top..top + side).contains(&y) && (left..left + side).contains(&x);
-        let value = match within {
-            true => part[(y - top) * side + x - left],
-            false => Complex32::ZERO,
+        let value = if within {
+            part[(y - top) * side + x - left]
+        } else {
+            Complex32::ZERO
         };
         let phase = double_phase::encode_value(value, x, y, 1.0);
         *level = target.response.level(phase, first + y * width + x);
