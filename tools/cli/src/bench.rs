@@ -236,9 +236,10 @@ fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
         (0..6).fold(ground, |depth, ball| {
             let (at, radius) = (0.2 + 0.27 * ball as f32, 0.1 + 0.02 * (ball % 3) as f32);
             let inside = radius.powi(2) - (u - at).powi(2) - (v - 0.6).powi(2);
-            match inside > 0.0 {
-                true => depth.min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0).max(0.0),
-                false => depth,
+            if inside > 0.0 {
+                depth.min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0).max(0.0)
+            } else {
+                depth
             }
         })
     };

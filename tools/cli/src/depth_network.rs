@@ -108,9 +108,10 @@ impl Input {
     }
 
     fn shape(&self) -> [usize; 4] {
-        match self.interleaved {
-            false => [1, 3, self.height, self.width],
-            true => [1, self.height, self.width, 3],
+        if self.interleaved {
+            [1, self.height, self.width, 3]
+        } else {
+            [1, 3, self.height, self.width]
         }
     }
 
@@ -121,10 +122,7 @@ impl Input {
         });
         let sized = imageops::resize(&picture, self.width as u32, self.height as u32, FilterType::Triangle);
         let at = |[_, a, b, c]: [usize; 4]| {
-            let (colour, y, x) = match self.interleaved {
-                false => (a, b, c),
-                true => (c, a, b),
-            };
+            let (colour, y, x) = if self.interleaved { (c, a, b) } else { (a, b, c) };
             (colour, sized.get_pixel(x as u32, y as u32).0[colour])
         };
         let indices = |i: usize| {
@@ -132,25 +130,23 @@ impl Input {
             [0, i / (b * c) % a, i / c % b, i % c]
         };
         let count = self.shape().iter().product();
-        match self.bytes {
-            true => {
-                let byte = |i| (at(indices(i)).1 * 255.0).round() as u8;
-                Tensor::from_shape(&self.shape(), &(0..count).map(byte).collect::<Vec<_>>())
-            }
-            false => {
-                let number = |i| {
-                    let (colour, value) = at(indices(i));
-                    colours.number(colour, value)
-                };
-                Tensor::from_shape(&self.shape(), &(0..count).map(number).collect::<Vec<_>>())
-            }
+        if self.bytes {
+            let byte = |i| (at(indices(i)).1 * 255.0).round() as u8;
+            Tensor::from_shape(&self.shape(), &(0..count).map(byte).collect::<Vec<_>>())
+        } else {
+            let number = |i| {
+                let (colour, value) = at(indices(i));
+                colours.number(colour, value)
+            };
+            Tensor::from_shape(&self.shape(), &(0..count).map(number).collect::<Vec<_>>())
         }
     }
 
     fn fact(&self) -> InferenceFact {
-        match self.bytes {
-            true => u8::fact(self.shape()).into(),
-            false => f32::fact(self.shape()).into(),
+        if self.bytes {
+            u8::fact(self.shape()).into()
+        } else {
+            f32::fact(self.shape()).into()
         }
     }
 }

@@ -173,12 +173,13 @@ pub fn test_gpu(open: &phasefront_gpu::DeviceOptions) -> Check {
 pub fn verdict(checks: &[Check]) -> Result<()> {
     let failed = checks.iter().filter(|check| check.passed == Some(false));
     let failed: Vec<_> = failed.map(|check| check.name).collect();
-    match failed.is_empty() {
-        true => Ok(()),
-        false => Err(Error::Input(format!(
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Input(format!(
             "the self-test failed: {}; please report it with the lines above",
             failed.join(", ")
-        ))),
+        )))
     }
 }
 
@@ -214,12 +215,11 @@ fn int8() -> Result<Check> {
         let same = run_on(&network, isa, &input)? == portable;
         differ.extend((!same).then_some(isa.name()));
     }
-    let says = match differ.is_empty() {
-        true => {
-            let names: Vec<_> = Isa::int8().into_iter().map(Isa::name).collect();
-            format!("{}: one and the same bits", names.join(", "))
-        }
-        false => format!("{} give other bits than the portable kernel", differ.join(", ")),
+    let says = if differ.is_empty() {
+        let names: Vec<_> = Isa::int8().into_iter().map(Isa::name).collect();
+        format!("{}: one and the same bits", names.join(", "))
+    } else {
+        format!("{} give other bits than the portable kernel", differ.join(", "))
     };
     Ok(Check::new("int8 network", differ.is_empty(), says))
 }

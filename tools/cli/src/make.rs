@@ -71,9 +71,10 @@ impl HologramRequest {
     /// Chooses the method for the frame: the sweep if depth is clean or no network suits the display, else the network.
     fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || default_network(display).is_some();
-        Ok(match trained && !sharpness::measure(frame).is_clean() {
-            true => CoreMethod::Network,
-            false => CoreMethod::Sweep,
+        Ok(if trained && !sharpness::measure(frame).is_clean() {
+            CoreMethod::Network
+        } else {
+            CoreMethod::Sweep
         })
     }
 }

@@ -261,12 +261,11 @@ pub fn read(path: &Path) -> Result<Vec<Scene>> {
 /// Checks that `url` is a picture inside the page, as [`write()`] makes it, which no browser fetches from elsewhere.
 fn check_picture(url: &str) -> std::result::Result<(), String> {
     let data = url.strip_prefix(PICTURE);
-    match data.is_some_and(|data| STANDARD.decode(data).is_ok()) {
-        true => Ok(()),
-        false => {
-            let begin: String = url.chars().take(60).collect();
-            Err(format!("{begin:?} is no picture in the page itself ({PICTURE}…)"))
-        }
+    if data.is_some_and(|data| STANDARD.decode(data).is_ok()) {
+        Ok(())
+    } else {
+        let begin: String = url.chars().take(60).collect();
+        Err(format!("{begin:?} is no picture in the page itself ({PICTURE}…)"))
     }
 }
 
@@ -297,9 +296,10 @@ impl Scene {
             .checked_mul(*height)
             .and_then(|area| area.checked_mul(self.frames));
         let inside = slices.iter().all(|slice| usize::from(*slice) < self.z_mm.len());
-        match places == Some(slices.len()) && inside {
-            true => Ok(()),
-            false => Err(format!("its depth has {} places of {width}×{height}", slices.len())),
+        if places == Some(slices.len()) && inside {
+            Ok(())
+        } else {
+            Err(format!("its depth has {} places of {width}×{height}", slices.len()))
         }
     }
 }
@@ -362,9 +362,12 @@ mod tests {
         assert_eq!((slices[0], slices[239]), (0, 9));
         // One view is sharp on the left, the other on the right.
         let grey = |sharp: std::ops::Range<u32>| {
-            RgbImage::from_fn(80, 40, |x, y| match sharp.contains(&x) && (x + y) % 2 == 0 {
-                true => image::Rgb([255; 3]),
-                false => image::Rgb([100; 3]),
+            RgbImage::from_fn(80, 40, |x, y| {
+                if sharp.contains(&x) && (x + y) % 2 == 0 {
+                    image::Rgb([255; 3])
+                } else {
+                    image::Rgb([100; 3])
+                }
             })
         };
         let found = Depth::from_focus(&[vec![grey(0..40), grey(40..80)]]);

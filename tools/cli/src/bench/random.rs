@@ -125,10 +125,7 @@ fn onnx(layers: usize) -> Vec<u8> {
         graph = graph.bytes(5, &tensor(&kernel, &shape, values));
         let values = weights(outputs).into_iter();
         graph = graph.bytes(5, &tensor(&bias, &[outputs], values));
-        let out = match last {
-            true => "field".to_owned(),
-            false => format!("conv{i}"),
-        };
+        let out = if last { "field".to_owned() } else { format!("conv{i}") };
         let attributes: [(&str, &[u64]); 2] = [("kernel_shape", &[3, 3]), ("pads", &[1, 1, 1, 1])];
         graph = graph.bytes(1, &node("Conv", &[&at, &kernel, &bias], &out, &attributes));
         at = out;

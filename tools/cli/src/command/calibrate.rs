@@ -336,46 +336,44 @@ impl Aberration {
         output::check_file(&self.output)?;
         let state = self.folder.join("search.json");
         let file = self.display.read_of_three()?;
-        let entries = match self.output.exists() {
-            true => calibration::read_entries(&self.output)?,
-            false => Vec::new(),
+        let entries = if self.output.exists() {
+            calibration::read_entries(&self.output)?
+        } else {
+            Vec::new()
         };
-        let now = match state.exists() {
-            false => {
-                let start = self
-                    .entry(&entries)
-                    .map_or([0.0; 5], |mut e| *e.colour_mut(self.index()));
-                if start != [0.0; 5] && !self.overwrite.is_given() {
-                    return Err(Error::file(
-                        &self.output,
-                        "has coefficients of this colour at this z already; --overwrite searches on from them",
-                    ));
-                }
-                // Photographs of another search must not be taken for this one's.
-                output::folder(&self.folder, Holding::RunOf("search.json"))?;
-                output::make_folder(&self.folder)?;
-                SearchFile {
-                    z_mm: self.z_mm,
-                    colour: self.colour,
-                    at: self.at,
-                    search: Search::from(start),
-                }
+        let now = if state.exists() {
+            output::reading(&state)?;
+            let text = file::read_text(&state).map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
+            let now: SearchFile = serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
+            if (now.z_mm, now.colour, now.at) != (self.z_mm, self.colour, self.at) {
+                return Err(Error::file(
+                    &state,
+                    "is of another z, colour or place; a search needs a folder of its own",
+                ));
             }
-            true => {
-                output::reading(&state)?;
-                let text = file::read_text(&state).map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
-                let now: SearchFile = serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
-                if (now.z_mm, now.colour, now.at) != (self.z_mm, self.colour, self.at) {
-                    return Err(Error::file(
-                        &state,
-                        "is of another z, colour or place; a search needs a folder of its own",
-                    ));
-                }
-                let sharpness = self.sharpness(&now, &file.target.display)?;
-                SearchFile {
-                    search: now.search.learn(&sharpness),
-                    ..now
-                }
+            let sharpness = self.sharpness(&now, &file.target.display)?;
+            SearchFile {
+                search: now.search.learn(&sharpness),
+                ..now
+            }
+        } else {
+            let start = self
+                .entry(&entries)
+                .map_or([0.0; 5], |mut e| *e.colour_mut(self.index()));
+            if start != [0.0; 5] && !self.overwrite.is_given() {
+                return Err(Error::file(
+                    &self.output,
+                    "has coefficients of this colour at this z already; --overwrite searches on from them",
+                ));
+            }
+            // Photographs of another search must not be taken for this one's.
+            output::folder(&self.folder, Holding::RunOf("search.json"))?;
+            output::make_folder(&self.folder)?;
+            SearchFile {
+                z_mm: self.z_mm,
+                colour: self.colour,
+                at: self.at,
+                search: Search::from(start),
             }
         };
         if now.search.is_done() {

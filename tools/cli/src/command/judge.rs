@@ -194,9 +194,10 @@ impl Judge {
 
     fn combinations(&self, display: &phasefront::Display) -> Vec<Combination> {
         let trained = phasefront_models::default_network(display).is_some();
-        let default = match trained {
-            true => vec![CoreMethod::Sweep, CoreMethod::Network],
-            false => vec![CoreMethod::Sweep],
+        let default = if trained {
+            vec![CoreMethod::Sweep, CoreMethod::Network]
+        } else {
+            vec![CoreMethod::Sweep]
         };
         let methods = if self.method.is_empty() {
             default

@@ -47,11 +47,12 @@ impl Link {
 }
 
 fn checked((width, height): (usize, usize)) -> Result<(usize, usize)> {
-    match width >= 512 && height >= 24 {
-        true => Ok((height, width)),
-        false => Err(Error::Input(format!(
+    if width >= 512 && height >= 24 {
+        Ok((height, width))
+    } else {
+        Err(Error::Input(format!(
             "a pattern of {width}×{height}; its 256 steps and six bands need at least 512×24"
-        ))),
+        )))
     }
 }
 
@@ -76,9 +77,10 @@ impl Read {
         let (height, width) = capture.shape;
         checked((width, height)).map_err(|e| Error::file(&self.capture, e))?;
         let reading = link::read(&capture, checked(self.size)?);
-        let text = match reading.faults.is_empty() {
-            true => "every pixel arrives as it is".into(),
-            false => reading.faults.join("\n"),
+        let text = if reading.faults.is_empty() {
+            "every pixel arrives as it is".into()
+        } else {
+            reading.faults.join("\n")
         };
         terminal::print(json, &json!(reading), text);
         Ok(())

@@ -101,9 +101,10 @@ impl MultiplexCommand {
             .into_iter()
             .filter(|n| *n <= maps.len())
             .collect();
-        let figures = match self.judge {
-            true => plan.judge(&wave, &maps, &counts)?,
-            false => Vec::new(),
+        let figures = if self.judge {
+            plan.judge(&wave, &maps, &counts)?
+        } else {
+            Vec::new()
         };
         let rows: Vec<_> = (counts.iter().zip(&figures))
             .map(|(n, f)| {

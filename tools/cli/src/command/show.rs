@@ -104,9 +104,10 @@ fn images_of(path: &Path) -> Result<Vec<PathBuf>> {
         })
         .collect();
     files.sort();
-    match files.is_empty() {
-        true => Err(Error::file(path, "holds no .png and no .bmp")),
-        false => Ok(files),
+    if files.is_empty() {
+        Err(Error::file(path, "holds no .png and no .bmp"))
+    } else {
+        Ok(files)
     }
 }
 
@@ -125,9 +126,10 @@ impl Screens {
 
 fn row(screen: &Screen) -> String {
     let rate = screen.rate_hz.map_or(String::new(), |rate| format!("  {rate} Hz"));
-    let scaled = match screen.scale == 1.0 {
-        true => String::new(),
-        false => format!("  scaled by {}: turn this off for a modulator", screen.scale),
+    let scaled = if screen.scale == 1.0 {
+        String::new()
+    } else {
+        format!("  scaled by {}: turn this off for a modulator", screen.scale)
     };
     let [x, y] = screen.at;
     format!(

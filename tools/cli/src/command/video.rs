@@ -147,9 +147,10 @@ impl Video {
         let bar = source.progress();
         let start = Instant::now();
         let memory = memory_mb();
-        let statistics = match self.live {
-            true => self.live(options, &mut source, &mut sink, &bar, rate)?,
-            false => self.one_by_one(options, &mut source, &mut sink, &bar, rate)?,
+        let statistics = if self.live {
+            self.live(options, &mut source, &mut sink, &bar, rate)?
+        } else {
+            self.one_by_one(options, &mut source, &mut sink, &bar, rate)?
         };
         let seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
@@ -212,11 +213,12 @@ impl Video {
     fn rate_hz(&self) -> Result<f64> {
         let films = || film::is_film(&self.input).then(|| film::about(&self.input)).flatten();
         let rate = self.rate.or_else(|| Some(films()?.rate_hz)).unwrap_or(30.0);
-        match rate.is_finite() && rate > 0.0 && rate <= 1000.0 {
-            true => Ok(rate),
-            false => Err(Error::Input(format!(
+        if rate.is_finite() && rate > 0.0 && rate <= 1000.0 {
+            Ok(rate)
+        } else {
+            Err(Error::Input(format!(
                 "--rate {rate}: it must lie above 0 and up to 1000"
-            ))),
+            )))
         }
     }
 

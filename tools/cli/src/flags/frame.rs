@@ -79,10 +79,7 @@ impl SeenDepthFlags {
     /// Returns the depth that `network` estimates for `rgb`, larger where it is farther.
     pub(crate) fn farther(&self, network: &DepthNetwork, rgb: &Array3<f32>) -> Result<Array2<f32>> {
         let seen = network.see(rgb.view(), self.depth_network_colours.colours())?;
-        Ok(match self.invert {
-            true => seen,
-            false => seen.mapv(|v| -v),
-        })
+        Ok(if self.invert { seen } else { seen.mapv(|v| -v) })
     }
 }
 
@@ -280,9 +277,10 @@ impl FrameFlags {
     }
 
     fn inverted(&self, frame: RgbdFrame) -> Result<RgbdFrame> {
-        match self.seen.invert {
-            true => Ok(RgbdFrame::new(frame.rgb().to_owned(), frame.depth().mapv(|d| 1.0 - d))?),
-            false => Ok(frame),
+        if self.seen.invert {
+            Ok(RgbdFrame::new(frame.rgb().to_owned(), frame.depth().mapv(|d| 1.0 - d))?)
+        } else {
+            Ok(frame)
         }
     }
 

@@ -90,9 +90,10 @@ impl<'a> Multiplex<'a> {
                     field
                 }
             };
-            let (odd, turn) = match differ.start {
-                true => (n % 2 == 1, (n as f32 * GOLDEN).fract() * TAU),
-                false => (false, 0.0),
+            let (odd, turn) = if differ.start {
+                (n % 2 == 1, (n as f32 * GOLDEN).fract() * TAU)
+            } else {
+                (false, 0.0)
             };
             // Double phase of the conjugate, conjugated back, is double phase with the other parity.
             if odd {

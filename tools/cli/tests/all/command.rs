@@ -922,10 +922,10 @@ fn a_gpu_that_is_not_there_or_not_meant_is_named() {
 fn auto_sweeps_clean_depth_and_leaves_noisy_depth_to_a_network() {
     let folder = Folder::new();
     let square = |y: usize, x: usize| (20..60).contains(&y) && (24..70).contains(&x);
-    let rgb = Array3::from_shape_fn((3, 80, 96), |(c, y, x)| match square(y, x) {
-        true => 0.9 - 0.1 * c as f32,
-        false => 0.2,
-    });
+    let rgb = Array3::from_shape_fn(
+        (3, 80, 96),
+        |(c, y, x)| if square(y, x) { 0.9 - 0.1 * c as f32 } else { 0.2 },
+    );
     picture::write_amplitude(&folder.path("rgb.png"), rgb.view()).unwrap();
     for (name, ramp, stage) in [("clean.npy", 1, "sweep"), ("noisy.npy", 5, "network")] {
         let depth = Array2::from_shape_fn((80, 96), |(y, x)| {

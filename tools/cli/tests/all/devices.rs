@@ -46,9 +46,10 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
         let size = format!("{}x{}", size.0, size.1);
         let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
         folder.succeeds(&[&SMALL_HOLOGRAM[..], fit, &to].concat());
-        let frames = match folder.path("frame.png").exists() {
-            true => vec!["frame.png"],
-            false => vec!["frame-red.png", "frame-green.png", "frame-blue.png"],
+        let frames = if folder.path("frame.png").exists() {
+            vec!["frame.png"]
+        } else {
+            vec!["frame-red.png", "frame-green.png", "frame-blue.png"]
         };
         let back = ["--display", name, "--size", &size, "-o", "back.png"];
         folder.succeeds(&[&["unpack"], &frames[..], &back].concat());

@@ -19,9 +19,12 @@ const HEIGHT: u32 = 32;
 
 /// Creates a photo that is blue on the left, where it is near.
 fn colour() -> DynamicImage {
-    image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match x < WIDTH / 2 {
-        true => image::Rgb([40, 4 * y as u8, 220]),
-        false => image::Rgb([200, 90, 20]),
+    image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        if x < WIDTH / 2 {
+            image::Rgb([40, 4 * y as u8, 220])
+        } else {
+            image::Rgb([200, 90, 20])
+        }
     })
     .into()
 }
@@ -315,9 +318,10 @@ fn network(sides: Option<(i64, i64)>, interleaved: bool) -> Vec<u8> {
         output: vec!["seen".into()],
         ..Default::default()
     });
-    let picture = match interleaved {
-        false => vec![one.clone(), three, height.clone(), width.clone()],
-        true => vec![one.clone(), height.clone(), width.clone(), three],
+    let picture = if interleaved {
+        vec![one.clone(), height.clone(), width.clone(), three]
+    } else {
+        vec![one.clone(), three, height.clone(), width.clone()]
     };
     ModelProto {
         ir_version: 8,

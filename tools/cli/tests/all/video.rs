@@ -35,9 +35,12 @@ fn refusal(arguments: &[&str]) -> String {
 /// Creates colour, and depth in millimetres, of a square that moves over a wall.
 fn frame(index: u32) -> (image::RgbImage, image::ImageBuffer<image::Luma<u16>, Vec<u16>>) {
     let square = |x: u32, y: u32| (8 + index * 4..24 + index * 4).contains(&x) && (12..30).contains(&y);
-    let colour = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match square(x, y) {
-        true => image::Rgb([240, 180, 40]),
-        false => image::Rgb([20, 60, 2 * x as u8]),
+    let colour = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        if square(x, y) {
+            image::Rgb([240, 180, 40])
+        } else {
+            image::Rgb([20, 60, 2 * x as u8])
+        }
     });
     let depth = image::ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| match square(x, y) {
         true => image::Luma([800]),

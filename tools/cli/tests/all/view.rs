@@ -11,9 +11,12 @@ use serde_json::Value;
 fn with_frame() -> Folder {
     let folder = Folder::new();
     let near = |x: u32, y: u32| (12..40).contains(&x) && (16..48).contains(&y);
-    let rgb = image::RgbImage::from_fn(96, 64, |x, y| match near(x, y) {
-        true => image::Rgb([230, (x * 9) as u8, 40]),
-        false => image::Rgb([30, 90, ((x / 6 + y / 6) % 2 * 180) as u8]),
+    let rgb = image::RgbImage::from_fn(96, 64, |x, y| {
+        if near(x, y) {
+            image::Rgb([230, (x * 9) as u8, 40])
+        } else {
+            image::Rgb([30, 90, ((x / 6 + y / 6) % 2 * 180) as u8])
+        }
     });
     rgb.save(folder.path("rgb.png")).unwrap();
     let depth = image::GrayImage::from_fn(96, 64, |x, y| image::Luma([if near(x, y) { 20 } else { 230 }]));

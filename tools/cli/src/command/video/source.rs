@@ -239,12 +239,13 @@ impl Folder {
 
 /// Refuses near and far if depth of `unit` has no metres.
 fn check_range(flags: &Video, unit: DepthUnit) -> Result<()> {
-    match flags.depth.range()?.is_some() && unit == DepthUnit::Normalized {
-        true => Err(Error::Input(
+    if flags.depth.range()?.is_some() && unit == DepthUnit::Normalized {
+        Err(Error::Input(
             "--near and --far are metres and normalized depth has no unit; leave them out, or name the unit by --depth-unit"
                 .into(),
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }
 
