@@ -66,13 +66,12 @@ fn unknown(path: &Path, name: &str, why: &std::io::Error) -> Error {
     let bundled = bundled.join(", ");
     Error::file(
         path,
-        match FILES.contains(&name) {
-            true => {
-                format!("is not bundled ({bundled} are), but a file of the source tree: --network models/{name}.onnx")
-            }
-            false => format!(
+        if FILES.contains(&name) {
+            format!("is not bundled ({bundled} are), but a file of the source tree: --network models/{name}.onnx")
+        } else {
+            format!(
                 "is neither a bundled network ({bundled}) nor a file that can be read ({why}); other networks are files, as models/rgbd-30.onnx of the source tree: --network FILE.onnx"
-            ),
+            )
         },
     )
 }

@@ -14,12 +14,11 @@ pub fn name(path: &Path) -> String {
 /// other than newlines, because names of files, networks and scenes may contain any.
 pub fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display) {
     let mut out = std::io::stdout().lock();
-    let printed = match json {
-        true => writeln!(out, "{value}"),
-        false => {
-            let control = |c: char| c.is_control() && c != '\n';
-            writeln!(out, "{}", text.to_string().replace(control, "\u{fffd}"))
-        }
+    let printed = if json {
+        writeln!(out, "{value}")
+    } else {
+        let control = |c: char| c.is_control() && c != '\n';
+        writeln!(out, "{}", text.to_string().replace(control, "\u{fffd}"))
     };
     match printed.and_then(|()| out.flush()) {
         Ok(()) => {}
