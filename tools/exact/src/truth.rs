@@ -13,9 +13,12 @@ use serde::Serialize;
 /// Returns the amplitudes of the front layer. Pixels without a surface are black.
 pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     let front = &ldi.layers[0];
-    Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| match front.depth[(y, x)].is_nan() {
-        true => 0.0,
-        false => front.rgb[(c, y, x)],
+    Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| {
+        if front.depth[(y, x)].is_nan() {
+            0.0
+        } else {
+            front.rgb[(c, y, x)]
+        }
     })
 }
 
