@@ -181,11 +181,12 @@ impl AberrationFile {
     /// Returns an error if the number of colours differs.
     pub fn check(&self, display: &Display) -> Result<()> {
         let (of, right) = (self.colours(), display.colours());
-        match of == right {
-            true => Ok(()),
-            false => Err(Error::Input(format!(
+        if of == right {
+            Ok(())
+        } else {
+            Err(Error::Input(format!(
                 "the aberration is of {of} colours, the display has {right}; both must have as many"
-            ))),
+            )))
         }
     }
 

@@ -92,9 +92,10 @@ impl PanelToml {
 /// # Errors
 /// Returns an error if the file is missing or has another format or size.
 fn read_flatness(path: &Path, (height, width): (usize, usize)) -> Result<Vec<u16>> {
-    let (shape, turns) = match has_extension(path, "csv") {
-        true => read_csv(path)?,
-        false => read_image(path)?,
+    let (shape, turns) = if has_extension(path, "csv") {
+        read_csv(path)?
+    } else {
+        read_image(path)?
     };
     if shape != (height, width) {
         return Err(Error::file(

@@ -95,9 +95,10 @@ impl Placement {
             Rgb([0, 1, 2].map(|c| rgb[(c, row.min(height - 1), column.min(width - 1))]))
         });
         let (height, width) = self.inner;
-        let sized = match (h as usize, w as usize) == self.inner {
-            true => part,
-            false => imageops::resize(&part, width as u32, height as u32, FilterType::Triangle),
+        let sized = if (h as usize, w as usize) == self.inner {
+            part
+        } else {
+            imageops::resize(&part, width as u32, height as u32, FilterType::Triangle)
         };
         Array3::from_shape_fn((3, height, width), |(c, y, x)| {
             sized.get_pixel(x as u32, y as u32).0[c].clamp(0.0, 1.0)

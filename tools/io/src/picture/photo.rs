@@ -128,9 +128,10 @@ impl Xmp {
             "holds no depth: it has no XMP. Phones store depth in portraits; for other photos there is --depth-network",
         )?;
         let main = String::from_utf8(main.to_vec()).map_err(|_| "its XMP is no UTF-8")?;
-        let extended = match parts.is_empty() {
-            true => None,
-            false => Some(extended(&main, &parts)?),
+        let extended = if parts.is_empty() {
+            None
+        } else {
+            Some(extended(&main, &parts)?)
         };
         Ok(Xmp { main, extended })
     }
