@@ -7,20 +7,18 @@
 //! - [`hidden`] adds surfaces that an RGB-D frame does not show, so that edges are lit from behind;
 //! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)) instead of a Fourier
 //!   transform;
-//! - a point between planes is not moved to a plane; its light is carried to the plane, to first order;
+//! - a point between two planes is on both, with a share on each ([`shares`](self));
 //! - a tile of the frame processes only the planes with points in the tile and its halo, and crosses the others in one
 //!   step;
 //! - the last step goes from the front plane directly to the midpoint, or on to the display.
 //!
-//! Plane k of N is at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). Over the distance s
-//! from its point to the plane, light u becomes u + i·λs/4π·∇²u to first order. The share [`CARRIED`] of the second
-//! term is added: on a slope, points nearer to the plane would block light that spreads to farther neighbours.
-//! [`mod@reference`] is the naive oracle.
+//! Plane k of N is at z = V/2 − V·(k + ½)/N. [`mod@reference`] is the naive oracle.
 
 mod filters;
 mod fit;
 pub mod hidden;
 pub mod reference;
+mod shares;
 mod tile;
 mod workers;
 
@@ -35,6 +33,8 @@ use num_complex::Complex32;
 use phasefront_kernels::Isa;
 use phasefront_kernels::fir::Fir;
 use rayon::prelude::*;
+pub use shares::MEET;
+use shares::Slot;
 use std::sync::{Mutex, PoisonError};
 pub use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
@@ -44,8 +44,6 @@ use workers::Workers;
 pub const MAX_PLANES: usize = 1024;
 /// The largest number of taps of a step.
 pub const MAX_TAPS: usize = 63;
-/// The share of a point's first-order spread to its plane that is applied.
-pub const CARRIED: f64 = 0.5;
 /// The largest number of hidden layers.
 pub const MAX_HIDDEN_LAYERS: usize = 2;
 /// The largest spread of light through the volume, in pixels. A tile's halo is as wide as this spread, so with a larger
@@ -64,20 +62,18 @@ pub struct Sweep {
     pub taps: usize,
     /// The number of hidden layers to add, 0 to [`MAX_HIDDEN_LAYERS`].
     pub hidden_layers: usize,
-    /// Whether points can be between planes, with their light carried to the plane by a first-order step. Otherwise
-    /// each point is moved to its plane, as in SM-LBM.
+    /// Whether points between two planes are on both. Otherwise each point is moved to its plane, as in SM-LBM.
     pub between_planes: bool,
     /// The number of pixels along each side of a tile, a multiple of 16.
     pub tile: usize,
 }
 
 impl Sweep {
-    /// Returns parameters that suit `display`: planes so close together that light spreads 3/4 of a pixel from one to
+    /// Returns parameters that suit `display`: planes so close together that light spreads at most a pixel from one to
     /// the next, as far as [`Sweep::DEFAULT_PLANES`] allows, and as many taps as a step needs.
     pub fn for_display(display: &Display) -> Self {
         let reach = reach_px(display, display.volume_depth_m());
-        let planes = (reach * 4.0 / 3.0).ceil() as usize;
-        let planes = planes.clamp(*Self::DEFAULT_PLANES.start(), *Self::DEFAULT_PLANES.end());
+        let planes = (reach.ceil() as usize).clamp(*Self::DEFAULT_PLANES.start(), *Self::DEFAULT_PLANES.end());
         Self::of_planes(display, planes)
     }
 
@@ -177,7 +173,7 @@ pub struct SweepPlan {
 
 /// The working memory of a [`SweepPlan`] for one frame at a time, for the thread pool in which it was made.
 pub struct SweepScratch {
-    planes: Vec<u16>,
+    slots: Vec<Slot>,
     sources: Vec<u32>,
     hidden: HiddenScratch,
     tiles: Workers<TileScratch>,
@@ -281,13 +277,14 @@ impl SweepPlan {
         let size = self.height * self.width;
         let layers = self.sweep.hidden_layers;
         SweepScratch {
-            planes: vec![0; size],
+            slots: vec![0; size],
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| {
                 let mut scratch = self.layout.scratch();
+                // Each point can be on two planes.
                 let all = (layers + 1) * size;
-                scratch.reserve(self.layout.most_points(layers + 1).min(all));
+                scratch.reserve(2 * self.layout.most_points(layers + 1).min(all));
                 scratch
             }),
             cancel: Cancel::default(),
@@ -308,11 +305,11 @@ impl SweepPlan {
         assert_eq!(field.len(), self.filters.len() * size);
         let (rgb, depth) = frame.values();
         const PART: usize = 1 << 14;
-        (scratch.planes.par_chunks_mut(PART))
+        (scratch.slots.par_chunks_mut(PART))
             .zip(depth.par_chunks(PART))
-            .for_each(|(planes, depth)| {
-                for (plane, d) in planes.iter_mut().zip(depth) {
-                    *plane = plane_of_depth(*d, self.sweep.planes) as u16;
+            .for_each(|(slots, depth)| {
+                for (slot, d) in slots.iter_mut().zip(depth) {
+                    *slot = self.sweep.slot(*d);
                 }
             });
         let layers = self.sweep.hidden_layers;
@@ -322,7 +319,7 @@ impl SweepPlan {
         let surfaces = Surfaces {
             rgb,
             depth,
-            planes: &scratch.planes,
+            slots: &scratch.slots,
             hidden: &scratch.sources[..layers * size],
             height: self.height,
             width: self.width,
@@ -347,11 +344,6 @@ impl SweepPlan {
         });
         Ok(())
     }
-}
-
-/// Returns the plane of a pixel of depth `d` among `planes`, where 0 is the nearest.
-pub fn plane_of_depth(d: f32, planes: usize) -> usize {
-    ((f64::from(d) * planes as f64) as usize).min(planes - 1)
 }
 
 /// Returns how far to search for hidden surfaces: as far as light spreads through the volume.
@@ -387,7 +379,6 @@ pub fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>>
         step_m,
         planes: sweep.planes,
         home_m,
-        between_planes: sweep.between_planes,
     };
     Ok(display.wavelengths_m().iter().map(of).collect())
 }

@@ -167,6 +167,28 @@ fn a_flat_frame_of_one_colour_stays_as_it_is_far_from_its_border() {
 }
 
 #[test]
+fn slopes_have_no_stripes() {
+    let (height, width) = (72, 64);
+    let depth = Array2::from_shape_fn((height, width), |(y, x)| 0.1 + (8 * y + 3 * x) as f32 / 960.0);
+    let frame = RgbdFrame::new(Array3::from_elem((3, height, width), 0.6), depth).unwrap();
+    let of = |planes, between_planes| {
+        let sweep = Sweep {
+            planes,
+            between_planes,
+            ..sweep()
+        };
+        run(&SweepPlan::new(height, width, &display(), sweep, 0.0).unwrap(), &frame)
+    };
+    let truth = of(300, false);
+    let error = |field: Vec<Complex32>| {
+        let squares = field.iter().zip(&truth).map(|(a, b)| (a.norm() - b.norm()).powi(2));
+        (squares.sum::<f32>() / truth.len() as f32).sqrt()
+    };
+    let (between, moved) = (error(of(9, true)), error(of(9, false)));
+    assert!(between < 0.3 * moved, "{between} {moved}");
+}
+
+#[test]
 fn what_cannot_be_swept_is_named() {
     let refused = |sweep: Sweep, z_m: f64| {
         let plan = SweepPlan::new(8, 8, &Display::default(), sweep, z_m);

@@ -147,9 +147,12 @@ impl Maker<'_> {
     fn header(&self) -> String {
         let sweep = self.plan.sweep();
         format!(
-            "const COUNT: u32 = {}u;\nconst HIDDEN: u32 = {}u;\n",
-            sweep.planes, sweep.hidden_layers
-        )
+            "const COUNT: u32 = {}u;\nconst HIDDEN: u32 = {}u;\nconst BETWEEN: bool = {};\nconst MEET: f32 = {};\n",
+            sweep.planes,
+            sweep.hidden_layers,
+            sweep.between_planes,
+            sweep::MEET
+        ) + include_str!("sweep_shares.wgsl")
     }
 
     /// Plans the dispatch that finds the planes of each pixel's points.
@@ -189,7 +192,7 @@ impl Maker<'_> {
     fn steps(&self, together: usize, fields: &[wgpu::Buffer; 2]) -> Result<Vec<Dispatch>> {
         let (device, sweep) = (self.device, self.plan.sweep());
         let radius = sweep.taps / 2;
-        let taps = (self.plan.filters().iter()).map(|f| (f.carry, &f.step[..]));
+        let taps = (self.plan.filters().iter()).map(|f| &f.step[..]);
         let taps = device.constants("steps", &packed(taps, radius))?;
         let (columns, rows) = TILE;
         let source = self.header()
@@ -199,9 +202,7 @@ impl Maker<'_> {
                 const COLUMNS: u32 = {columns}u;
                 const ROWS: u32 = {rows}u;
                 const EACH: u32 = {EACH}u;
-                const CARRY: bool = {};
-                ",
-                sweep.between_planes
+                "
             )
             + include_str!("sweep.wgsl");
         let program = device.program("planes", source, "cross_planes");
@@ -235,7 +236,7 @@ impl Maker<'_> {
         let filters = self.plan.filters();
         let lengths = filters.iter().map(|f| f.home.len());
         let radius = lengths.max().unwrap_or(1) - 1;
-        let taps = filters.iter().map(|f| (0.0, &f.home[..]));
+        let taps = filters.iter().map(|f| &f.home[..]);
         let taps = device.constants("the way home", &packed(taps, radius))?;
         let ((height, width), (high, wide)) = (self.plan.shape(), self.padded);
         let go = |down: bool, written: usize, read: usize, from, to: &wgpu::Buffer| {
@@ -290,14 +291,13 @@ fn border(plan: &SweepPlan, display: &Display) -> Result<usize> {
     Ok(widest.unwrap_or(0) + MARGIN)
 }
 
-/// Packs the filters of three colours up to `radius` for the programs: four f32 per tap, with the carry of points in
-/// the third value of the first tap.
-fn packed<'a>(colours: impl Iterator<Item = (f32, &'a [[f32; 2]])>, radius: usize) -> Vec<u8> {
+/// Packs the filters of three colours up to `radius` for the programs: four f32 per tap, of which two are unused.
+fn packed<'a>(colours: impl Iterator<Item = &'a [[f32; 2]]>, radius: usize) -> Vec<u8> {
     let all: Vec<[f32; 4]> = colours
-        .flat_map(|(carry, taps)| {
+        .flat_map(|taps| {
             (0..=radius).map(move |j| {
                 let [re, im] = taps.get(j).copied().unwrap_or_default();
-                [re, im, if j == 0 { carry } else { 0.0 }, 0.0]
+                [re, im, 0.0, 0.0]
             })
         })
         .collect();

@@ -1,8 +1,8 @@
 // Sweeps several planes, the farthest first, for one colour in one tile. For each plane it applies the step from the
-// plane behind along rows and columns, then sets the plane's points, which replace the field, then adds the light of
-// points before or behind the plane. A tile is loaded with a halo into workgroup memory, and its valid part shrinks by
-// RADIUS per step until its middle remains. The header from sweep.rs defines the constants in capitals. A thread
-// computes EACH rows of a column.
+// plane behind along rows and columns, then lets the plane's points replace their shares of the field. A tile is loaded
+// with a halo into workgroup memory, and its valid part shrinks by RADIUS per step until its middle remains. The header
+// from sweep.rs defines the constants in capitals, and sweep_shares.wgsl comes before this file. A thread computes EACH
+// rows of a column.
 
 struct Frame {
     width: u32, height: u32,
@@ -11,8 +11,7 @@ struct Frame {
     // The first plane of this dispatch. Behind the last plane there is no light.
     first: u32,
 }
-// The filter's centre, then the taps at distances 1, 2 …, complex. The first value's z is the share that a point gives
-// to its neighbours (see Filters::carry).
+// The filter's centre, then the taps at distances 1, 2 …, complex.
 struct Colour { taps: array<vec4f, RADIUS + 1> }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -35,7 +34,7 @@ var<workgroup> marked: u32;
 
 fn times(a: vec2f, b: vec2f) -> vec2f { return vec2f(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 
-// Returns the plane of a pixel's point in a layer. Layer 0 is the visible surface.
+// Returns the plane of a pixel's point in a layer, or the one in front of it. Layer 0 is the visible surface.
 fn plane_of(word: u32, layer: u32) -> u32 {
     if (layer == 0u) { return word & 1023u; }
     return (word >> (11u * layer - 1u)) & 2047u;
@@ -81,6 +80,7 @@ fn cross_planes(
             for (var layer = 0u; layer <= HIDDEN; layer++) {
                 let step = frame.first - plane_of(planes[i], layer);
                 if (step < PLANES) { own_marks |= 1u << step; }
+                if (step - 1u < PLANES) { own_marks |= 1u << (step - 1u); }
             }
         }
     }
@@ -118,34 +118,17 @@ fn cross_planes(
             }
             // The plane's points, with the visible surface last.
             let plane = frame.first - step;
-            let middle = (f32(plane) + 0.5) / f32(COUNT);
-            let here = (held & (1u << step)) != 0u;
-            var light: array<f32, EACH>;
-            if (here) {
+            if ((held & (1u << step)) != 0u) {
                 for (var i = 0u; i < EACH; i++) {
-                    light[i] = 0.0;
                     for (var l = 0u; l <= HIDDEN; l++) {
                         let layer = HIDDEN - l;
-                        if (plane_of(planes[i], layer) != plane) { continue; }
+                        // A point between planes is also on the plane behind it.
+                        if (plane - plane_of(planes[i], layer) > 1u) { continue; }
                         var source = own + i * frame.width;
                         if (layer > 0u) { source = sources[(layer - 1u) * area + source]; }
                         let point = surfaces[source];
-                        let amplitude = point[colour];
-                        v[i] = vec2f(amplitude, 0.0);
-                        light[i] += colours[colour].taps[0].z * amplitude * (point.w - middle);
+                        v[i] += share(point.w, plane) * (vec2f(point[colour], 0.0) - v[i]);
                     }
-                }
-            }
-            if (CARRY && here) {
-                workgroupBarrier();
-                for (var i = 0u; i < EACH; i++) { tile[(y + i) * COLUMNS + x] = vec2f(light[i], 0.0); }
-                workgroupBarrier();
-                for (var i = 0u; i < EACH; i++) {
-                    let row = (y + i) * COLUMNS;
-                    let beside = tile[row + max(x, 1u) - 1u].x + tile[row + min(x + 1u, COLUMNS - 1u)].x;
-                    let above = tile[(max(y + i, 1u) - 1u) * COLUMNS + x].x;
-                    let below = tile[min(y + i + 1u, ROWS - 1u) * COLUMNS + x].x;
-                    v[i].y += beside + above + below - 4.0 * light[i];
                 }
             }
             if (step + 1u < PLANES) {

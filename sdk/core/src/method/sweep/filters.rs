@@ -6,11 +6,9 @@
 //! hologram is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so merging empty planes does
 //! not affect the result.
 
-use super::CARRIED;
 use super::fit::{self, Coefficients};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
-use std::f64::consts::PI;
 
 /// The sum of magnitudes that a merged filter may lose at its ends.
 const TAIL: f64 = 2e-5;
@@ -32,8 +30,6 @@ pub struct Optics {
     pub(super) planes: usize,
     /// The distance from plane 0, the nearest to the viewer, to the hologram.
     pub home_m: f64,
-    /// Whether light of points between planes is carried to their plane.
-    pub(super) between_planes: bool,
 }
 
 impl Optics {
@@ -54,9 +50,6 @@ impl Optics {
 
 /// The filters of one colour.
 pub struct Filters {
-    /// The light that a point adds to each neighbour, divided by i, its amplitude and its depth behind its plane in
-    /// normalized depth. The point itself loses four times as much.
-    pub carry: f32,
     /// H and B, for the oracle.
     pub step: Taps,
     pub home: Taps,
@@ -81,7 +74,6 @@ impl Filters {
             step_m,
             planes,
             home_m,
-            between_planes,
         } = optics;
         let free = |f: f64, distance_m: f64| fit::transfer(f, distance_m, wavelength_m, pitch_m);
         let steps = (planes - 1).max(1);
@@ -114,13 +106,7 @@ impl Filters {
                 _ => grid.cut((spectrum.iter().zip(&home_spectrum)).map(|(h, b)| h.powu(k as u32) * b)),
             })
             .collect();
-        let per_m = wavelength_m / (4.0 * PI * pitch_m * pitch_m);
-        let volume_m = step_m * planes as f64;
         let mut filters = Filters {
-            carry: match between_planes {
-                true => (CARRIED * per_m * volume_m) as f32,
-                false => 0.0,
-            },
             step: taps(&step),
             home: taps(&home),
             errors,
@@ -250,7 +236,6 @@ mod tests {
             step_m: 6e-3 / 24.0,
             planes: 24,
             home_m: -2.9e-3,
-            between_planes: true,
         }
     }
 

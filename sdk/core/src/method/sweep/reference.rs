@@ -1,7 +1,7 @@
 //! The naive oracle of the sweep. It processes whole planes, every plane, one step at a time, with f64 sums.
 
 use super::filters::Filters;
-use super::{Sweep, hidden, hidden_reach, optics, plane_of_depth};
+use super::{MEET, Sweep, hidden, hidden_reach, optics};
 use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::runtime::error::Result;
@@ -27,8 +27,6 @@ pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Re
         let mut plane = Plane::new(height + 2 * border, width + 2 * border);
         for k in (0..sweep.planes).rev() {
             plane.convolve(&filters.step);
-            let middle = (k as f64 + 0.5) / sweep.planes as f64;
-            let mut carried = Vec::new();
             for layer in (0..=sweep.hidden_layers).rev() {
                 for pixel in 0..size {
                     let source = match layer {
@@ -38,19 +36,10 @@ pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Re
                             source => source as usize,
                         },
                     };
-                    if plane_of_depth(depth[source], sweep.planes) == k {
-                        let (y, x) = (pixel / width + border, pixel % width + border);
-                        let value = f64::from(rgb[colour * size + source]);
-                        plane.values[y * plane.width + x] = value.into();
-                        let behind = f64::from(depth[source]) - middle;
-                        carried.push((y, x, f64::from(filters.carry) * value * behind));
-                    }
-                }
-            }
-            for (y, x, light) in carried {
-                plane.values[y * plane.width + x].im -= 4.0 * light;
-                for (y, x) in [(y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)] {
-                    plane.values[y * plane.width + x].im += light;
+                    let share = share(&sweep, depth[source], k);
+                    let light = f64::from(rgb[colour * size + source]);
+                    let value = &mut plane.values[(pixel / width + border) * plane.width + pixel % width + border];
+                    *value = *value * (1.0 - share) + share * light;
                 }
             }
         }
@@ -63,6 +52,18 @@ pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Re
         }
     }
     Ok(result)
+}
+
+/// Returns the share that a point of normalized `depth` blocks and emits on plane `k`.
+pub(super) fn share(sweep: &Sweep, depth: f32, k: usize) -> f64 {
+    let behind = f64::from(sweep.position(depth)) - k as f64;
+    let meet = f64::from(MEET);
+    let share = if behind >= 0.0 {
+        (1.0 - behind) / meet
+    } else {
+        (1.0 + behind) / (1.0 - meet)
+    };
+    share.clamp(0.0, 1.0)
 }
 
 struct Plane {

@@ -7,6 +7,7 @@
 
 use super::filters::Filters;
 use super::hidden::NOTHING;
+use super::shares::{Share, Slot};
 use num_complex::Complex32;
 use phasefront_kernels::fir::{Fir, RUN};
 use std::ops::Range;
@@ -30,8 +31,8 @@ pub(super) struct Surfaces<'a> {
     pub(super) rgb: &'a [f32],
     /// The normalized depth, (H, W).
     pub(super) depth: &'a [f32],
-    /// The plane of each pixel, (H, W).
-    pub(super) planes: &'a [u16],
+    /// The planes of each pixel's point, (H, W).
+    pub(super) slots: &'a [Slot],
     /// The pixels that the hidden layers continue, (layers, H, W).
     pub(super) hidden: &'a [u32],
     pub(super) height: usize,
@@ -100,7 +101,6 @@ impl Layout {
             starts: vec![0; self.halos.len() + 1],
             found: Vec::new(),
             points: Vec::new(),
-            light: vec![0.0; self.stride + 4],
             point_spans: vec![NOWHERE; self.halos.len() * rows],
             lit: vec![NOWHERE; rows],
             wider: vec![NOWHERE; rows],
@@ -143,8 +143,6 @@ pub(super) struct TileScratch {
     starts: Vec<u32>,
     found: Vec<(u16, Points)>,
     points: Vec<Points>,
-    /// The light that neighbouring points carry to their plane, with two zeros on each side.
-    light: Vec<f32>,
     /// The span of each plane's points in each row.
     point_spans: Vec<Span>,
     /// The span of possible light in each row of the field.
@@ -175,6 +173,17 @@ impl TileScratch {
     }
 }
 
+/// Where points are relative to a plane that they are on.
+#[derive(Clone, Copy, Default, PartialEq)]
+enum Side {
+    #[default]
+    On,
+    /// Between the plane and the next one in front of it.
+    Before,
+    /// Between the plane and the next one behind it.
+    Behind,
+}
+
 /// Neighbouring points of one plane in a row.
 #[derive(Clone, Copy, Default)]
 struct Points {
@@ -183,6 +192,7 @@ struct Points {
     /// The index of the first point's colour in the frame. The colours of the others follow it.
     from: u32,
     count: u16,
+    side: Side,
 }
 
 /// A tile of a frame.
@@ -215,8 +225,8 @@ impl<'a> Tile<'a> {
         scratch.starts.fill(0);
         scratch.found.clear();
         scratch.point_spans.fill(NOWHERE);
-        let Surfaces { planes, hidden, .. } = self.surfaces;
-        let layers = hidden.len() / planes.len();
+        let Surfaces { slots, hidden, .. } = self.surfaces;
+        let layers = hidden.len() / slots.len();
         for layer in (0..=layers).rev() {
             self.find(layer, scratch);
         }
@@ -241,7 +251,7 @@ impl<'a> Tile<'a> {
     /// Finds the points of a layer, where 0 is the front.
     fn find(&self, layer: usize, scratch: &mut TileScratch) {
         let Surfaces {
-            planes,
+            slots,
             hidden,
             height,
             width,
@@ -255,31 +265,31 @@ impl<'a> Tile<'a> {
             let row = y * width;
             match layer {
                 0 => {
-                    let planes = &planes[row..][..width];
+                    let slots = &slots[row..][..width];
                     let mut x = columns.start;
                     while x < columns.end {
-                        let plane = planes[x];
-                        let same = planes[x..columns.end].iter().take_while(|p| **p == plane);
+                        let slot = slots[x];
+                        let same = slots[x..columns.end].iter().take_while(|s| **s == slot);
                         let count = same.count();
-                        self.add(plane, y, x..x + count, row + x, scratch);
+                        self.add(slot, y, x..x + count, row + x, scratch);
                         x += count;
                     }
                 }
                 _ => {
-                    let sources = &hidden[(layer - 1) * planes.len() + row..][..width];
+                    let sources = &hidden[(layer - 1) * slots.len() + row..][..width];
                     let mut x = columns.start;
                     while x < columns.end {
                         let source = sources[x];
                         let mut count = 1;
                         if source != NOTHING {
-                            let plane = planes[source as usize];
+                            let slot = slots[source as usize];
                             while x + count < columns.end
                                 && sources[x + count] == source + count as u32
-                                && planes[source as usize + count] == plane
+                                && slots[source as usize + count] == slot
                             {
                                 count += 1;
                             }
-                            self.add(plane, y, x..x + count, source as usize, scratch);
+                            self.add(slot, y, x..x + count, source as usize, scratch);
                         }
                         x += count;
                     }
@@ -288,9 +298,20 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Adds the points of row `y` and `columns` of the frame that are within the plane's halo. The colour of the first
-    /// point is at `from`.
-    fn add(&self, plane: u16, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
+    /// Adds the points of row `y` and `columns` of the frame to their planes. The colour of the first point is at
+    /// `from`.
+    fn add(&self, slot: Slot, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
+        let plane = slot / 2;
+        if slot.is_multiple_of(2) {
+            self.add_to(plane, Side::On, y, columns, from, scratch);
+        } else {
+            self.add_to(plane, Side::Behind, y, columns.clone(), from, scratch);
+            self.add_to(plane + 1, Side::Before, y, columns, from, scratch);
+        }
+    }
+
+    /// Adds points that are within the halo of `plane`.
+    fn add_to(&self, plane: u16, side: Side, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let k = usize::from(plane);
         let halo = self.layout.halos[k];
@@ -308,6 +329,7 @@ impl<'a> Tile<'a> {
                 at: (y * stride + x) as u32,
                 from: (from + start - columns.start) as u32,
                 count: (end - start) as u16,
+                side,
             },
         ));
         scratch.starts[k + 1] += 1;
@@ -328,10 +350,10 @@ impl<'a> Tile<'a> {
         else {
             return;
         };
-        self.scatter(colour, at, filters.carry, scratch);
+        self.scatter(colour, at, scratch);
         while let Some(next) = (0..at).rev().find(|k| occupied(&scratch.starts, *k)) {
             at = self.cross(at, next, filters, scratch);
-            self.scatter(colour, at, filters.carry, scratch);
+            self.scatter(colour, at, scratch);
         }
         at = self.cross(at, at - filters.before_end(at), filters, scratch);
         // The whole tile, because unlit pixels must also be written.
@@ -351,10 +373,10 @@ impl<'a> Tile<'a> {
         at
     }
 
-    /// Replaces the field with the points of plane `k` where they are (Eq. 3 and 4): they emit light with phase 0 and
-    /// block the light from behind. Then carries the light of points before or behind the plane to it.
-    fn scatter(&self, colour: usize, k: usize, carry: f32, scratch: &mut TileScratch) {
-        let size = self.surfaces.planes.len();
+    /// Replaces the field's share with the points of plane `k` where they are (Eq. 3 and 4): they emit light with phase
+    /// 0 and block the light from behind.
+    fn scatter(&self, colour: usize, k: usize, scratch: &mut TileScratch) {
+        let size = self.surfaces.slots.len();
         let rgb = &self.surfaces.rgb[colour * size..][..size];
         let points = scratch.starts[k] as usize..scratch.starts[k + 1] as usize;
         let rows = self.layout.rows();
@@ -366,34 +388,22 @@ impl<'a> Tile<'a> {
             }
         }
         let [re, im] = scratch.field.each_mut().map(Aligned::values);
-        for points in &scratch.points[points.clone()] {
-            let (at, from) = (points.at as usize, points.from as usize);
-            let count = usize::from(points.count);
-            re[at..at + count].copy_from_slice(&rgb[from..from + count]);
-            im[at..at + count].fill(0.0);
-        }
-        if carry == 0.0 {
-            return;
-        }
-        let stride = self.layout.stride;
-        let middle = (k as f32 + 0.5) / self.layout.halos.len() as f32;
         for points in &scratch.points[points] {
             let (at, from) = (points.at as usize, points.from as usize);
             let count = usize::from(points.count);
-            let light = &mut scratch.light[..count + 4];
-            let own = &mut light[2..count + 2];
-            let values = rgb[from..].iter().zip(&self.surfaces.depth[from..]);
-            for (own, (value, depth)) in own.iter_mut().zip(values) {
-                *own = carry * value * (depth - middle);
+            let (re, im) = (&mut re[at..at + count], &mut im[at..at + count]);
+            let light = &rgb[from..from + count];
+            if points.side == Side::On {
+                re.copy_from_slice(light);
+                im.fill(0.0);
+                continue;
             }
-            for row in [at - stride, at + stride] {
-                for (im, own) in im[row..].iter_mut().zip(&*own) {
-                    *im += own;
-                }
-            }
-            light[count + 2..].fill(0.0);
-            for (im, light) in im[at - 1..].iter_mut().zip(light.windows(3)) {
-                *im += light[0] - 4.0 * light[1] + light[2];
+            let share = Share::on(k, self.layout.halos.len(), points.side == Side::Behind);
+            let depth = &self.surfaces.depth[from..from + count];
+            for (((re, im), light), depth) in re.iter_mut().zip(im).zip(light).zip(depth) {
+                let share = share.of(*depth);
+                *re += share * (light - *re);
+                *im -= share * *im;
             }
         }
     }
