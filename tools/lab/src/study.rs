@@ -4,6 +4,7 @@
 
 pub mod flicker;
 pub mod occlusion;
+pub mod slopes;
 pub mod sweep_parts;
 
 use crate::scene;

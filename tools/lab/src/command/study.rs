@@ -1,5 +1,6 @@
 //! `phasefront-lab study` computes the paper's Fig. 2a and 2b as a table, JSON and a plot. It also studies the benefit
-//! of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on other displays.
+//! of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on slopes and on other
+//! displays.
 
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};
@@ -8,8 +9,10 @@ use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::Result;
 use phasefront_io::output::{self, Holding};
+use phasefront_io::picture;
 use phasefront_io::picture::plot::{self, Panel};
 use phasefront_lab::study::flicker;
+use phasefront_lab::study::slopes;
 use phasefront_lab::study::sweep_parts::{self, DisplayRow};
 use phasefront_lab::study::{self, Row, Scenes};
 use serde_json::json;
@@ -29,7 +32,7 @@ pub(crate) struct Study {
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(1..=4096))]
     size: Option<u16>,
     /// Planes of SM-LBM; in the study of planes, those of the finest hologram [default: 256; for planes 8192, for sweep
-    /// and displays 200]
+    /// and displays 200, for slopes 640]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
     /// Layers of a layered depth image in the study of planes [default: 5]
@@ -40,13 +43,15 @@ pub(crate) struct Study {
     seed: u64,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Folder for the results: NAME.json, and NAME.svg for layers, planes and sweep
+    /// Folder for the results: NAME.json, NAME.svg for layers, planes and sweep, and slopes.png
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
 }
 
 /// The number of planes of the truth in the studies of the sweep.
 const SWEEP_PLANES: u32 = 200;
+/// The number of planes of the truth in the study of slopes.
+const SLOPE_PLANES: u32 = 640;
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum What {
@@ -56,6 +61,8 @@ enum What {
     Planes,
     /// The plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, compared with exact waves
     Sweep,
+    /// The plane sweep compared with exact waves on smooth slopes, with pictures of them in near focus
+    Slopes,
     /// The plane sweep compared with exact waves on other displays
     Displays,
     /// How much the displayed image of a static scene changes from frame to frame, over 30 frames of each scene
@@ -92,6 +99,7 @@ impl Study {
             What::Layers | What::Planes => {}
             What::Flicker => return self.flicker(json),
             What::Sweep => return self.sweep(json),
+            What::Slopes => return self.slopes(json),
             What::Displays => return self.displays(json),
         }
         let scenes = self.scenes()?;
@@ -151,14 +159,21 @@ impl Study {
         self.write_json("sweep", &result)?;
         self.plot_sweep(&Sweep::for_display(&scenes.display), &rows)?;
         let mut text = format!(
-            "{:8} {:48}  clean PSNR dB    SSIM   refined PSNR dB    SSIM  ns a pixel   (mean of {} scenes)",
+            "{:8} {:48}  clean PSNR dB    SSIM   noisy PSNR dB    SSIM   refined PSNR dB    SSIM  ns a pixel   (mean of {} scenes)",
             "part", "setting", scenes.scenes
         );
         for row in &rows {
             let time = row.ns_per_pixel.map_or("–".into(), |ns| format!("{ns:.1}"));
             text += &format!(
-                "\n{:8} {:48}  {:13.2}  {:.4}  {:16.2}  {:.4}  {time:>10}",
-                row.part, row.setting, row.clean.psnr, row.clean.ssim, row.refined.psnr, row.refined.ssim
+                "\n{:8} {:48}  {:13.2}  {:.4}  {:14.2}  {:.4}  {:16.2}  {:.4}  {time:>10}",
+                row.part,
+                row.setting,
+                row.clean.psnr,
+                row.clean.ssim,
+                row.noisy.psnr,
+                row.noisy.ssim,
+                row.refined.psnr,
+                row.refined.ssim
             );
         }
         terminal::print(json, &result, text);
@@ -209,6 +224,38 @@ impl Study {
                 ),
             ],
         )
+    }
+
+    fn slopes(&self, json: bool) -> Result<()> {
+        let scenes = self.scenes()?;
+        let planes = self.planes.unwrap_or(SLOPE_PLANES) as usize;
+        let bar = progress_bar(slopes::work(&scenes.display) as u64, "holograms");
+        let study = slopes::study(scenes.size, planes, &scenes.display, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "slopes", "planes": planes, "size": scenes.size, "display": scenes.display, "rows": study.rows,
+        });
+        self.write_json("slopes", &result)?;
+        picture::write_amplitude(&self.output.join("slopes.png"), study.picture.view())?;
+        let mut text = format!(
+            "{:20} {:34}  midpoint dB    SSIM  near dB    SSIM   far dB    SSIM",
+            "slope", "method"
+        );
+        for row in &study.rows {
+            text += &format!(
+                "\n{:20} {:34}  {:11.2}  {:.4}  {:7.2}  {:.4}  {:7.2}  {:.4}",
+                row.slope,
+                row.method,
+                row.midpoint.psnr,
+                row.midpoint.ssim,
+                row.near.psnr,
+                row.near.ssim,
+                row.far.psnr,
+                row.far.ssim
+            );
+        }
+        terminal::print(json, &result, text);
+        Ok(())
     }
 
     fn displays(&self, json: bool) -> Result<()> {

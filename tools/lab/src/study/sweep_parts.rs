@@ -1,11 +1,12 @@
 //! Measures the effect of the plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, beside
-//! exact waves on the same surfaces. It uses rendered depth, and simulated sensor depth that the core has refined. It
-//! also measures the sweep on displays that no network was trained for.
+//! exact waves on the same surfaces. It uses rendered depth, the same with white noise, and simulated sensor depth that
+//! the core has refined. It also measures the sweep on displays that no network was trained for.
 
 use crate::scene;
+use crate::sensor::Sensor;
 use crate::sensor::coarse::{Coarse, Sampling};
 use crate::study::Scenes;
-use ndarray::Array3;
+use ndarray::{Array3, ArrayView3};
 use num_complex::Complex32;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::method::sweep;
@@ -64,6 +65,20 @@ pub struct Figures {
     pub ssim: f64,
 }
 
+impl Figures {
+    /// Compares two amplitudes, (C, H, W).
+    ///
+    /// # Errors
+    /// Returns an error if the shapes differ.
+    pub fn of(amplitude: ArrayView3<'_, f32>, truth: ArrayView3<'_, f32>) -> Result<Self> {
+        let alike = metrics::compare(amplitude, truth)?;
+        Ok(Figures {
+            psnr: alike.psnr_overall,
+            ssim: alike.ssim_overall,
+        })
+    }
+}
+
 /// One setting of the ablation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
@@ -75,6 +90,8 @@ pub struct Row {
     pub value: usize,
     /// The quality on rendered depth.
     pub clean: Figures,
+    /// The quality on rendered depth with white noise of [`Sensor::Noise`].
+    pub noisy: Figures,
     /// The quality on refined depth.
     pub refined: Figures,
     /// The time for the first scene on one thread, the fastest of five frames, in ns per pixel. `None` for exact waves.
@@ -107,8 +124,10 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             let ldi = render(scenes, i)?;
             let truth = sm_lbm::hologram(&ldi, display, planes, &|_, _| {})?;
             let (rgb, depth) = (visible_rgb(&ldi), visible_depth(&ldi));
+            let noisy = Sensor::Noise.read(depth.view(), scenes.seed + i).depth;
+            let noisy = noisy.mapv(|d| d.clamp(0.0, 1.0));
             let refined = SENSOR.read(depth.view(), scenes.seed + i).session_depth(&rgb)?;
-            let frames = [depth, refined].map(|depth| RgbdFrame::new(rgb.clone(), depth));
+            let frames = [depth, noisy, refined].map(|depth| RgbdFrame::new(rgb.clone(), depth));
             let mut figures = Vec::new();
             for ((.., how), plan) in settings.iter().zip(&plans) {
                 let mut of_way = Vec::new();
@@ -122,7 +141,7 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
                     of_way.push(alike(&field, &truth)?);
                     done();
                 }
-                figures.push([of_way[0], of_way[1]]);
+                figures.push([of_way[0], of_way[1], of_way[2]]);
             }
             Ok(figures)
         })
@@ -137,7 +156,8 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             setting,
             value,
             clean: mean(each(0)),
-            refined: mean(each(1)),
+            noisy: mean(each(1)),
+            refined: mean(each(2)),
             ns_per_pixel: match plan {
                 Some(plan) => Some(time(plan, &frame)?),
                 None => None,
@@ -149,7 +169,7 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
 
 /// Returns the number of holograms of [`ablation`].
 pub fn ablation_work(scenes: &Scenes, planes: usize) -> usize {
-    2 * scenes.scenes * settings(&scenes.display, planes).len()
+    3 * scenes.scenes * settings(&scenes.display, planes).len()
 }
 
 /// Returns the settings to compare: the changed part, the setting in words, its number, and the method.
@@ -349,11 +369,7 @@ fn to_modulator(mut field: Array3<Complex32>, display: &Display) -> Result<Array
 
 fn alike(field: &Array3<Complex32>, truth: &Array3<Complex32>) -> Result<Figures> {
     let [a, b] = [field, truth].map(|field| field.mapv(|u| u.norm()));
-    let alike = metrics::compare(a.view(), b.view())?;
-    Ok(Figures {
-        psnr: alike.psnr_overall,
-        ssim: alike.ssim_overall,
-    })
+    Figures::of(a.view(), b.view())
 }
 
 fn mean(each: impl ExactSizeIterator<Item = Figures>) -> Figures {
