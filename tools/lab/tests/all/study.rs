@@ -208,8 +208,8 @@ fn slopes_have_no_stripes() {
     assert_eq!(work.into_inner(), slopes::work(&display));
     for rows in study.rows.chunks(3) {
         let [moved, between, _] = rows else { panic!("{rows:?}") };
-        for figures in [|row: &slopes::Row| row.midpoint, |row| row.near, |row| row.far] {
-            let (moved, between) = (figures(moved), figures(between));
+        let views = |row: &slopes::Row| [row.midpoint, row.near, row.far];
+        for (moved, between) in views(moved).into_iter().zip(views(between)) {
             assert!(between.psnr > moved.psnr + 3.0, "{rows:?}");
         }
     }
