@@ -1,14 +1,13 @@
 //! Converts the depth of sensors and files to normalized depth. The modules handle units, range and holes, and align,
-//! smooth over time and refine the depth images of phones to the resolution of the display.
+//! smooth over time and condition the depth images of phones for the resolution of the display.
 //!
 //! The result is d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
 
 pub mod align;
 pub mod camera;
+pub mod condition;
 pub mod image;
 pub mod range;
-pub mod refine;
-pub mod refine_reference;
 pub mod sharpness;
 pub mod smoothing;
 pub mod stream;
@@ -52,12 +51,12 @@ impl DepthUnit {
 /// Normalized depth and the parameters of its conversion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalizedDepth {
-    /// The normalized depth, (H, W), 0 nearest, 1 farthest, without holes.
+    /// The normalized depth, (H, W), 0 nearest, 1 farthest. NaN means no reading.
     pub depth: Array2<f32>,
     /// The distances in metres at d = 0 and d = 1, or `None` if the input was already normalized.
     pub range_m: Option<(f32, f32)>,
-    /// The number of pixels that had no reading.
-    pub filled: usize,
+    /// The number of pixels without a reading.
+    pub holes: usize,
     /// The number of pixels before near or beyond far, which became 0 or 1.
     pub clipped: usize,
 }
@@ -67,7 +66,7 @@ const MOST_CLIPPED: f64 = 0.99;
 
 /// Normalizes `depth`, (H, W), given in `unit`.
 ///
-/// Pixels without a reading take the nearest reading. `near_m` and `far_m`, in metres, become 0 and 1; they default to
+/// `near_m` and `far_m`, in metres, become 0 and 1; they default to
 /// the 1st and 99th percentile of the readings. Values beyond them are clamped.
 ///
 /// # Errors
@@ -96,7 +95,7 @@ pub fn normalize(
             "near and far are metres and normalized depth has no unit; leave them out, or name the unit of the depth's numbers".into(),
         ));
     }
-    let mut metres = depth.mapv(|v| match normalized {
+    let metres = depth.mapv(|v| match normalized {
         true => v,
         false => unit.metres(v).unwrap_or(f32::NAN),
     });
@@ -105,12 +104,15 @@ pub fn normalize(
             "normalized depth holds {bad}; it must lie in 0..=1, or another depth unit be named"
         )));
     }
-    let filled = fill_nearest(&mut metres)?;
+    let holes = metres.iter().filter(|v| v.is_nan()).count();
+    if holes == metres.len() {
+        return Err(no_reading());
+    }
     if normalized {
         return Ok(NormalizedDepth {
             depth: metres,
             range_m: None,
-            filled,
+            holes,
             clipped: 0,
         });
     }
@@ -128,7 +130,7 @@ pub fn normalize(
             "near {near} m and far {far} m are no range; near must lie before far, both in metres; the depth lies from {least} m to {most} m"
         )));
     }
-    let clipped = metres.iter().filter(|m| !(near..=far).contains(*m)).count();
+    let clipped = metres.iter().filter(|m| **m < near || **m > far).count();
     if given && clipped as f64 > MOST_CLIPPED * metres.len() as f64 {
         return Err(Error::Frame(format!(
             "near {near} m and far {far} m leave nothing of the depth, which lies from {least} m to {most} m; both are metres"
@@ -137,14 +139,18 @@ pub fn normalize(
     // If all distances are equal, there is no extent to scale, so d = ½ puts the surface in the middle of the volume.
     let depth = match near < far {
         true => metres.mapv(|m| ((m - near) / (far - near)).clamp(0.0, 1.0)),
-        false => metres.mapv(|_| 0.5),
+        false => metres.mapv(|m| if m.is_nan() { m } else { 0.5 }),
     };
     Ok(NormalizedDepth {
         depth,
         range_m: Some((near, far)),
-        filled,
+        holes,
         clipped,
     })
+}
+
+fn no_reading() -> Error {
+    Error::Frame("depth has no reading at all; at least one pixel must be valid".into())
 }
 
 /// Returns the 1st and 99th percentile of `readings`, which must not be empty or contain NaN.
@@ -165,9 +171,7 @@ fn percentiles(mut readings: Vec<f32>) -> (f32, f32) {
 pub fn fill_nearest(depth: &mut Array2<f32>) -> Result<usize> {
     let holes = depth.iter().filter(|v| v.is_nan()).count();
     if holes == depth.len() {
-        return Err(Error::Frame(
-            "depth has no reading at all; at least one pixel must be valid".into(),
-        ));
+        return Err(no_reading());
     }
     if holes > 0 {
         let width = depth.dim().1;
@@ -232,7 +236,8 @@ mod tests {
         depth[(9, 9)] = f32::NAN;
         depth[(5, 5)] = 1000.0;
         let n = normalize(depth.view(), DepthUnit::Metres, None, None).unwrap();
-        assert_eq!(n.filled, 2);
+        assert_eq!(n.holes, 2);
+        assert!(n.depth[(0, 0)].is_nan() && n.depth[(9, 9)].is_nan());
         let (near, far) = n.range_m.unwrap();
         assert!((near - 1.01).abs() < 0.011 && (far - 1.99).abs() < 0.011);
         assert_eq!(n.depth[(5, 5)], 1.0);
@@ -286,6 +291,7 @@ mod tests {
     #[test]
     fn one_distance_everywhere_is_the_middle_of_the_volume() {
         let n = normalize(array![[2.0, 0.0]].view(), DepthUnit::Metres, None, None).unwrap();
-        assert_eq!(n.depth, array![[0.5, 0.5]]);
+        assert_eq!(n.depth[(0, 0)], 0.5);
+        assert!(n.depth[(0, 1)].is_nan());
     }
 }

@@ -11,7 +11,7 @@ use counting::ALLOCATIONS;
 use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
-use phasefront_core::depth::refine::Refiner;
+use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
 use phasefront_core::display::levels::LevelsMut;
@@ -63,17 +63,14 @@ fn camera_frames_and_previews() {
     let mut rgb = vec![0.0; 3 * h * w];
     let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
     assert_eq!(count(convert), 0);
-    let plan = Refiner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w)).unwrap();
+    let plan = Conditioner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w), false).unwrap();
     let mut scratch = plan.scratch();
     let depth: Vec<f32> = (0..300)
         .map(|i| if i % 7 == 0 { f32::NAN } else { (i % 20) as f32 / 20.0 })
         .collect();
-    let mut refined = vec![0.0; h * w];
-    let refine = || {
-        plan.refine(&depth, &[1.0; 300], &rgb, &mut refined, &mut scratch)
-            .unwrap()
-    };
-    assert_eq!(count(refine), 0);
+    let mut conditioned = vec![0.0; h * w];
+    let condition = || plan.condition(&depth, &rgb, &mut conditioned, &mut scratch).unwrap();
+    assert_eq!(count(condition), 0);
     let plan = Preview::new((h, w), &Target::default(), 2e-3, (20, 20)).unwrap();
     let mut scratch = plan.scratch();
     let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);

@@ -1,4 +1,4 @@
-//! Reading an RGB-D frame from files: colour and depth are brought to one shape, and depth is normalized.
+//! Reading an RGB-D frame from files: depth is normalized and conditioned for the shape of the colour on a modulator.
 
 pub mod fit;
 
@@ -12,7 +12,7 @@ use ndarray::{Array2, Array3, ArrayView2};
 use phasefront::RgbdFrame;
 use phasefront_core::depth;
 use phasefront_core::depth::DepthUnit;
-use phasefront_core::depth::refine::Refiner;
+use phasefront_core::depth::condition::Conditioner;
 use std::path::Path;
 
 /// The largest relative difference between the aspect ratios of colour and depth.
@@ -32,11 +32,20 @@ pub struct DepthOptions {
     pub far_m: Option<f32>,
 }
 
-/// Reads a frame. Depth with another shape but the same aspect ratio is resampled, with a warning.
+/// Colour and depth as files have them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Captured {
+    /// The amplitudes, (3, H, W).
+    pub rgb: Array3<f32>,
+    /// The normalized depth of the same field of view, (h, w). NaN means no reading.
+    pub depth: Array2<f32>,
+}
+
+/// Reads colour, and depth of the same aspect ratio.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or if the files do not match.
-pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result<RgbdFrame> {
+pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result<Captured> {
     let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
     let rgb = picture::amplitudes(image);
     let normalized = options.unit == DepthUnit::Normalized;
@@ -48,7 +57,7 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
             depth_path.display()
         );
     }
-    let mut readings = file.depth;
+    let readings = file.depth;
     if normalized && let Some(bad) = readings.iter().find(|v| v.is_infinite()) {
         return Err(Error::file(
             depth_path,
@@ -59,20 +68,13 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
         log::warn!("{}: {doubt}", depth_path.display());
     }
     let (depth_height, depth_width) = readings.dim();
-    if (depth_height, depth_width) != (height, width) {
-        if !has_aspect((depth_height, depth_width), (height, width)) {
-            return Err(Error::file(
-                depth_path,
-                format!(
-                    "depth is {depth_width}×{depth_height}, colour {width}×{height}: their aspect ratios differ; they must show the same field of view"
-                ),
-            ));
-        }
-        log::warn!(
-            "{}: depth of {depth_width}×{depth_height} is resampled to the colour's {width}×{height}",
-            depth_path.display()
-        );
-        readings = nearest(&readings, (height, width));
+    if !has_aspect((depth_height, depth_width), (height, width)) {
+        return Err(Error::file(
+            depth_path,
+            format!(
+                "depth is {depth_width}×{depth_height}, colour {width}×{height}: their aspect ratios differ; they must show the same field of view"
+            ),
+        ));
     }
     let normalized = depth::normalize(readings.view(), options.unit, options.near_m, options.far_m)
         .map_err(|e| Error::file(depth_path, e))?;
@@ -86,12 +88,15 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
             );
         }
         log::info!(
-            "{}: near {near:.3} m, far {far:.3} m, {} pixels filled",
+            "{}: near {near:.3} m, far {far:.3} m, {} pixels without a reading",
             depth_path.display(),
-            normalized.filled
+            normalized.holes
         );
     }
-    RgbdFrame::new(rgb, normalized.depth).map_err(|e| Error::file(rgb_path, e))
+    Ok(Captured {
+        rgb,
+        depth: normalized.depth,
+    })
 }
 
 /// Checks whether two shapes, (H, W), have the same aspect ratio.
@@ -152,7 +157,7 @@ fn doubt(depth: &Array2<f32>) -> Option<String> {
 }
 
 /// Normalizes depth, (h, w), of any scale on which farther is larger, to the range from `near` to `far`. The defaults
-/// are the 1st and 99th percentiles.
+/// are the 1st and 99th percentiles. Values that are not finite become NaN.
 ///
 /// # Errors
 /// Returns an error if no value is finite or the range is empty.
@@ -165,48 +170,31 @@ pub fn relative(depth: ArrayView2<'_, f32>, near: Option<f32>, far: Option<f32>)
     Ok(depth::normalize(shifted.view(), DepthUnit::Metres, near, far)?.depth)
 }
 
-/// Creates a frame from `rgb`, (3, H, W), and noisy or incomplete normalized `depth`, (h, w), placed on a modulator.
-/// The depth is refined along the edges of the colour image.
+/// Creates a frame from `rgb`, (3, H, W), and normalized `depth`, (h, w) with NaN for no reading, placed on a modulator.
+/// The depth is conditioned along the edges of the colour image.
 ///
 /// # Errors
 /// Returns an error if a shape is empty or too large.
-pub fn refined(rgb: &Array3<f32>, depth: &Array2<f32>, placement: &Placement) -> Result<RgbdFrame> {
+pub fn conditioned(rgb: &Array3<f32>, depth: &Array2<f32>, placement: &Placement) -> Result<RgbdFrame> {
     let (_, height, width) = rgb.dim();
     let crop = placement.depth_crop(depth.dim(), (height, width));
     let colour = placement.colour(rgb.view());
     let colour = colour.as_standard_layout().into_owned();
     let depth = depth.as_standard_layout();
-    let refiner = Refiner::new(depth.dim(), crop, placement.inner())?;
+    let conditioner = Conditioner::new(depth.dim(), crop, placement.inner(), false)?;
     let mut to = Array2::zeros(placement.inner());
-    refiner.refine(
+    conditioner.condition(
         depth.as_slice().expect("standard layout"),
-        &vec![1.0; depth.len()],
         colour.as_slice().expect("standard layout"),
         to.as_slice_mut().expect("standard layout"),
-        &mut refiner.scratch(),
+        &mut conditioner.scratch(),
     )?;
     placement.frame(colour, to)
-}
-
-/// Resamples to the nearest value, because an average across an edge would be a depth that no surface has.
-fn nearest(plane: &Array2<f32>, (height, width): (usize, usize)) -> Array2<f32> {
-    let (h, w) = plane.dim();
-    Array2::from_shape_fn((height, width), |(y, x)| {
-        plane[((2 * y + 1) * h / (2 * height), (2 * x + 1) * w / (2 * width))]
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_nearest_sample_is_the_centred_one() {
-        let plane = Array2::from_shape_fn((2, 3), |(y, x)| (3 * y + x) as f32);
-        let doubled = nearest(&plane, (4, 6));
-        assert!(doubled.indexed_iter().all(|((y, x), v)| *v == plane[(y / 2, x / 2)]));
-        assert_eq!(nearest(&doubled, (2, 3)), plane);
-    }
 
     #[test]
     fn depth_that_is_hardly_normalized_is_doubted() {

@@ -11,7 +11,7 @@ use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::depth::DepthUnit;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_io::Result;
-use phasefront_io::frame::{self, DepthOptions};
+use phasefront_io::frame::{self, Captured, DepthOptions};
 use std::path::Path;
 use std::time::Instant;
 
@@ -30,7 +30,8 @@ fn main() -> Result<()> {
         near_m: None,
         far_m: None,
     };
-    let frame = frame::read(Path::new(rgb), Path::new(depth), options)?;
+    let Captured { rgb, depth } = frame::read(Path::new(rgb), Path::new(depth), options)?;
+    let frame = RgbdFrame::new(rgb, depth)?;
     let (height, width) = frame.shape();
     let display = Display::default();
     let default = Sweep::for_display(&display);

@@ -59,12 +59,18 @@ const LINES: usize = 16;
 /// Measures the depth of `frame` on the current rayon pool. Does not allocate. A frame with both sides under six pixels
 /// has no edges, and a frame narrower than three pixels has no noise.
 pub fn measure(frame: &RgbdFrame) -> Sharpness {
-    let (height, width) = frame.shape();
+    let (rgb, depth) = frame.values();
+    measure_planes(rgb, depth, frame.shape().1)
+}
+
+/// Measures `depth`, rows of `width`, beside `rgb`, (C, H, W), like [`measure`].
+pub(crate) fn measure_planes(rgb: &[f32], depth: &[f32], width: usize) -> Sharpness {
+    let height = depth.len() / width;
     let along_rows = (0..height.div_ceil(LINES)).into_par_iter();
     let along_columns = (0..width.div_ceil(LINES)).into_par_iter();
     let lines = |part: usize, of: usize| part * LINES..((part + 1) * LINES).min(of);
-    let rows = along_rows.map(|part| edges(frame, lines(part, height), (1, width), width));
-    let columns = along_columns.map(|part| edges(frame, lines(part, width), (width, height), 1));
+    let rows = along_rows.map(|part| edges((rgb, depth), lines(part, height), (1, width), width));
+    let columns = along_columns.map(|part| edges((rgb, depth), lines(part, width), (width, height), 1));
     let (sharp, all) = rows.chain(columns).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     let edges = match all {
         0 => 1.0,
@@ -72,15 +78,19 @@ pub fn measure(frame: &RgbdFrame) -> Sharpness {
     };
     Sharpness {
         edges,
-        noise: noise(frame.values().1, width),
+        noise: noise(depth, width),
     }
 }
 
 /// Returns the number of sharp edges and of all edges along `lines`. Successive lines start `next` values apart and
 /// have `along` values, `step` apart.
-fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), next: usize) -> (u32, u32) {
-    let (rgb, depth) = frame.values();
-    let (size, colours) = (depth.len(), frame.colours());
+fn edges(
+    (rgb, depth): (&[f32], &[f32]),
+    lines: Range<usize>,
+    (step, along): (usize, usize),
+    next: usize,
+) -> (u32, u32) {
+    let (size, colours) = (depth.len(), rgb.len() / depth.len());
     let (mut sharp, mut all) = (0, 0);
     for line in lines {
         for i in 0..along.saturating_sub(WINDOW) {

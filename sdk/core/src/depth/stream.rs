@@ -1,11 +1,11 @@
 //! Processing of the depth of a sequence of camera frames for a display: readings, alignment, temporal smoothing, range
-//! and refinement, in this order.
+//! and conditioning, in this order.
 
 use super::align::Cameras;
 use super::camera::{Alignment, CameraFrame};
+use super::condition::{ConditionScratch, Conditioner};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
-use super::refine::{RefineScratch, Refiner};
 use super::smoothing::Smoother;
 use crate::frame::{Crop, Orientation};
 use crate::runtime::error::{Error, Result};
@@ -69,8 +69,8 @@ struct Layout {
 
 struct Plan {
     layout: Layout,
-    refiner: Refiner,
-    scratch: RefineScratch,
+    conditioner: Conditioner,
+    scratch: ConditionScratch,
     values: Vec<f32>,
     confidence: Vec<f32>,
     /// Buffers for `values` and `confidence` while they are aligned or turned.
@@ -106,6 +106,9 @@ impl DepthStream {
     pub fn reset(&mut self) {
         self.range.reset();
         self.smoother.reset();
+        if let Some(plan) = &mut self.plan {
+            plan.scratch.reset();
+        }
     }
 
     /// Computes the normalized depth of `frame` along the edges of `rgb` and writes it to `depth`, (H, W) in \[0, 1].
@@ -174,8 +177,8 @@ impl DepthStream {
                 *value = (*value * scale + shift).clamp(0.0, 1.0);
             }
         }
-        plan.refiner
-            .refine(&plan.values, &plan.confidence, rgb, depth, &mut plan.scratch)?;
+        plan.conditioner
+            .condition(&plan.values, rgb, depth, &mut plan.scratch)?;
         Ok(DepthReport {
             range_m,
             valid: found as f32 / plan.values.len() as f32,
@@ -190,12 +193,12 @@ impl Plan {
         let colour = layout.orientation.upright_shape(layout.colour.0, layout.colour.1);
         let crop =
             Crop::cover(colour, out).scaled(upright.1 as f64 / colour.1 as f64, upright.0 as f64 / colour.0 as f64);
-        let refiner = Refiner::new(upright, crop, out)?;
-        let scratch = refiner.scratch();
+        let conditioner = Conditioner::new(upright, crop, out, layout.cameras.is_some())?;
+        let scratch = conditioner.scratch();
         let plane = || vec![f32::NAN; height * width];
         Ok(Plan {
             layout,
-            refiner,
+            conditioner,
             scratch,
             values: plane(),
             confidence: plane(),

@@ -8,6 +8,7 @@ use ndarray::{Array2, Array3};
 use phasefront::{Display, RgbdFrame};
 use phasefront_cli::depth_network::{Colours, DepthNetwork};
 use phasefront_io::film::sequence;
+use phasefront_io::frame::Captured;
 use phasefront_io::frame::fit::{Fit, Placement};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::picture::{self, photo};
@@ -247,17 +248,15 @@ impl FrameFlags {
     pub(crate) fn read(&self, display: &Display, named: bool) -> Result<RgbdFrame> {
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
-                let frame = frame::read(rgb, depth, self.depth_numbers.options()?)?;
-                let frame = self.inverted(frame)?;
-                let placement = self.placement(frame.shape(), display);
-                placement.frame(placement.colour(frame.rgb()), placement.depth(frame.depth()))
+                let Captured { rgb, depth } = frame::read(rgb, depth, self.depth_numbers.options()?)?;
+                self.conditioned(&rgb, depth, display)
             }
             (Some(rgb), None, _) => self.by_network(&picture::read_rgb(rgb)?, display),
             (None, _, Some(path)) => {
                 let photo = photo::read(path)?;
                 match self.seen.network() {
                     Some(_) => self.by_network(&photo.rgb, display),
-                    None => self.inverted(self.of_photo(path, &photo, display)?),
+                    None => self.of_photo(path, &photo, display),
                 }
             }
             _ => Err(Error::Input(
@@ -276,12 +275,13 @@ impl FrameFlags {
         }
     }
 
-    fn inverted(&self, frame: RgbdFrame) -> Result<RgbdFrame> {
+    /// Makes the frame of normalized depth, which --invert turns over.
+    fn conditioned(&self, rgb: &Array3<f32>, mut depth: Array2<f32>, display: &Display) -> Result<RgbdFrame> {
         if self.seen.invert {
-            Ok(RgbdFrame::new(frame.rgb().to_owned(), frame.depth().mapv(|d| 1.0 - d))?)
-        } else {
-            Ok(frame)
+            depth.mapv_inplace(|d| 1.0 - d);
         }
+        let (_, height, width) = rgb.dim();
+        frame::conditioned(rgb, &depth, &self.placement((height, width), display))
     }
 
     /// Makes the frame of a photo: from its distances if --near or --far is given, else from d_n unchanged.
@@ -298,8 +298,7 @@ impl FrameFlags {
             }
         };
         let depth = depth.map_err(|e| Error::file(path, e))?;
-        let (_, height, width) = photo.rgb.dim();
-        frame::refined(&photo.rgb, &depth, &self.placement((height, width), display))
+        self.conditioned(&photo.rgb, depth, display)
     }
 
     fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
@@ -311,6 +310,6 @@ impl FrameFlags {
         let (_, height, width) = rgb.dim();
         let farther = self.seen.farther(&DepthNetwork::open(path, (height, width))?, rgb)?;
         let depth = frame::relative(farther.view(), None, None).map_err(|e| Error::file(path, e))?;
-        frame::refined(rgb, &depth, &self.placement((height, width), display))
+        frame::conditioned(rgb, &depth, &self.placement((height, width), display))
     }
 }

@@ -3,7 +3,7 @@
 use crate::Result;
 use image::imageops::{self, FilterType};
 use image::{Rgb, Rgb32FImage};
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
+use ndarray::{Array2, Array3, ArrayView3, s};
 use phasefront::RgbdFrame;
 use phasefront_core::frame::Crop;
 
@@ -105,20 +105,6 @@ impl Placement {
         })
     }
 
-    /// Resamples the visible part of `depth`, (H, W), which has the picture's shape. It takes the nearest samples,
-    /// because an average across an edge would be a depth that no surface has.
-    pub fn depth(&self, depth: ArrayView2<'_, f32>) -> Array2<f32> {
-        let (height, width) = depth.dim();
-        Array2::from_shape_fn(self.inner, |(y, x)| {
-            let at = |i: usize, from: f64, length: f64, out: usize, most: usize| {
-                ((from + (i as f64 + 0.5) * length / out as f64) as usize).min(most - 1)
-            };
-            let row = at(y, self.crop.y, self.crop.height, self.inner.0, height);
-            let column = at(x, self.crop.x, self.crop.width, self.inner.1, width);
-            depth[(row, column)]
-        })
-    }
-
     /// Creates the frame of the modulator's shape. Both `rgb`, (3, h, w), and `depth`, (h, w), have the shape of
     /// [`Self::inner`]. Black surrounds `rgb`, and the depth of the nearest pixel surrounds `depth`.
     ///
@@ -152,11 +138,22 @@ mod tests {
         (rgb, depth)
     }
 
+    /// Returns the nearest samples of the visible part of `depth`, which has the picture's shape.
+    fn sampled(placement: &Placement, depth: &Array2<f32>) -> Array2<f32> {
+        let crop = placement.depth_crop(depth.dim(), depth.dim());
+        let (height, width) = placement.inner();
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            let row = crop.y + (y as f64 + 0.5) * crop.height / height as f64;
+            let column = crop.x + (x as f64 + 0.5) * crop.width / width as f64;
+            depth[(row as usize, column as usize)]
+        })
+    }
+
     fn placed(shape: (usize, usize), modulator: (usize, usize), fit: Fit) -> RgbdFrame {
         let (rgb, depth) = picture(shape.0, shape.1);
         let placement = Placement::new(shape, modulator, fit);
         let frame = placement
-            .frame(placement.colour(rgb.view()), placement.depth(depth.view()))
+            .frame(placement.colour(rgb.view()), sampled(&placement, &depth))
             .unwrap();
         assert_eq!(frame.shape(), modulator);
         frame
@@ -194,7 +191,7 @@ mod tests {
         let (rgb, depth) = picture(5, 7);
         let placement = Placement::as_is((5, 7));
         let frame = placement
-            .frame(placement.colour(rgb.view()), placement.depth(depth.view()))
+            .frame(placement.colour(rgb.view()), sampled(&placement, &depth))
             .unwrap();
         assert_eq!((frame.rgb(), frame.depth()), (rgb.view(), depth.view()));
     }

@@ -7,7 +7,7 @@ use num_complex::Complex32;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane};
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::depth::DepthUnit;
-use phasefront_core::depth::refine::Refiner;
+use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::frame::{ColourPlan, Crop};
 use phasefront_core::method::sweep;
 use phasefront_core::method::sweep::SweepPlan;
@@ -114,22 +114,21 @@ fn captured(folder: &Path) -> RgbdFrame {
     plan.convert(&image, amplitudes, &mut plan.scratch()).unwrap();
     let millimetres = depth_map::read_depth(&folder.join("depth_0.png"), false).unwrap();
     let shape = millimetres.dim();
-    let holes = millimetres.mapv(|mm| f32::from(mm > 0.0));
     let depth = phasefront_core::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
         .unwrap()
         .depth;
-    let refiner = Refiner::new(shape, Crop::cover(shape, OUT), OUT).unwrap();
-    let mut refined = ndarray::Array2::zeros(OUT);
-    refiner
-        .refine(
+    let conditioner = Conditioner::new(shape, Crop::cover(shape, OUT), OUT, false).unwrap();
+    let mut conditioned = ndarray::Array2::zeros(OUT);
+    let mut scratch = conditioner.scratch();
+    conditioner
+        .condition(
             depth.as_slice().unwrap(),
-            holes.as_slice().unwrap(),
             amplitudes,
-            refined.as_slice_mut().unwrap(),
-            &mut refiner.scratch(),
+            conditioned.as_slice_mut().unwrap(),
+            &mut scratch,
         )
         .unwrap();
-    RgbdFrame::new(rgb, refined).unwrap()
+    RgbdFrame::new(rgb, conditioned).unwrap()
 }
 
 #[test]

@@ -1,0 +1,392 @@
+//! The definition of conditioning, which [`super`] describes, without its speed: it computes each reading and each
+//! pixel separately. Tests compare [`super::Conditioner`] with it.
+
+use super::edges::{EDGE, MIXED, MIXED_BY, UNEXPLAINED};
+use super::{fill, pixels, register, smooth, surfaces};
+use crate::depth::{fill_nearest, sharpness};
+use crate::frame::Crop;
+use ndarray::{Array2, ArrayView2, ArrayView3};
+
+/// Returns the distance (y, x) of the edges of `depth`, (h, w), from those of `rgb`, (3, H, W), in readings.
+pub fn shift(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) -> (f64, f64) {
+    let ((h, w), (_, height, width)) = (depth.dim(), rgb.dim());
+    let samples = ((height as f64 / crop.height).round() as usize).clamp(1, register::MOST_SAMPLES);
+    let (rows, columns) = (h * samples, w * samples);
+    let colour = |y: usize, x: usize| {
+        let place = |i: usize, from: f64, scale: f64| ((i as f64 + 0.5) / samples as f64 - from) * scale;
+        let y = place(y, crop.y, height as f64 / crop.height);
+        let x = place(x, crop.x, width as f64 / crop.width);
+        let inside = (0.0..height as f64).contains(&y) && (0.0..width as f64).contains(&x);
+        inside.then(|| [0, 1, 2].map(|c| rgb[(c, y as usize, x as usize)]))
+    };
+    let change = |a: Option<[f32; 3]>, b: Option<[f32; 3]>| {
+        let sum = a.zip(b).map_or(0.0, |(a, b)| (0..3).map(|c| (a[c] - b[c]).abs()).sum());
+        f64::from(sum / (sum + register::HALF))
+    };
+    let edges = [false, true].map(|down| {
+        Array2::from_shape_fn((rows, columns), |(y, x)| match down {
+            false => change(colour(y, x.saturating_sub(1)), colour(y, (x + 1).min(columns - 1))),
+            true => change(colour(y.saturating_sub(1), x), colour((y + 1).min(rows - 1), x)),
+        })
+    });
+    let evidence = |shift_y: isize, shift_x: isize| {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for ((y, x), d) in depth.indexed_iter() {
+            for (down, next) in [depth.get((y, x + 1)), depth.get((y + 1, x))].into_iter().enumerate() {
+                let step = next.map_or(0.0, |next| (next - d).abs());
+                if step < *register::EDGE.start() || step.is_nan() {
+                    continue;
+                }
+                let step = f64::from(step.min(*register::EDGE.end()));
+                let start = |i: usize, middle: bool, shift: isize, size: usize| {
+                    let at = (i * samples + if middle { samples / 2 } else { 0 }) as isize - shift;
+                    at.clamp(0, size as isize - 1) as usize
+                };
+                let (top, left) = (
+                    start(y, down == 1, shift_y, rows),
+                    start(x, down == 0, shift_x, columns),
+                );
+                let reading = (top..(top + samples).min(rows))
+                    .flat_map(|y| (left..(left + samples).min(columns)).map(move |x| (y, x)));
+                sum += step * reading.map(|at| edges[down][at]).sum::<f64>();
+                weights += step;
+            }
+        }
+        (sum, weights)
+    };
+    let reach = register::REACH as isize;
+    let shifts: Vec<(isize, isize)> = (-reach..=reach)
+        .flat_map(|y| (-reach..=reach).map(move |x| (y, x)))
+        .collect();
+    let sums: Vec<f64> = shifts.iter().map(|(y, x)| evidence(*y, *x).0).collect();
+    let top = (0..sums.len())
+        .max_by(|a, b| sums[*a].total_cmp(&sums[*b]))
+        .unwrap_or(0);
+    let zero = sums.len() / 2;
+    let best = if sums[top] > f64::from(register::GAIN) * sums[zero] {
+        top
+    } else {
+        zero
+    };
+    let mean = sums.iter().sum::<f64>() / sums.len() as f64;
+    let variance = sums.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / sums.len() as f64;
+    let weak = evidence(0, 0).1 < f64::from(register::LEAST_EDGES)
+        || sums[best] - mean < f64::from(register::DISTINCT) * variance.sqrt();
+    match weak {
+        true => (0.0, 0.0),
+        false => (
+            shifts[best].0 as f64 / samples as f64,
+            shifts[best].1 as f64 / samples as f64,
+        ),
+    }
+}
+
+/// Conditions the part `crop` of `depth`, (h, w), whose edges lie `shift` readings beside those of `rgb`, (3, H, W), and
+/// returns (H, W). `depth` has NaN for no reading and at least one reading.
+pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>, shift: (f64, f64)) -> Array2<f32> {
+    let (_, height, width) = rgb.dim();
+    let rows = Axis::new(crop.y + shift.0, crop.height, depth.dim().0, height);
+    let columns = Axis::new(crop.x + shift.1, crop.width, depth.dim().1, width);
+    let colours = |y: usize, x: usize| -> Vec<[f64; 3]> {
+        let pixels = rows.pixels(y).flat_map(|y| columns.pixels(x).map(move |x| (y, x)));
+        pixels
+            .map(|(y, x)| [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)])))
+            .collect()
+    };
+    let mut readings = depth.to_owned();
+    for _ in 0..fill::PASSES {
+        let before = readings.clone();
+        for (at, value) in readings.indexed_iter_mut().filter(|(_, value)| value.is_nan()) {
+            *value = from_rim(&before, at, &colours);
+        }
+    }
+    fill_nearest(&mut readings).expect("there is a reading");
+    let planes = (
+        rgb.as_slice().expect("standard layout"),
+        readings.as_slice().expect("standard layout"),
+    );
+    let clean = depth.dim() == (height, width) && sharpness::measure_planes(planes.0, planes.1, width).is_clean();
+    if !clean {
+        for _ in 0..smooth::PASSES {
+            readings = fitted(&fitted(&readings, 0, 1), 1, 0);
+        }
+    }
+    let kinds = kinds(&readings);
+    let choices = Array2::from_shape_fn((height, width), |(y, x)| {
+        let (row, column) = (rows.reading(y), columns.reading(x));
+        let around: [(usize, usize); 9] = std::array::from_fn(|k| {
+            let near = |i: usize, k: usize, size: usize| (i + k).saturating_sub(1).min(size - 1);
+            (
+                near(row, k / 3, readings.dim().0),
+                near(column, k % 3, readings.dim().1),
+            )
+        });
+        let (dx, dy) = (columns.offset(x), rows.offset(y));
+        if clean || !kinds[(row, column)].0 {
+            let depth = surfaces::bilinear(&around.map(|at| readings[at]), dx, dy);
+            return (depth, 0.0, f64::INFINITY);
+        }
+        let surfaces = surfaces_of(around.map(|at| (readings[at], kinds[at].1)), &|k| {
+            colours(around[k].0, around[k].1)
+        });
+        let colour = [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)]));
+        let likelihood = |surface: &Surface| {
+            let square: f64 = (0..3).map(|c| (colour[c] - surface.mean[c]).powi(2)).sum();
+            -square / (2.0 * surface.variance) - 1.5 * surface.variance.ln()
+        };
+        let most = surfaces.iter().map(likelihood).fold(f64::NEG_INFINITY, f64::max);
+        let mut scores: Vec<(f64, f32)> = (surfaces.iter())
+            .map(|surface| {
+                let covered = f64::from(surfaces::bilinear(&surface.covers, dx, dy));
+                let colour = (likelihood(surface) - most).max(-f64::from(pixels::MOST_EVIDENCE));
+                (f64::from(pixels::PLACE) * covered + colour, surface.depth_at(dx, dy))
+            })
+            .collect();
+        scores.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let second = scores.get(1).copied().unwrap_or((f64::NEG_INFINITY, scores[0].1));
+        (scores[0].1, second.1, scores[0].0 - second.0)
+    });
+    Array2::from_shape_fn((height, width), |at| voted(&choices, rgb, at).clamp(0.0, 1.0))
+}
+
+/// The readings along one side of the display: `length` readings, starting at `from`, for `out` display pixels.
+struct Axis {
+    from: f64,
+    length: f64,
+    readings: usize,
+    out: usize,
+}
+
+impl Axis {
+    fn new(from: f64, length: f64, readings: usize, out: usize) -> Self {
+        Axis {
+            from,
+            length,
+            readings,
+            out,
+        }
+    }
+
+    fn place(&self, pixel: usize) -> f64 {
+        self.from + (pixel as f64 + 0.5) * self.length / self.out as f64 - 0.5
+    }
+
+    fn reading(&self, pixel: usize) -> usize {
+        self.place(pixel).round().clamp(0.0, self.readings as f64 - 1.0) as usize
+    }
+
+    fn offset(&self, pixel: usize) -> f32 {
+        (self.place(pixel) - self.reading(pixel) as f64).clamp(-0.5, 0.5) as f32
+    }
+
+    /// Returns the display pixels in a reading, or the nearest pixel if there is none.
+    fn pixels(&self, reading: usize) -> std::ops::Range<usize> {
+        let first = (0..self.out).filter(|p| self.reading(*p) < reading).count();
+        let end = (0..self.out).filter(|p| self.reading(*p) <= reading).count();
+        let nearest = first.min(self.out - 1);
+        if first < end { first..end } else { nearest..nearest + 1 }
+    }
+}
+
+fn mean(colours: &[[f64; 3]]) -> [f64; 3] {
+    [0, 1, 2].map(|c| colours.iter().map(|colour| colour[c]).sum::<f64>() / colours.len() as f64)
+}
+
+/// Returns the places within `reach` of a place, with their steps from it.
+fn near(
+    (h, w): (usize, usize),
+    (y, x): (usize, usize),
+    reach: usize,
+) -> impl Iterator<Item = ((usize, usize), (f64, f64))> {
+    let columns = x.saturating_sub(reach)..(x + reach + 1).min(w);
+    (y.saturating_sub(reach)..(y + reach + 1).min(h))
+        .flat_map(move |row| columns.clone().map(move |column| (row, column)))
+        .map(move |at| (at, (at.0 as f64 - y as f64, at.1 as f64 - x as f64)))
+}
+
+fn from_rim(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>) -> f32 {
+    let own = mean(&colours(at.0, at.1));
+    let mut votes: Vec<(f32, f64)> = near(depth.dim(), at, fill::REACH)
+        .filter(|(at, _)| !depth[*at].is_nan())
+        .map(|(at, (dy, dx))| {
+            let theirs = mean(&colours(at.0, at.1));
+            let apart: f64 = (0..3).map(|c| (own[c] - theirs[c]).powi(2)).sum();
+            let weight = (1.0 + (dx * dx + dy * dy) / f64::from(fill::NEAR).powi(2))
+                * (1.0 + apart / f64::from(fill::ALIKE).powi(2));
+            (depth[at], weight.powi(-2))
+        })
+        .collect();
+    votes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = votes.iter().map(|vote| vote.1).sum::<f64>() / 2.0;
+    let mut sum = 0.0;
+    let median = votes.iter().find(|vote| {
+        sum += vote.1;
+        sum >= half
+    });
+    let Some(&(median, _)) = median else {
+        return f32::NAN;
+    };
+    votes.retain(|vote| (vote.0 - median).abs() <= fill::TOLERANCE);
+    let weights: f64 = votes.iter().map(|vote| vote.1).sum();
+    (votes.iter().map(|vote| f64::from(vote.0) * vote.1).sum::<f64>() / weights) as f32
+}
+
+/// Moves each reading onto the line that fits its neighbours in the direction (`dy`, `dx`) best.
+fn fitted(depth: &Array2<f32>, dy: isize, dx: isize) -> Array2<f32> {
+    Array2::from_shape_fn(depth.dim(), |(y, x)| {
+        let middle = f64::from(depth[(y, x)]);
+        let (mut w, mut wk, mut wkk, mut we, mut wke) = (0.0, 0.0, f64::from(smooth::STIFFNESS), 0.0, 0.0);
+        for k in -(smooth::REACH as isize)..=smooth::REACH as isize {
+            let at = (y.checked_add_signed(k * dy), x.checked_add_signed(k * dx));
+            let Some(value) = at.0.zip(at.1).and_then(|at| depth.get(at)) else {
+                continue;
+            };
+            let (difference, k) = (f64::from(*value) - middle, k as f64);
+            let weight = (1.0 - (difference / f64::from(smooth::TOLERANCE)).powi(2))
+                .max(0.0)
+                .powi(2);
+            w += weight;
+            wk += weight * k;
+            wkk += weight * k * k;
+            we += weight * difference;
+            wke += weight * k * difference;
+        }
+        (middle + (wkk * we - wk * wke) / (w * wkk - wk * wk)) as f32
+    })
+}
+
+/// Returns whether each reading is at an edge, and whether it is mixed.
+fn kinds(depth: &Array2<f32>) -> Array2<(bool, bool)> {
+    let range = |at: (usize, usize), reach: usize| {
+        near(depth.dim(), at, reach).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), (at, _)| {
+            (a.min(depth[at]), b.max(depth[at]))
+        })
+    };
+    let is_steep = |at: (usize, usize)| range(at, 1).1 - range(at, 1).0 > EDGE;
+    let bent = Array2::from_shape_fn(depth.dim(), |(y, x)| {
+        let (h, w) = depth.dim();
+        let repeated = |i: usize, k: usize, size: usize| (i + k).saturating_sub(2).min(size - 1);
+        let values: Vec<(f64, f64, f64)> = (0..25)
+            .map(|k| {
+                let value = depth[(repeated(y, k / 5, h), repeated(x, k % 5, w))];
+                (f64::from(value), (k / 5) as f64 - 2.0, (k % 5) as f64 - 2.0)
+            })
+            .collect();
+        let mean = values.iter().map(|v| v.0).sum::<f64>() / 25.0;
+        let slope_y = values.iter().map(|v| v.0 * v.1).sum::<f64>() / 50.0;
+        let slope_x = values.iter().map(|v| v.0 * v.2).sum::<f64>() / 50.0;
+        let left = values
+            .iter()
+            .map(|v| (v.0 - mean - slope_y * v.1 - slope_x * v.2).powi(2));
+        let (least, most) = range((y, x), 2);
+        is_steep((y, x)) && (left.sum::<f64>() / 25.0).sqrt() > f64::from(UNEXPLAINED * (most - least))
+    });
+    Array2::from_shape_fn(depth.dim(), |at| {
+        let (least, most) = range(at, 1);
+        let is_edge = is_steep(at) && near(depth.dim(), at, 1).any(|(at, _)| bent[at]);
+        let margin = (MIXED * (most - least)).max(MIXED_BY);
+        (
+            is_edge,
+            is_edge && depth[at] - least >= margin && most - depth[at] >= margin,
+        )
+    })
+}
+
+/// A surface at an edge, as in [`super::surfaces`].
+struct Surface {
+    depth: f32,
+    count: f32,
+    covers: [f32; 9],
+    colours: Vec<[f64; 3]>,
+    mean: [f64; 3],
+    variance: f64,
+    differences: [f32; 9],
+    has: [f32; 9],
+}
+
+impl Surface {
+    fn depth_at(&self, dx: f32, dy: f32) -> f32 {
+        let known = surfaces::bilinear(&self.has, dx, dy);
+        match known > 0.05 {
+            true => self.depth + surfaces::bilinear(&self.differences, dx, dy) / known,
+            false => self.depth,
+        }
+    }
+}
+
+/// Groups 3×3 readings, each a depth and whether it is mixed, with their colours.
+fn surfaces_of(readings: [(f32, bool); 9], colours: &dyn Fn(usize) -> Vec<[f64; 3]>) -> Vec<Surface> {
+    let mut found: Vec<Surface> = Vec::new();
+    for mixed in [false, true] {
+        for at in [4, 1, 3, 5, 7, 0, 2, 6, 8]
+            .into_iter()
+            .filter(|at| readings[*at].1 == mixed)
+        {
+            let depth = readings[at].0;
+            found.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+            let apart = |surface: &Surface| (surface.depth - depth).abs();
+            let nearest = (0..found.len()).min_by(|a, b| apart(&found[*a]).total_cmp(&apart(&found[*b])));
+            let behind = found.partition_point(|surface| surface.depth < depth);
+            if let Some(nearest) = nearest.filter(|i| apart(&found[*i]) <= surfaces::TOLERANCE) {
+                let surface = &mut found[nearest];
+                surface.depth += (depth - surface.depth) / (surface.count + 1.0);
+                surface.count += 1.0;
+                surface.covers[at] += 1.0;
+                if !mixed {
+                    surface.colours.extend(colours(at));
+                }
+            } else if mixed && behind > 0 && behind < found.len() {
+                let (near, far) = (found[behind - 1].depth, found[behind].depth);
+                let share = (depth - near) / (far - near);
+                found[behind - 1].covers[at] += 1.0 - share;
+                found[behind].covers[at] += share;
+            } else if found.len() < surfaces::MOST {
+                found.push(Surface {
+                    depth,
+                    count: 1.0,
+                    covers: std::array::from_fn(|k| f32::from(k == at)),
+                    colours: colours(at),
+                    mean: [0.0; 3],
+                    variance: 0.0,
+                    differences: [0.0; 9],
+                    has: [0.0; 9],
+                });
+            }
+        }
+    }
+    for surface in &mut found {
+        surface.mean = mean(&surface.colours);
+        let squares = surface.colours.iter().flatten().map(|v| v * v).sum::<f64>() / surface.colours.len() as f64;
+        let square = surface.mean.iter().map(|v| v * v).sum::<f64>();
+        surface.variance = (squares - square).max(f64::from(surfaces::LEAST_VARIANCE));
+        surface.has = surface.covers.map(|covers| f32::from(covers >= 1.0));
+        surface.differences = std::array::from_fn(|k| surface.has[k] * (readings[k].0 - surface.depth));
+    }
+    found
+}
+
+/// Returns the depth of a pixel after its neighbours' vote. A choice is two depths and the lead of the first.
+fn voted(choices: &Array2<(f32, f32, f64)>, rgb: ArrayView3<'_, f32>, (y, x): (usize, usize)) -> f32 {
+    let (first, second, lead) = choices[(y, x)];
+    let reach = pixels::REACH;
+    let (height, width) = choices.dim();
+    let inside = y >= reach && y + reach < height && x >= reach && x + reach < width;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (at, (dy, dx)) in near(choices.dim(), (y, x), reach).filter(|(at, _)| *at != (y, x)) {
+        let apart: f64 = (0..3)
+            .map(|c| f64::from(rgb[(c, at.0, at.1)] - rgb[(c, y, x)]).powi(2))
+            .sum();
+        let near = (1.0 + (dy * dy + dx * dx) / f64::from(pixels::NEAR).powi(2)).powi(-2);
+        let alike = (1.0 + apart / f64::from(pixels::ALIKE).powi(2)).powi(-2);
+        let weight = near * alike.max(f64::from(pixels::LEAST_ALIKE));
+        let theirs = choices[at].0;
+        let for_first = (theirs - first).abs() <= (theirs - second).abs();
+        sum += if for_first { weight } else { -weight };
+        weights += weight;
+    }
+    let neighbours = f64::from(pixels::NEIGHBOURS);
+    match lead >= neighbours || !inside || lead + neighbours * sum / weights > 0.0 {
+        true => first,
+        false => second,
+    }
+}

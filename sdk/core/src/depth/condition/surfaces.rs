@@ -1,0 +1,162 @@
+//! The surfaces at an edge: groups of the 3×3 readings around a reading, with their colours.
+//!
+//! Readings that are not mixed form the surfaces. A mixed reading between two surfaces covers a share of each, by its
+//! depth; one beyond all surfaces is the only reading of a surface of its own, such as a thin bar.
+
+use super::colour::Moments;
+use super::edges::Kind;
+
+/// The largest difference between the readings of a surface and their mean, as a share of the volume.
+pub(super) const TOLERANCE: f32 = 0.03;
+/// The largest number of surfaces.
+pub(super) const MOST: usize = 4;
+/// The least variance of a surface's colour, summed over red, green and blue.
+pub(super) const LEAST_VARIANCE: f32 = 0.003;
+/// The 3×3 readings, nearest first.
+const ORDER: [usize; 9] = [4, 1, 3, 5, 7, 0, 2, 6, 8];
+
+/// A surface at an edge.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Surface {
+    /// The mean depth of its readings.
+    pub(super) depth: f32,
+    /// The share of each of the 3×3 readings that it covers.
+    pub(super) covers: [f32; 9],
+    /// The difference of each reading that is not mixed from the mean, and whether there is one.
+    slopes: [f32; 9],
+    has: [f32; 9],
+    colour: [f32; 3],
+    /// −1/2σ² and −³⁄₂·ln σ² of its colours' normal distribution.
+    narrow: f32,
+    peak: f32,
+    count: f32,
+    moments: Moments,
+}
+
+impl Surface {
+    fn new(at: usize, depth: f32, colours: &Moments) -> Self {
+        let mut surface = Surface::default();
+        surface.join(at, depth);
+        surface.moments = *colours;
+        surface
+    }
+
+    fn join(&mut self, at: usize, depth: f32) {
+        self.depth += (depth - self.depth) / (self.count + 1.0);
+        self.count += 1.0;
+        self.covers[at] += 1.0;
+    }
+
+    fn finish(&mut self) {
+        let mean = self.moments.mean();
+        let square = mean.iter().map(|v| v * v).sum::<f32>();
+        let variance = (self.moments.squares / self.moments.count - square).max(LEAST_VARIANCE);
+        self.colour = mean;
+        self.narrow = -0.5 / variance;
+        self.peak = -1.5 * libm::logf(variance);
+    }
+
+    /// Returns the logarithm of the probability of a colour, plus a constant.
+    pub(super) fn likelihood(&self, colour: [f32; 3]) -> f32 {
+        let [r, g, b] = [
+            colour[0] - self.colour[0],
+            colour[1] - self.colour[1],
+            colour[2] - self.colour[2],
+        ];
+        (r * r + g * g + b * b) * self.narrow + self.peak
+    }
+
+    /// Returns the depth of the surface at the offset `dx`, `dy` from the middle reading.
+    pub(super) fn depth_at(&self, dx: f32, dy: f32) -> f32 {
+        let known = bilinear(&self.has, dx, dy);
+        match known > 0.05 {
+            true => self.depth + bilinear(&self.slopes, dx, dy) / known,
+            false => self.depth,
+        }
+    }
+}
+
+/// The readings at an edge.
+pub(super) struct Readings<'a> {
+    pub(super) depth: &'a [f32],
+    pub(super) kinds: &'a [Kind],
+    pub(super) colours: &'a [Moments],
+}
+
+impl Readings<'_> {
+    /// Groups the 3×3 readings at the indices `around` and returns the number of surfaces.
+    pub(super) fn surfaces(&self, around: &[usize; 9], surfaces: &mut [Surface; MOST]) -> usize {
+        let mut count = 0;
+        for mixed in [false, true] {
+            for at in ORDER {
+                let i = around[at];
+                if (self.kinds[i] == Kind::Mixed) != mixed {
+                    continue;
+                }
+                let depth = self.depth[i];
+                let apart = |surface: &Surface| (surface.depth - depth).abs();
+                let nearest = (surfaces[..count].iter_mut()).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+                if let Some(nearest) = nearest
+                    && apart(nearest) <= TOLERANCE
+                {
+                    nearest.join(at, depth);
+                    if !mixed {
+                        nearest.moments.add(&self.colours[i]);
+                    }
+                } else if mixed && split(&mut surfaces[..count], at, depth) {
+                } else if count < MOST {
+                    surfaces[count] = Surface::new(at, depth, &self.colours[i]);
+                    count += 1;
+                }
+            }
+        }
+        for surface in &mut surfaces[..count] {
+            surface.finish();
+            for at in 0..9 {
+                let belongs = surface.covers[at] >= 1.0;
+                surface.has[at] = f32::from(belongs);
+                surface.slopes[at] = if belongs {
+                    self.depth[around[at]] - surface.depth
+                } else {
+                    0.0
+                };
+            }
+        }
+        count
+    }
+}
+
+/// Shares the mixed reading `at` between the surfaces before and behind its `depth`. Returns whether both exist.
+fn split(surfaces: &mut [Surface], at: usize, depth: f32) -> bool {
+    let (mut before, mut behind) = (None, None);
+    for (i, surface) in surfaces.iter().enumerate() {
+        let slot = if surface.depth < depth {
+            &mut before
+        } else {
+            &mut behind
+        };
+        let is_nearer = |other: usize| (surface.depth - depth).abs() < (surfaces[other].depth - depth).abs();
+        if slot.is_none_or(is_nearer) {
+            *slot = Some(i);
+        }
+    }
+    let (Some(before), Some(behind)) = (before, behind) else {
+        return false;
+    };
+    let share = (depth - surfaces[before].depth) / (surfaces[behind].depth - surfaces[before].depth);
+    surfaces[before].covers[at] += 1.0 - share;
+    surfaces[behind].covers[at] += share;
+    true
+}
+
+/// Interpolates 3×3 `values` bilinearly at the offset `dx`, `dy` from their middle, each −½..=½.
+pub(super) fn bilinear(values: &[f32; 9], dx: f32, dy: f32) -> f32 {
+    let (left, right_share) = if dx < 0.0 { (0, 1.0 + dx) } else { (1, dx) };
+    let (top, bottom_share) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
+    let across = |row: usize| {
+        let (a, b) = (values[3 * row + left], values[3 * row + left + 1]);
+        a + right_share * (b - a)
+    };
+    let (a, b) = (across(top), across(top + 1));
+    a + bottom_share * (b - a)
+}

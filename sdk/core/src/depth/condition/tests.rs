@@ -1,0 +1,289 @@
+#![allow(clippy::unwrap_used)]
+use super::*;
+use ndarray::{Array2, Array3};
+use rand::{RngExt, SeedableRng};
+
+struct Case {
+    depth: Array2<f32>,
+    rgb: Array3<f32>,
+    crop: Crop,
+}
+
+impl Case {
+    /// Creates a case without a crop. The sides of `rgb` have the same proportion as those of `depth`.
+    fn whole(depth: Array2<f32>, rgb: Array3<f32>) -> Self {
+        let crop = Crop::cover(depth.dim(), depth.dim());
+        Case { depth, rgb, crop }
+    }
+
+    /// Creates two surfaces of different colours, with noise, holes and a shift, at different resolutions of depth and
+    /// colour.
+    fn random(seed: u64) -> Self {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut side = || random.random_range(1..40usize);
+        let (cells, out) = ((side(), side()), (side(), side()));
+        let crop = Crop::cover(cells, out);
+        let mut noise = |most: f32| random.random_range(-most..most);
+        let front = |x: f64, y: f64| (x - 0.4).powi(2) + (y - 0.5).powi(2) < 0.07;
+        let depth = Array2::from_shape_fn(cells, |(y, x)| {
+            let (x, y) = ((x as f64 + 0.9) / cells.1 as f64, (y as f64 + 0.5) / cells.0 as f64);
+            let surface = if front(x, y) { 0.2 } else { 0.7 + 0.2 * y as f32 };
+            match noise(1.0) {
+                n if n > 0.8 => f32::NAN,
+                _ if x > 0.7 && y < 0.5 => f32::NAN,
+                n => surface + 0.02 * n,
+            }
+        });
+        let rgb = Array3::from_shape_fn((3, out.0, out.1), |(c, y, x)| {
+            let x = (crop.x + (x as f64 + 0.5) * crop.width / out.1 as f64) / cells.1 as f64;
+            let y = (crop.y + (y as f64 + 0.5) * crop.height / out.0 as f64) / cells.0 as f64;
+            let colour = if front(x, y) { [0.9, 0.5, 0.1] } else { [0.2, 0.4, 0.6] };
+            (colour[c] + 0.03 * noise(1.0)).clamp(0.0, 1.0)
+        });
+        Case { depth, rgb, crop }
+    }
+
+    /// Creates a disc of radius 50 in front of a wall, 200×200, with depth from a sensor that is `ratio` times coarser
+    /// and lies (`dy`, `dx`) pixels beside the colour.
+    fn disc(ratio: usize, (dy, dx): (isize, isize)) -> Self {
+        let disc = |y: isize, x: isize| (y - 100).pow(2) + (x - 90).pow(2) < 2500;
+        let rgb = Array3::from_shape_fn((3, 200, 200), |(c, y, x)| match disc(y as isize, x as isize) {
+            true => [0.9, 0.6, 0.2][c],
+            false => [0.1, 0.3, 0.4][c],
+        });
+        let depth = Array2::from_shape_fn((200 / ratio, 200 / ratio), |(y, x)| {
+            let pixels = (0..ratio * ratio).map(|k| (y * ratio + k / ratio, x * ratio + k % ratio));
+            let hits = pixels.filter(|(y, x)| disc(*y as isize - dy, *x as isize - dx));
+            0.7 - 0.4 * hits.count() as f32 / (ratio * ratio) as f32
+        });
+        Case::whole(depth, rgb)
+    }
+
+    /// Returns the share of pixels of [`Self::disc`] whose depth is wrong by more than 0.05.
+    fn wrong(&self) -> f64 {
+        let conditioned = self.condition(false).unwrap();
+        let is_front = |i: usize| self.rgb[(0, i / 200, i % 200)] > 0.5;
+        let truth = |i: usize| if is_front(i) { 0.3 } else { 0.7 };
+        let wrong = conditioned
+            .iter()
+            .enumerate()
+            .filter(|(i, d)| (**d - truth(*i)).abs() > 0.05);
+        wrong.count() as f64 / conditioned.len() as f64
+    }
+
+    fn condition(&self, aligned: bool) -> Result<Vec<f32>> {
+        let (_, height, width) = self.rgb.dim();
+        let plan = Conditioner::new(self.depth.dim(), self.crop, (height, width), aligned)?;
+        let mut to = vec![9.0; height * width];
+        plan.condition(
+            self.depth.as_slice().unwrap(),
+            self.rgb.as_slice().unwrap(),
+            &mut to,
+            &mut plan.scratch(),
+        )?;
+        assert!(to.iter().all(|d| (0.0..=1.0).contains(d)));
+        Ok(to)
+    }
+}
+
+#[test]
+fn the_fast_form_does_as_the_definition_says() {
+    let (mut all, mut differ, mut shifted) = (0, 0, 0);
+    for seed in 0..150 {
+        let case = Case::random(seed);
+        if case.depth.iter().all(|d| d.is_nan()) {
+            assert!(case.condition(false).is_err());
+            continue;
+        }
+        let shift = reference::shift(case.depth.view(), case.crop, case.rgb.view());
+        shifted += usize::from(shift != (0.0, 0.0));
+        let naive = reference::condition(case.depth.view(), case.crop, case.rgb.view(), shift);
+        let fast = case.condition(false).unwrap();
+        let count = naive
+            .iter()
+            .zip(&fast)
+            .filter(|(a, b)| (**a - **b).abs() > 2e-4)
+            .count();
+        all += fast.len();
+        differ += count;
+    }
+    // Rounding may decide between two surfaces that are equally likely.
+    assert!(all > 30_000 && differ * 1000 < all, "{differ} of {all}");
+    assert!(shifted > 20, "{shifted}");
+}
+
+#[test]
+fn threads_make_no_difference() {
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| [Case::random(12), Case::disc(4, (2, 2))].map(|case| case.condition(false).unwrap()))
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn edges_follow_the_colour_whatever_the_shift() {
+    for (ratio, shift) in [
+        (4, (0, 0)),
+        (4, (2, 2)),
+        (4, (1, -3)),
+        (5, (-4, 2)),
+        (2, (0, 1)),
+        (1, (3, 1)),
+    ] {
+        let case = Case::disc(ratio, shift);
+        let wrong = case.wrong();
+        assert!(wrong < 0.005, "{ratio} {shift:?}: {wrong}");
+    }
+}
+
+#[test]
+fn weak_evidence_shifts_nothing() {
+    let size = (40, 50);
+    let step = Array2::from_shape_fn(size, |(_, x)| if x < 20 { 0.2 } else { 0.8 });
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+    let mut noisy = |least: f32, most: f32| random.random_range(least..most);
+    let black = Array3::zeros((3, 160, 200));
+    let grey = Array3::from_elem((3, 160, 200), 0.5);
+    let flat = Array2::from_elem(size, 0.4);
+    let texture = Array3::from_shape_fn((3, 160, 200), |_| noisy(0.0, 1.0));
+    let rough = Array2::from_shape_fn(size, |_| 0.5 + noisy(-0.02, 0.02));
+    for (depth, rgb) in [(&step, &black), (&step, &grey), (&flat, &texture), (&rough, &texture)] {
+        let case = Case::whole(depth.clone(), rgb.clone());
+        assert_eq!(case.condition(false).unwrap(), case.condition(true).unwrap());
+        assert_eq!(reference::shift(depth.view(), case.crop, rgb.view()), (0.0, 0.0));
+    }
+}
+
+#[test]
+fn a_shift_beyond_the_range_leaves_surfaces_whole() {
+    let conditioned = Case::disc(4, (0, 40)).condition(false).unwrap();
+    let between = conditioned.iter().filter(|d| (0.35..0.65).contains(*d)).count();
+    assert!(between * 200 < conditioned.len(), "{between}");
+}
+
+#[test]
+fn frames_share_their_evidence_until_a_reset() {
+    let (case, other) = (Case::disc(4, (2, 2)), Case::disc(4, (0, 0)));
+    let plan = Conditioner::new((50, 50), case.crop, (200, 200), false).unwrap();
+    let mut scratch = plan.scratch();
+    let run = |case: &Case, scratch: &mut ConditionScratch| {
+        let mut to = vec![0.0; 200 * 200];
+        let rgb = case.rgb.as_slice().unwrap();
+        plan.condition(case.depth.as_slice().unwrap(), rgb, &mut to, scratch)
+            .unwrap();
+        to
+    };
+    for _ in 0..5 {
+        assert_eq!(run(&case, &mut scratch), case.condition(false).unwrap());
+    }
+    assert_ne!(run(&other, &mut scratch), other.condition(false).unwrap());
+    scratch.reset();
+    assert_eq!(run(&other, &mut scratch), other.condition(false).unwrap());
+}
+
+#[test]
+fn holes_take_the_surface_of_their_colour() {
+    let (h, w) = (24, 32);
+    let is_front = |x: usize| x < 16;
+    // There are no readings around the edge, and the hole on the far right is larger than any neighbourhood.
+    let depth = Array2::from_shape_fn((h, w), |(_, x)| match x {
+        12..20 | 25.. => f32::NAN,
+        x if is_front(x) => 0.1,
+        _ => 0.9,
+    });
+    let rgb = Array3::from_shape_fn((3, h, w), |(_, _, x)| if is_front(x) { 0.8 } else { 0.3 });
+    for (i, d) in Case::whole(depth, rgb).condition(false).unwrap().iter().enumerate() {
+        let expected = if is_front(i % w) { 0.1 } else { 0.9 };
+        assert!((d - expected).abs() < 1e-5, "{} {d}", i % w);
+    }
+}
+
+#[test]
+fn clean_depth_of_the_displays_size_is_left_alone() {
+    let mut case = Case::disc(1, (0, 0));
+    case.depth
+        .indexed_iter_mut()
+        .for_each(|((y, x), d)| *d += 0.001 * (x as f32 / 3.0 + y as f32 / 7.0).sin());
+    assert_eq!(case.condition(false).unwrap(), case.depth.as_slice().unwrap());
+    // Noise is removed.
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    let truth = case.depth.clone();
+    case.depth
+        .iter_mut()
+        .for_each(|d| *d += random.random_range(-0.01..0.01));
+    let rms = |depth: &[f32]| {
+        let squares = depth.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
+        (squares / truth.len() as f32).sqrt()
+    };
+    let (before, after) = (
+        rms(case.depth.as_slice().unwrap()),
+        rms(&case.condition(false).unwrap()),
+    );
+    assert!(after < 0.4 * before, "{before} {after}");
+}
+
+/// A floor at a grazing angle stays a plane, and the steps of a sensor's numbers become smooth.
+#[test]
+fn slopes_stay_slopes() {
+    let slope = |y: usize| 0.1 + 0.02 * y as f32;
+    let rgb = Array3::from_elem((3, 160, 160), 0.5);
+    let floor = Case::whole(Array2::from_shape_fn((40, 40), |(y, _)| slope(y)), rgb.clone());
+    let conditioned = floor.condition(false).unwrap();
+    for y in 16..144 {
+        let expected = slope(0) + 0.02 * ((y as f32 + 0.5) / 4.0 - 0.5);
+        assert!((conditioned[y * 160 + 80] - expected).abs() < 1e-4, "{y}");
+    }
+    let steps = Case::whole(
+        Array2::from_shape_fn((40, 40), |(y, _)| 0.1 + 0.012 * (y / 3) as f32),
+        rgb,
+    );
+    let conditioned = steps.condition(false).unwrap();
+    let change = |y: usize| conditioned[(y + 1) * 160 + 80] - conditioned[y * 160 + 80];
+    let most = (16..144).map(change).fold(0.0, f32::max);
+    assert!((16..144).all(|y| change(y) >= 0.0) && most < 0.0025, "{most}");
+}
+
+#[test]
+fn a_thin_bar_stays() {
+    let (h, w) = (30, 40);
+    let depth = Array2::from_shape_fn((h, w), |(_, x)| if x == 20 { 0.2 } else { 0.8 });
+    let rgb = Array3::from_shape_fn((3, 4 * h, 4 * w), |(_, _, x)| if x / 4 == 20 { 0.9 } else { 0.2 });
+    let conditioned = Case::whole(depth, rgb).condition(false).unwrap();
+    for (i, d) in conditioned.iter().enumerate() {
+        let expected = if i % (4 * w) / 4 == 20 { 0.2 } else { 0.8 };
+        assert!((d - expected).abs() < 0.01, "{} {d}", i % (4 * w));
+    }
+}
+
+#[test]
+fn unusual_frames_give_depth() {
+    let texture = Array3::from_shape_fn((3, 12, 20), |(c, y, x)| ((c + 3 * y + 7 * x) % 10) as f32 / 10.0);
+    // One value.
+    let flat = Case::whole(Array2::from_elem((6, 10), 0.4), texture.clone());
+    assert!(flat.condition(false).unwrap().iter().all(|d| (d - 0.4).abs() < 1e-6));
+    // Twice as wide as the colour.
+    let wide = Array2::from_shape_fn((24, 40), |(_, x)| if x < 20 { 0.2 } else { 0.7 });
+    let conditioned = Case::whole(wide, texture.clone()).condition(true).unwrap();
+    assert!((conditioned[5 * 20 + 2] - 0.2).abs() < 1e-5 && (conditioned[5 * 20 + 17] - 0.7).abs() < 1e-5);
+    // A single reading.
+    let mut one = Array2::from_elem((6, 10), f32::NAN);
+    one[(2, 3)] = 0.6;
+    assert!(
+        Case::whole(one, texture.clone())
+            .condition(false)
+            .unwrap()
+            .iter()
+            .all(|d| (d - 0.6).abs() < 1e-6)
+    );
+    // None.
+    let none = Case::whole(Array2::from_elem((6, 10), f32::NAN), texture).condition(false);
+    assert!(none.unwrap_err().to_string().contains("no reading at all"));
+}
+
+#[test]
+fn impossible_shapes_are_refused() {
+    let crop = Crop::cover((1, 1), (1, 1));
+    assert!(Conditioner::new((0, 4), crop, (4, 4), true).is_err());
+    assert!(Conditioner::new((4, 4), crop, (4, 1 << 17), true).is_err());
+}
