@@ -32,7 +32,7 @@ struct LevelPlan {
     frame: RgbdFrame,
     depth: DepthStream,
     colour: Option<(ColourPlan, ColourScratch)>,
-    /// The picture's red, green and blue, if the display has one laser. Depth is refined along its edges.
+    /// The picture's red, green and blue, if the display has one laser. Depth is conditioned along its edges.
     picture: Vec<f32>,
 }
 

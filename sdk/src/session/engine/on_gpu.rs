@@ -1,4 +1,4 @@
-//! Computes a quality level on the GPU, from the camera's colour and refined depth to levels.
+//! Computes a quality level on the GPU, from the camera's colour and conditioned depth to levels.
 
 use crate::session::SessionOptions;
 use crate::session::engine::brightness::BrightnessTracker;

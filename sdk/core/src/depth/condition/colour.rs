@@ -42,7 +42,7 @@ pub(super) fn colours(
         for column in 0..reach.min(w) {
             end = if in_column(column) { column + reach + 1 } else { end };
         }
-        for at in 0..w {
+        for (at, to) in to.iter_mut().enumerate() {
             if at + reach < w && in_column(at + reach) {
                 end = at + 2 * reach + 1;
             }
@@ -59,7 +59,7 @@ pub(super) fn colours(
                     moments.squares += pixel[0] * pixel[0] + pixel[1] * pixel[1] + pixel[2] * pixel[2];
                 }
             }
-            to[at] = moments;
+            *to = moments;
         }
     });
 }

@@ -3,7 +3,7 @@
 
 use super::axis::AxisMap;
 use super::edges::Kind;
-use super::surfaces::{MOST, Readings, Surface, bilinear};
+use super::surfaces::{MOST, Place, Readings, Surface};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -195,7 +195,7 @@ impl Decider<'_> {
 
     /// Chooses the first and the second of `surfaces` for the pixel (`y`, `x`).
     fn choose(&self, surfaces: &[Surface], y: usize, x: usize) -> (f32, Second) {
-        let (dx, dy) = (self.x.offset[x], self.y.offset[y]);
+        let place = Place::new(self.x.offset[x], self.y.offset[y]);
         let colour = self.colour(y * self.x.cell.len() + x);
         let mut likelihoods = [f32::NEG_INFINITY; MOST];
         let mut most = f32::NEG_INFINITY;
@@ -205,7 +205,7 @@ impl Decider<'_> {
         }
         let (mut first, mut second) = ((f32::NEG_INFINITY, 0), (f32::NEG_INFINITY, 0));
         for (i, (surface, likelihood)) in surfaces.iter().zip(likelihoods).enumerate() {
-            let score = PLACE * bilinear(&surface.covers, dx, dy) + (likelihood - most).max(-MOST_EVIDENCE);
+            let score = PLACE * place.of(&surface.covers) + (likelihood - most).max(-MOST_EVIDENCE);
             if score > first.0 {
                 second = first;
                 first = (score, i);
@@ -213,7 +213,7 @@ impl Decider<'_> {
                 second = (score, i);
             }
         }
-        let depth = |i: usize| surfaces[i].depth_at(dx, dy).clamp(0.0, 1.0);
+        let depth = |i: usize| surfaces[i].depth_at(&place).clamp(0.0, 1.0);
         let lead = first.0 - second.0;
         let depth_of_second = if lead < NEIGHBOURS { depth(second.1) } else { 0.0 };
         (

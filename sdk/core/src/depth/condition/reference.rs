@@ -121,9 +121,9 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
                 near(column, k % 3, readings.dim().1),
             )
         });
-        let (dx, dy) = (columns.offset(x), rows.offset(y));
+        let place = surfaces::Place::new(columns.offset(x), rows.offset(y));
         if clean || !kinds[(row, column)].0 {
-            let depth = surfaces::bilinear(&around.map(|at| readings[at]), dx, dy);
+            let depth = place.of(&around.map(|at| readings[at]));
             return (depth, 0.0, f64::INFINITY);
         }
         let surfaces = surfaces_of(around.map(|at| (readings[at], kinds[at].1)), &|k| {
@@ -137,9 +137,9 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
         let most = surfaces.iter().map(likelihood).fold(f64::NEG_INFINITY, f64::max);
         let mut scores: Vec<(f64, f32)> = (surfaces.iter())
             .map(|surface| {
-                let covered = f64::from(surfaces::bilinear(&surface.covers, dx, dy));
+                let covered = f64::from(place.of(&surface.covers));
                 let colour = (likelihood(surface) - most).max(-f64::from(pixels::MOST_EVIDENCE));
-                (f64::from(pixels::PLACE) * covered + colour, surface.depth_at(dx, dy))
+                (f64::from(pixels::PLACE) * covered + colour, surface.depth_at(&place))
             })
             .collect();
         scores.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -305,10 +305,10 @@ struct Surface {
 }
 
 impl Surface {
-    fn depth_at(&self, dx: f32, dy: f32) -> f32 {
-        let known = surfaces::bilinear(&self.has, dx, dy);
+    fn depth_at(&self, place: &surfaces::Place) -> f32 {
+        let known = place.of(&self.has);
         match known > 0.05 {
-            true => self.depth + surfaces::bilinear(&self.differences, dx, dy) / known,
+            true => self.depth + place.of(&self.differences) / known,
             false => self.depth,
         }
     }

@@ -21,8 +21,10 @@ pub(super) const HALF: f32 = 0.2;
 pub(super) const DISTINCT: f32 = 2.0;
 /// The least sum of differences of depth.
 pub(super) const LEAST_EDGES: f32 = 4.0;
-/// The share of a frame's evidence that remains after the next frame.
-const MEMORY: f32 = 0.9;
+/// The number of frames from one search to the next. Cameras do not move against each other.
+const INTERVAL: u32 = 4;
+/// The share of the evidence that remains in the next search.
+const MEMORY: f32 = 0.7;
 /// The relative gain in evidence at which a shift replaces the one of the previous frame.
 pub(super) const GAIN: f32 = 1.02;
 
@@ -45,6 +47,9 @@ pub(super) struct Registration {
     /// The evidence of all frames so far.
     evidence: [f32; SHIFTS + 1],
     best: usize,
+    /// The number of frames since the last search, or `None` before the first.
+    age: Option<u32>,
+    found: (f64, f64),
 }
 
 impl Registration {
@@ -75,6 +80,8 @@ impl Registration {
             rows: vec![[0.0; SHIFTS + 1]; shape.0],
             evidence: [0.0; SHIFTS + 1],
             best: SHIFTS / 2,
+            age: None,
+            found: (0.0, 0.0),
         }
     }
 
@@ -82,11 +89,20 @@ impl Registration {
     pub(super) fn reset(&mut self) {
         self.evidence.fill(0.0);
         self.best = SHIFTS / 2;
+        self.age = None;
     }
 
     /// Returns the distance (y, x) of the edges of `depth`, which may contain NaN, from those of `rgb`, (3, H, W), in
     /// readings, or 0 if the evidence is weak.
     pub(super) fn shift(&mut self, depth: &[f32], rgb: &[f32]) -> (f64, f64) {
+        self.age = self.age.map(|age| age + 1).filter(|age| *age < INTERVAL).or(Some(0));
+        if self.age == Some(0) {
+            self.found = self.search(depth, rgb);
+        }
+        self.found
+    }
+
+    fn search(&mut self, depth: &[f32], rgb: &[f32]) -> (f64, f64) {
         self.sample(rgb);
         self.find_edges();
         self.compare(depth);

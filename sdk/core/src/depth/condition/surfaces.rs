@@ -66,11 +66,11 @@ impl Surface {
         (r * r + g * g + b * b) * self.narrow + self.peak
     }
 
-    /// Returns the depth of the surface at the offset `dx`, `dy` from the middle reading.
-    pub(super) fn depth_at(&self, dx: f32, dy: f32) -> f32 {
-        let known = bilinear(&self.has, dx, dy);
+    /// Returns the depth of the surface at a place.
+    pub(super) fn depth_at(&self, place: &Place) -> f32 {
+        let known = place.of(&self.has);
         match known > 0.05 {
-            true => self.depth + bilinear(&self.slopes, dx, dy) / known,
+            true => self.depth + place.of(&self.slopes) / known,
             false => self.depth,
         }
     }
@@ -112,15 +112,8 @@ impl Readings<'_> {
         }
         for surface in &mut surfaces[..count] {
             surface.finish();
-            for at in 0..9 {
-                let belongs = surface.covers[at] >= 1.0;
-                surface.has[at] = f32::from(belongs);
-                surface.slopes[at] = if belongs {
-                    self.depth[around[at]] - surface.depth
-                } else {
-                    0.0
-                };
-            }
+            surface.has = surface.covers.map(|covers| f32::from(covers >= 1.0));
+            surface.slopes = std::array::from_fn(|at| surface.has[at] * (self.depth[around[at]] - surface.depth));
         }
         count
     }
@@ -149,14 +142,35 @@ fn split(surfaces: &mut [Surface], at: usize, depth: f32) -> bool {
     true
 }
 
-/// Interpolates 3×3 `values` bilinearly at the offset `dx`, `dy` from their middle, each −½..=½.
-pub(super) fn bilinear(values: &[f32; 9], dx: f32, dy: f32) -> f32 {
-    let (left, right_share) = if dx < 0.0 { (0, 1.0 + dx) } else { (1, dx) };
-    let (top, bottom_share) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
-    let across = |row: usize| {
-        let (a, b) = (values[3 * row + left], values[3 * row + left + 1]);
-        a + right_share * (b - a)
-    };
-    let (a, b) = (across(top), across(top + 1));
-    a + bottom_share * (b - a)
+/// A place among 3×3 readings, for bilinear interpolation.
+pub(super) struct Place {
+    /// The first of the four readings around it.
+    first: usize,
+    /// Their weights.
+    weights: [f32; 4],
+}
+
+impl Place {
+    /// Returns the place at the offset `dx`, `dy` from the middle reading, each −½..=½.
+    pub(super) fn new(dx: f32, dy: f32) -> Self {
+        let (left, right_share) = if dx < 0.0 { (0, 1.0 + dx) } else { (1, dx) };
+        let (top, bottom_share) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
+        let (left_share, top_share) = (1.0 - right_share, 1.0 - bottom_share);
+        Place {
+            first: 3 * top + left,
+            weights: [
+                top_share * left_share,
+                top_share * right_share,
+                bottom_share * left_share,
+                bottom_share * right_share,
+            ],
+        }
+    }
+
+    /// Interpolates `values` of the readings.
+    pub(super) fn of(&self, values: &[f32; 9]) -> f32 {
+        let [a, b, c, d] = self.weights;
+        let i = self.first;
+        a * values[i] + b * values[i + 1] + c * values[i + 3] + d * values[i + 4]
+    }
 }
