@@ -1,7 +1,9 @@
 //! Results: handles to memory that is read in place.
 
 use crate::error::{PhasefrontError, guard};
+use crate::options::EncoderOptions;
 use crate::statistics::FrameTimes;
+use crate::target::Target;
 use num_complex::Complex32;
 use phasefront::output::{Output, Placement};
 use phasefront::session;
@@ -11,7 +13,7 @@ use std::sync::Arc;
 /// planes are read.
 #[derive(Debug, uniffi::Object)]
 pub struct RawHologram {
-    core: session::Hologram,
+    pub(crate) core: session::Hologram,
 }
 
 /// The properties of a hologram.
@@ -47,6 +49,44 @@ impl RawHologram {
 
 #[uniffi::export]
 impl RawHologram {
+    /// Makes the hologram of a complex field of `height` × `width` pixels at `z_mm`, 0 the midpoint: the real and the
+    /// imaginary part of each pixel as 32-bit floats, planes of the target's colours row by row without gaps, one after
+    /// another.
+    ///
+    /// # Errors
+    /// A field of another size, one that is larger than the modulator, dark or not finite; a z too far away; options
+    /// out of their range.
+    #[uniffi::constructor]
+    pub fn of_field(
+        field: &[u8],
+        width: u32,
+        height: u32,
+        z_mm: f64,
+        target: Arc<Target>,
+        options: EncoderOptions,
+    ) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| {
+            let (values, rest) = field.as_chunks::<8>();
+            if !rest.is_empty() {
+                return Err(PhasefrontError::Frame(format!(
+                    "a field of {} bytes; a value has 8",
+                    field.len()
+                )));
+            }
+            let values: Vec<Complex32> = (values.iter())
+                .map(|[a, b, c, d, e, f, g, h]| {
+                    Complex32::new(
+                        f32::from_ne_bytes([*a, *b, *c, *d]),
+                        f32::from_ne_bytes([*e, *f, *g, *h]),
+                    )
+                })
+                .collect();
+            let shape = (height as usize, width as usize);
+            let core = session::Hologram::of_field(&values, shape, z_mm / 1e3, &target.core, &(&options).into())?;
+            Ok(RawHologram::new(core))
+        })
+    }
+
     /// Returns the properties of the hologram.
     pub fn info(&self) -> Result<HologramInfo, PhasefrontError> {
         guard(|| {
@@ -235,10 +275,10 @@ impl RawPlanes {
 /// An image without gaps between rows. The layers written by hand read it.
 #[derive(Debug, uniffi::Object)]
 pub struct RawImage {
-    bytes: Vec<u8>,
-    width: u32,
-    height: u32,
-    pixel_bytes: u32,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) pixel_bytes: u32,
 }
 
 #[uniffi::export]

@@ -147,6 +147,26 @@ pub enum Backend {
     Gpu,
 }
 
+/// How a field becomes levels.
+#[derive(Debug, Clone, uniffi::Record)]
+pub struct EncoderOptions {
+    /// How the field becomes phases.
+    pub encoding: Encoding,
+    /// Which amplitude full light stands for.
+    pub brightness: Brightness,
+    /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
+    /// in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+    #[uniffi(default = None)]
+    pub dark_threshold: Option<f32>,
+    /// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
+    /// what suits the encoding: 1, and 0 with a pre-filter.
+    #[uniffi(default = None)]
+    pub local_steps: Option<u32>,
+    /// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
+    #[uniffi(default = 0)]
+    pub midpoint_steps: u32,
+}
+
 /// The options of a session. [`session_options`] returns the defaults.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct SessionOptions {
@@ -317,6 +337,32 @@ impl SessionOptions {
     }
 }
 
+impl From<&EncoderOptions> for phasefront::EncoderOptions {
+    fn from(options: &EncoderOptions) -> Self {
+        let defaults = phasefront::EncoderOptions::from(match &options.encoding {
+            Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
+            Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
+                sigma: *sigma,
+                width: *width as usize,
+            },
+            Encoding::BandLimit { k } => phasefront::Encoding::BandLimit { k: *k },
+            Encoding::Deep { prefilter } => phasefront::Encoding::Deep(prefilter.core.clone()),
+        });
+        let steps = options.local_steps;
+        phasefront::EncoderOptions {
+            dark_threshold: options.dark_threshold.unwrap_or(defaults.dark_threshold),
+            local_steps: steps.map_or(defaults.local_steps, |steps| steps as usize),
+            midpoint_steps: options.midpoint_steps as usize,
+            brightness: match options.brightness {
+                Brightness::Smoothed => phasefront::Brightness::Smoothed,
+                Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
+                Brightness::FrameMax => phasefront::Brightness::FrameMax,
+            },
+            ..defaults
+        }
+    }
+}
+
 impl TryFrom<&SessionOptions> for session::SessionOptions {
     type Error = PhasefrontError;
 
@@ -331,27 +377,15 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let mut to = session::SessionOptions::new(target.clone(), method(best));
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
+        to.encoder = (&EncoderOptions {
+            encoding: options.encoding.clone(),
+            brightness: options.brightness,
+            dark_threshold: options.dark_threshold,
+            local_steps: options.local_steps,
+            midpoint_steps: options.midpoint_steps,
+        })
+            .into();
         let steps = |asked: Option<u32>, defaults: usize| asked.map_or(defaults, |steps| steps as usize);
-        let defaults = phasefront::EncoderOptions::from(match &options.encoding {
-            Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
-            Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
-                sigma: *sigma,
-                width: *width as usize,
-            },
-            Encoding::BandLimit { k } => phasefront::Encoding::BandLimit { k: *k },
-            Encoding::Deep { prefilter } => phasefront::Encoding::Deep(prefilter.core.clone()),
-        });
-        to.encoder = phasefront::EncoderOptions {
-            dark_threshold: options.dark_threshold.unwrap_or(defaults.dark_threshold),
-            local_steps: steps(options.local_steps, defaults.local_steps),
-            midpoint_steps: options.midpoint_steps as usize,
-            ..defaults
-        };
-        to.encoder.brightness = match options.brightness {
-            Brightness::Smoothed => phasefront::Brightness::Smoothed,
-            Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
-            Brightness::FrameMax => phasefront::Brightness::FrameMax,
-        };
         to.quality_levels = (options.quality_levels.iter())
             .map(|quality_level| session::QualityLevel {
                 method: method(quality_level),

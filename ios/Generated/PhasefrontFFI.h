@@ -341,6 +341,11 @@ uint64_t uniffi_phasefront_ffi_fn_clone_rawhologram(uint64_t handle, RustCallSta
 void uniffi_phasefront_ffi_fn_free_rawhologram(uint64_t handle, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWHOLOGRAM_OF_FIELD
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWHOLOGRAM_OF_FIELD
+uint64_t uniffi_phasefront_ffi_fn_constructor_rawhologram_of_field(ForeignBytes field, uint32_t width, uint32_t height, double z_mm, uint64_t target, RustBuffer options, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_FIELD
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_FIELD
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_field(uint64_t ptr, double z_mm, RustCallStatus *_Nonnull out_status
@@ -484,6 +489,41 @@ void uniffi_phasefront_ffi_fn_init_callback_vtable_loglistener(const UniffiVTabl
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_LOGLISTENER_ON_LOG
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_LOGLISTENER_ON_LOG
 void uniffi_phasefront_ffi_fn_method_loglistener_on_log(uint64_t ptr, RustBuffer level, RustBuffer message, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWMODULATOR
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWMODULATOR
+uint64_t uniffi_phasefront_ffi_fn_clone_rawmodulator(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWMODULATOR
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWMODULATOR
+void uniffi_phasefront_ffi_fn_free_rawmodulator(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWMODULATOR_FROM_TOML
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWMODULATOR_FROM_TOML
+uint64_t uniffi_phasefront_ffi_fn_constructor_rawmodulator_from_toml(RustBuffer text, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWMODULATOR_NAMED
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWMODULATOR_NAMED
+uint64_t uniffi_phasefront_ffi_fn_constructor_rawmodulator_named(RustBuffer name, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_PACK
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_PACK
+RustBuffer uniffi_phasefront_ffi_fn_method_rawmodulator_pack(uint64_t ptr, uint64_t hologram, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_TARGET
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_TARGET
+uint64_t uniffi_phasefront_ffi_fn_method_rawmodulator_target(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_UNPACK
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_UNPACK
+uint64_t uniffi_phasefront_ffi_fn_method_rawmodulator_unpack(uint64_t ptr, ForeignBytes images, uint32_t width, uint32_t height, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_NETWORK
@@ -1140,6 +1180,24 @@ uint16_t uniffi_phasefront_ffi_checksum_method_loglistener_on_log(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_PACK
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_PACK
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_pack(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_TARGET
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_TARGET
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_target(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_UNPACK
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_UNPACK
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_unpack(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_NETWORK_INFO
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_NETWORK_INFO
 uint16_t uniffi_phasefront_ffi_checksum_method_network_info(void
@@ -1251,6 +1309,24 @@ uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
 uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_end(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWHOLOGRAM_OF_FIELD
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWHOLOGRAM_OF_FIELD
+uint16_t uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWMODULATOR_FROM_TOML
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWMODULATOR_FROM_TOML
+uint16_t uniffi_phasefront_ffi_checksum_constructor_rawmodulator_from_toml(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWMODULATOR_NAMED
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWMODULATOR_NAMED
+uint16_t uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named(void
     
 );
 #endif

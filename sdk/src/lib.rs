@@ -35,6 +35,7 @@
 //! | [`target`] | the target of a hologram: display, modulator response, laser light, correction of the optics |
 //! | [`EncoderOptions`] | how a field becomes levels: [`Encoding`], [`Brightness`] |
 //! | [`Pipeline`] | a single frame through all stages, without a session |
+//! | [`Hologram::of_field`] | your own complex field, to levels |
 //! | [`output`] | converts levels to the images that a modulator takes, and back; commercially available modulators |
 //!
 //! The bundled networks are in the crate `phasefront-models`.

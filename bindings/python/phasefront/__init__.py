@@ -52,6 +52,7 @@ from ._ffi import (
     display_from_toml,
     version,
 )
+from ._encode import Modulator, encode
 from ._frame import Frame
 from ._hologram import Hologram
 from ._session import Dropped, Event, Failed, Processed, QualityChanged, Session, send_log, send_stages, session_options
@@ -60,10 +61,10 @@ from ._target import Target
 __all__ = [
     "Backend", "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange", "Display",
     "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo",
-    "Intrinsics", "Layout", "LogLevel", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
+    "Intrinsics", "Layout", "LogLevel", "Method", "Modulator", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
     "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "Rotation", "RunningMode",
     "Session", "SessionOptions", "Stage", "Statistics", "Target", "Thermal", "YuvMatrix", "__version__", "built_in_pair",
-    "display_from_toml", "send_log", "send_stages", "session_options", "version",
+    "display_from_toml", "encode", "send_log", "send_stages", "session_options", "version",
 ]  # fmt: skip
 
 #: The version of the library.

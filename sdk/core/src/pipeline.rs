@@ -2,6 +2,7 @@
 //! timed. A session processes sequences of frames.
 
 pub mod display_plan;
+pub mod field;
 
 use crate::display::levels::LevelsMut;
 use crate::display::target::Target;

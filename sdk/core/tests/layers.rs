@@ -30,6 +30,7 @@ const LAYERS: &[&str] = &[
     "encode::brightness",
     "encode",
     "pipeline::display_plan",
+    "pipeline::field",
     "pipeline",
     "output",
     "output::modulator",

@@ -5,9 +5,11 @@ use super::live::lock;
 use super::process_id::ProcessId;
 use super::threads::Threads;
 use num_complex::Complex32;
-use phasefront_core::display::levels::Levels;
+use phasefront_core::display::levels::{Levels, LevelsMut};
 use phasefront_core::display::target::Target;
-use phasefront_core::pipeline::FrameTimes;
+use phasefront_core::encode::EncoderOptions;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
+use phasefront_core::pipeline::{FrameTimes, field};
 use phasefront_core::runtime::error::{Error, Result};
 use phasefront_core::runtime::stage::stage;
 use phasefront_core::view::preview::{Preview, PreviewScratch, check_screen};
@@ -94,7 +96,7 @@ pub struct Hologram {
     pub(super) levels: Pooled<u8>,
     /// The levels of a display with more than 8 bits.
     pub(super) words: Option<Pooled<u16>>,
-    /// Normalized depth as d·65535.
+    /// Normalized depth as d·65535. Empty if the hologram was made of a field, whose depth is not known.
     pub(super) depth: Pooled<u16>,
     pub(super) scale: f32,
     pub(super) times: FrameTimes,
@@ -116,7 +118,74 @@ impl std::fmt::Debug for Hologram {
 }
 
 impl Hologram {
-    /// Returns the timestamp of the frame.
+    /// Makes the hologram of a complex field that comes from elsewhere: `field`, (C, H, W), of `shape` = (H, W) at
+    /// `z_m`, where z = 0 is the middle of the volume. C is the number of the target's lasers. The field propagates to
+    /// the modulator, and is corrected and encoded for it. A smoothed brightness is that of the field alone.
+    ///
+    /// ```
+    /// use phasefront::num_complex::Complex32;
+    /// use phasefront::{Display, EncoderOptions, Hologram, Target};
+    ///
+    /// let target = Target::from(Display::from_toml("width = 64\nheight = 48\nwavelengths_nm = [532]")?);
+    /// let field: Vec<_> = (0..48 * 64).map(|i| Complex32::from_polar(0.5, 0.01 * i as f32)).collect();
+    /// let hologram = Hologram::of_field(&field, (48, 64), 0.0, &target, &EncoderOptions::default())?;
+    /// assert_eq!(hologram.levels().len(), 48 * 64);
+    /// # Ok::<(), phasefront::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Returns an error if the field has another number of values, is larger than the modulator, is dark, or has values
+    /// that are NaN or infinite; and if z is too far away or an option is out of its range.
+    pub fn of_field(
+        field: &[Complex32],
+        shape: (usize, usize),
+        z_m: f64,
+        target: &Target,
+        options: &EncoderOptions,
+    ) -> Result<Self> {
+        computing::check()?;
+        let pool = Threads::shared()?;
+        let _computing = Computing::begin();
+        pool.install(|| {
+            field::check(field, shape, target)?;
+            let plan = DisplayPlan::from_z(shape, z_m, target, options)?;
+            let (mut scratch, mut field) = (plan.scratch(), field.to_vec());
+            let mut levels = Pool::default().take(field.len());
+            let stage = stage!("propagate");
+            plan.propagate(&mut field, &mut scratch);
+            let propagate = stage.end();
+            let mut words = (target.display.bits() > 8).then(|| Pool::default().take(field.len()));
+            let modulation = match &mut words {
+                None => plan.modulate(None, &mut field, LevelsMut::Bytes(&mut levels.values), &mut scratch),
+                Some(words) => plan.modulate(None, &mut field, LevelsMut::Words(&mut words.values), &mut scratch),
+            };
+            if let Some(words) = &words {
+                let below = target.display.bits() - 8;
+                for (level, word) in levels.values.iter_mut().zip(&words.values) {
+                    *level = (*word >> below) as u8;
+                }
+            }
+            Ok(Hologram {
+                timestamp_ns: 0,
+                shape,
+                levels,
+                words,
+                depth: Pool::default().take(0),
+                scale: modulation.scale,
+                times: FrameTimes {
+                    propagate,
+                    encode: modulation.encode,
+                    ..FrameTimes::default()
+                },
+                range_m: None,
+                valid_depth: 0.0,
+                quality_level: 0,
+                viewer: Arc::new(Viewer::new(target.clone(), pool.clone())),
+            })
+        })
+    }
+
+    /// Returns the timestamp of the frame; 0 for a hologram of a field.
     pub fn timestamp_ns(&self) -> u64 {
         self.timestamp_ns
     }
@@ -197,8 +266,12 @@ impl Hologram {
     }
 
     /// Returns the z in metres of the scene point at (`x`, `y`) of the picture, for example to focus where the user
-    /// taps. Coordinates run from 0 to 1 from the upper left corner; values outside are clamped to the edge.
+    /// taps. Coordinates run from 0 to 1 from the upper left corner; values outside are clamped to the edge. Returns 0
+    /// for a hologram of a field, whose depth is not known.
     pub fn z_at(&self, x: f64, y: f64) -> f64 {
+        if self.depth.values.is_empty() {
+            return 0.0;
+        }
         let (height, width) = self.shape;
         let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
         let d = self.depth.values[at(y, height) * width + at(x, width)];

@@ -2,10 +2,12 @@
 
 use super::SessionOptions;
 use super::computing::Computing;
+use super::live::lock;
+use super::process_id::ProcessId;
 use phasefront_core::runtime::error::{Error, Result};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// A pool of threads; `None` on platforms without threads, such as WebAssembly, where the caller's thread computes.
 pub(super) struct Threads(Option<ThreadPool>);
@@ -36,6 +38,24 @@ impl Threads {
         };
         let started = pool.build().map_err(|e| Error::Threads(Arc::new(e)))?;
         Ok(Threads(Some(started)))
+    }
+
+    /// Returns the threads of holograms without a session, which this process starts once.
+    ///
+    /// # Errors
+    /// Returns an error if threads cannot be started.
+    pub(super) fn shared() -> Result<Arc<Self>> {
+        static SHARED: Mutex<Option<(ProcessId, Arc<Threads>)>> = Mutex::new(None);
+        let mut shared = lock(&SHARED);
+        match &*shared {
+            Some((process, threads)) if process.is_current() => Ok(threads.clone()),
+            _ => {
+                let threads = Arc::new(Self::start(None)?);
+                // Those of a process that was forked are not there to be ended.
+                std::mem::forget(shared.replace((ProcessId::current(), threads.clone())));
+                Ok(threads)
+            }
+        }
     }
 
     /// Runs `work` on these threads and returns its result.

@@ -12,6 +12,7 @@ mod on_gpu;
 mod camera_formats;
 mod debug;
 mod determinism;
+mod field;
 #[cfg(feature = "gpu")]
 mod gpu_session;
 mod one_colour;

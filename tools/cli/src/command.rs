@@ -5,6 +5,7 @@ mod calibrate;
 mod compare;
 mod devices;
 mod doctor;
+mod encode;
 mod hologram;
 mod judge;
 mod link;
@@ -41,6 +42,7 @@ pub(crate) struct Phasefront {
 #[derive(Subcommand)]
 pub(crate) enum Command {
     Hologram(Box<hologram::Hologram>),
+    Encode(Box<encode::Encode>),
     Refocus(refocus::Refocus),
     View(Box<view::View>),
     Compare(compare::Compare),
@@ -66,6 +68,7 @@ impl Command {
         let json = common.json;
         match self {
             Command::Hologram(command) => command.run(json),
+            Command::Encode(command) => command.run(json),
             Command::Refocus(command) => command.run(json),
             Command::View(command) => command.run(json),
             Command::Compare(command) => command.run(json),

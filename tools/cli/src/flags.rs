@@ -5,3 +5,4 @@ pub(crate) mod depth;
 pub(crate) mod encoder;
 pub(crate) mod frame;
 pub(crate) mod method;
+pub(crate) mod outputs;

@@ -2,6 +2,7 @@
 //! `hologram`, `view` and `judge` use it.
 
 mod cpu;
+pub(crate) mod field;
 mod gpu;
 mod judged;
 mod layers;

@@ -240,6 +240,14 @@ pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &Holog
     info.place()
 }
 
+/// Writes phases in radians, (C, H, W), as a `.npy` of float32.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write_phases(path: &Path, phases: ArrayView3<'_, f32>) -> Result<()> {
+    output::write_atomically(path, |file| phases.write_npy(file).map_err(std::io::Error::other))
+}
+
 /// Declares the two files of a complex hologram as outputs.
 ///
 /// # Errors
@@ -267,6 +275,28 @@ fn beside(path: &Path) -> Result<PathBuf> {
         }
     }
     Ok(beside)
+}
+
+/// Reads a complex field, (C, H, W), for `display` from a `.npy` of complex64 or complex128.
+///
+/// # Errors
+/// Returns an error if the file is missing, truncated or of another type, or if the field does not have a plane for
+/// each laser.
+pub fn read_field(path: &Path, display: &DisplayFile) -> Result<Array3<Complex32>> {
+    let field = npy::read_field(&input::bytes(path, MOST_ARRAY)?).map_err(|why| Error::file(path, why))?;
+    match (field.dim().0, display.target.display.colours()) {
+        (theirs, ours) if theirs == ours => Ok(field),
+        (theirs, 1) => Err(Error::file(
+            path,
+            format!("has {theirs} planes; the display has one laser: (H, W) or (1, H, W)"),
+        )),
+        (theirs, ours) => Err(Error::file(
+            path,
+            format!(
+                "has {theirs} planes; the display has {ours} lasers: (3, H, W), or give a --display of one laser, wavelengths_nm = [532]"
+            ),
+        )),
+    }
 }
 
 /// Reads a hologram: a PNG of levels that contains its [`HologramInfo`], or a `.npy` with its `.json`.

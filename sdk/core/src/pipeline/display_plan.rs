@@ -212,8 +212,11 @@ impl DisplayPlan {
         }
     }
 
-    /// Writes phases in \[0, 2π) and returns the amplitude that maps to full light.
-    fn phases(
+    /// Works like [`Self::modulate`], but writes phases in \[0, 2π), and returns the amplitude that maps to full light.
+    ///
+    /// # Panics
+    /// Panics if `field` or `phases` does not have C·H·W values.
+    pub fn phases(
         &self,
         past: Option<Past>,
         field: &mut [Complex32],

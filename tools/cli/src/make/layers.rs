@@ -1,6 +1,7 @@
 //! The methods for layered depth images, on the CPU.
 
-use super::{HologramRequest, HologramResult, Method, described, stack};
+use super::field::{self, Stage};
+use super::{HologramRequest, HologramResult, Method, described};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -14,7 +15,6 @@ use phasefront_exact::corrected::{self, Correction, spatial};
 use phasefront_exact::{point_based, sm_lbm};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::display::calibration::AberrationFile;
-use phasefront_io::hologram::Levels;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use std::sync::Arc;
@@ -49,33 +49,22 @@ impl HologramRequest {
         let display = &target.display;
         let options = self.encoder_options(&encoder.options);
         let modulator = DisplayPlan::new((height, width), &target, &options)?;
-        let mut scratch = modulator.scratch();
         let start = Instant::now();
-        let Wave {
-            stage,
-            mut field,
-            engine,
-        } = self.wave(method, ldi, display, varying)?;
-        let waved = Instant::now();
-        let shape = field.dim();
-        let values = field.as_slice_mut().expect("standard layout");
-        modulator.propagate(values, &mut scratch);
-        let propagate = waved.elapsed();
-        let kept = self.keeps_field.then(|| values.to_vec());
-        let mut levels = Levels::zeros(display, (height, width));
-        let modulation = modulator.modulate(None, values, levels.view_mut(), &mut scratch);
-        Ok(HologramResult {
-            method: stage,
-            field: kept.map(|values| stack(values, shape)),
-            levels,
+        let wave = self.wave(method, ldi, display, varying)?;
+        let made = Stage {
+            name: wave.stage,
+            time: start.elapsed(),
+        };
+        let encoding = field::Encoding {
+            plan: &modulator,
+            display,
             encoder,
-            scale: modulation.scale,
-            stages: vec![
-                (stage, waved - start),
-                ("propagate", propagate),
-                ("encode", modulation.encode),
-            ],
-            engine,
+            is_at_modulator: false,
+            keeps_field: self.keeps_field,
+        };
+        Ok(HologramResult {
+            engine: wave.engine,
+            ..encoding.of(wave.field, made)
         })
     }
 

@@ -15,6 +15,7 @@ mod calibrate_command;
 mod command;
 mod devices;
 mod doctor;
+mod encode;
 mod inputs;
 mod one_laser;
 mod outputs;

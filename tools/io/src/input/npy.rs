@@ -2,8 +2,9 @@
 //! false.
 
 use crate::input::decode::Plane;
-use ndarray::{Array, Array2, ArrayView, Dimension};
+use ndarray::{Array, Array2, Array3, ArrayD, ArrayView, Dimension};
 use ndarray_npy::{ViewElement, ViewNpyError, ViewNpyExt};
+use num_complex::{Complex32, Complex64};
 
 /// The largest alignment of an element type.
 const ALIGNMENT: usize = 16;
@@ -35,6 +36,33 @@ pub fn read<T: ViewElement + Clone, D: Dimension>(file: &[u8]) -> Result<Array<T
 
 fn view<T: ViewElement + Clone, D: Dimension>(file: &[u8]) -> Result<Array<T, D>, ViewNpyError> {
     ArrayView::<T, D>::view_npy(file).map(|view| view.to_owned())
+}
+
+/// Reads the complex field of a whole `.npy` file of complex64 or complex128, as (C, H, W). (H, W) is one colour.
+///
+/// # Errors
+/// Returns an error if the type or the number of axes differs or if there are fewer or more bytes than the header says.
+pub(crate) fn read_field(file: &[u8]) -> Result<Array3<Complex32>, String> {
+    let double = || read(file).map(|array: ArrayD<Complex64>| array.mapv(|v| Complex32::new(v.re as f32, v.im as f32)));
+    let array: ArrayD<Complex32> = match read(file) {
+        Err(ViewNpyError::WrongDescriptor(_)) => double(),
+        read => read,
+    }
+    .map_err(|e| match e {
+        ViewNpyError::WrongDescriptor(kind) => {
+            format!("holds {kind}; a field is complex: field.astype(numpy.complex64) makes it so")
+        }
+        e => format!("is not a whole complex64 or complex128 .npy: {e}"),
+    })?;
+    let shape = match *array.shape() {
+        [height, width] => (1, height, width),
+        [colours, height, width] => (colours, height, width),
+        _ => {
+            return Err(format!("has shape {:?}; a field is (H, W) or (C, H, W)", array.shape()));
+        }
+    };
+    let array = array.as_standard_layout().into_owned().into_shape_with_order(shape);
+    array.map_err(|e| e.to_string())
 }
 
 /// The requirement for the `.npy` of a depth map.

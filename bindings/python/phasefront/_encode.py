@@ -1,0 +1,132 @@
+"""Fields that come from elsewhere, and modulators with the frames that their inputs take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy
+from numpy.typing import ArrayLike, NDArray
+
+from . import _ffi
+from ._ffi import Brightness, Display, EncoderOptions, Encoding, PhasefrontError
+from ._hologram import Hologram, Purpose
+from ._memory import MOST_BYTES, Memory, array_at
+from ._target import Target
+
+
+class Modulator:
+    """A modulator: its display, the phases of its levels, and the frames that its input takes.
+
+    Args:
+        raw: What `named` and `from_toml` make it of.
+    """
+
+    #: The target of holograms for the modulator.
+    target: _ffi.Target
+
+    def __init__(self, raw: _ffi.RawModulator):
+        self._raw = raw
+        self.target = raw.target()
+
+    @classmethod
+    def named(cls, name: str) -> Modulator:
+        """Returns a modulator that the command `phasefront devices` lists, for example ti-plm-p47.
+
+        Raises `PhasefrontError.Display` for any other name.
+        """
+        return cls(_ffi.RawModulator.named(name))
+
+    @classmethod
+    def from_toml(cls, text: str) -> Modulator:
+        """Reads the text of a modulator's file, with keys such as packing and levels_turns.
+
+        Raises `PhasefrontError.Display` for text that is not TOML, an unknown key, or a value out of its range.
+        """
+        return cls(_ffi.RawModulator.from_toml(text))
+
+    def pack(self, hologram: Hologram) -> list[NDArray[numpy.uint8]]:
+        """Returns the images that the modulator's input takes, uint8, (H, W, bytes per pixel): one, or one for each
+        colour. Read only.
+
+        Raises `PhasefrontError.Setting` for a hologram that does not fit the modulator.
+        """
+        images = self._raw.pack(hologram._raw)
+        return [array_at(image, image.address(), (image.height(), image.width(), image.pixel_bytes()), numpy.uint8) for image in images]
+
+    def unpack(self, images: Sequence[ArrayLike], shape: tuple[int, int] | None = None) -> NDArray[numpy.uint16]:
+        """Returns the levels in `images`, uint16, (C, H, W): the inverse of `pack`. Read only.
+
+        Args:
+            images: What `pack` returned, uint8.
+            shape: (H, W) of the hologram in the middle of the modulator. By default it has the modulator's size.
+
+        Raises `PhasefrontError.Setting` for images of another type or size.
+        """
+        arrays = [numpy.asarray(image) for image in images]
+        if any(array.dtype != numpy.uint8 for array in arrays):
+            raise PhasefrontError.Setting("images hold bytes, uint8, as pack returns them")
+        display = self.target.display()
+        height, width = shape or (display.height, display.width)
+        values = numpy.concatenate([array.ravel() for array in arrays]) if arrays else numpy.zeros(0, numpy.uint8)
+        levels = self._raw.unpack(Memory(values), width, height)
+        return array_at(levels, levels.address(), (levels.height() // height, height, width), numpy.uint16)
+
+
+def encode(
+    field: ArrayLike,
+    target: Display | _ffi.Target | Modulator | None = None,
+    *,
+    z_mm: float = 0.0,
+    encoding: Encoding | None = None,
+    scale: float | None = None,
+    dark_threshold: float | None = None,
+    local_steps: int | None = None,
+    midpoint_steps: int = 0,
+) -> Hologram:
+    """Makes the hologram of a complex field. It propagates to the modulator, and is corrected and encoded for it.
+
+    Args:
+        field: Complex, (H, W) for one laser or (C, H, W) for C lasers, red first. It may be smaller than the modulator,
+            and then lies in its middle.
+        target: A display, a calibrated target or a modulator. By default the display of 1920×1080.
+        z_mm: z of the field from the middle of the volume, in mm toward the viewer.
+        encoding: How the field becomes phases. By default a small Gaussian blur comes first (AA-DPM).
+        scale: The amplitude that full light stands for. By default the largest of the field.
+        dark_threshold: See `SessionOptions`.
+        local_steps: See `SessionOptions`.
+        midpoint_steps: See `SessionOptions`.
+
+    The result's depth is not known: its `z_at` returns 0. Raises `PhasefrontError.Frame` for a field of another type or
+    shape, or with values that are NaN or infinite, and `PhasefrontError.Setting` for an option out of its range.
+    """
+    if isinstance(target, Modulator):
+        target = target.target
+    elif not isinstance(target, _ffi.Target):
+        target = Target.of_display(Display() if target is None else target)
+    array = _field(field, 3 if target.display().laser_nm is None else 1)
+    options = EncoderOptions(
+        encoding=encoding or Encoding.ANTI_ALIAS(sigma=0.7, width=3),
+        brightness=Brightness.FRAME_MAX() if scale is None else Brightness.FIXED(scale=scale),
+        dark_threshold=dark_threshold,
+        local_steps=local_steps,
+        midpoint_steps=midpoint_steps,
+    )
+    _, height, width = array.shape
+    raw = _ffi.RawHologram.of_field(Memory(array), width, height, z_mm, target, options)
+    return Hologram(raw, Purpose(target, options.encoding))
+
+
+def _field(field: ArrayLike, colours: int) -> NDArray[numpy.complex64]:
+    """Returns a field as complex64, (C, H, W), without gaps."""
+    given: numpy.ndarray[Any, Any] = numpy.asarray(field)
+    if given.dtype.kind != "c":
+        raise PhasefrontError.Frame(f"the field holds {given.dtype}; it must be complex: field.astype(numpy.complex64)")
+    array = given[numpy.newaxis] if given.ndim == 2 else given
+    if array.ndim != 3 or array.shape[0] != colours:
+        right = "(H, W) of one laser" if colours == 1 else f"({colours}, H, W), red first,"
+        raise PhasefrontError.Frame(f"the field is {given.shape}; {right} is right")
+    if array.size * 8 > MOST_BYTES:
+        raise PhasefrontError.Frame(f"the field is {given.shape}; {MOST_BYTES} bytes of complex64 are the most")
+    with numpy.errstate(over="ignore"):
+        return numpy.ascontiguousarray(array, numpy.complex64)

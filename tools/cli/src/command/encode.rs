@@ -1,0 +1,115 @@
+//! `phasefront encode`: makes a phase-only hologram of a complex field that comes from elsewhere.
+
+use crate::flags::encoder::EncoderFlags;
+use crate::flags::outputs::OutputFlags;
+use crate::make::field::{self, Stage};
+use clap::Args;
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::{Brightness, EncoderOptions};
+use phasefront_command::flags::DisplayFlags;
+use phasefront_core::pipeline;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
+use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram;
+use phasefront_io::{Error, Result, output};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Make a phase-only hologram of your own complex field
+///
+/// The field is a NumPy array, complex64 or complex128, (H, W) for one laser or (C, H, W) for C lasers, red first. It
+/// propagates from its z to the modulator, is corrected for the display's optics, and is encoded.
+#[derive(Args)]
+pub(crate) struct Encode {
+    /// The complex field
+    #[arg(value_name = "FIELD.npy")]
+    field: PathBuf,
+    /// z of the field from the middle of the volume, mm [default: 0; a field of --complex, with its .json beside it, is
+    /// at the modulator and corrected already]
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    z_mm: Option<f64>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    #[command(flatten)]
+    encoder: EncoderFlags,
+    /// Amplitude that full light stands for [default: the largest of the field]
+    #[arg(long, value_name = "A")]
+    scale: Option<f32>,
+    #[command(flatten)]
+    outputs: OutputFlags,
+    /// Also write the phases of the modulator, float32 in radians, (C, H, W), before they become levels
+    #[arg(long, value_name = "FILE.npy")]
+    phases: Option<PathBuf>,
+    /// Output: a PNG of modulator levels
+    #[arg(short, value_name = "OUT.png")]
+    output: PathBuf,
+}
+
+impl Encode {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::file(&self.output, &["png"])?;
+        (self.phases.iter()).try_for_each(|path| output::file(path, &["npy"]))?;
+        let display = self.display.read()?;
+        self.outputs.declare(&display)?;
+        let encoder = self.encoder.read()?;
+        let start = Instant::now();
+        let field = hologram::read_field(&self.field, &display)?;
+        let target = display.corrected()?;
+        let (_, height, width) = field.dim();
+        let values = field.as_slice().expect("standard layout");
+        pipeline::field::check(values, (height, width), &target).map_err(|e| Error::file(&self.field, e))?;
+        let stage = Stage {
+            name: "field",
+            time: start.elapsed(),
+        };
+        let is_at_modulator = self.z_mm.is_none() && self.is_of_the_modulator(&display)?;
+        let z_m = match is_at_modulator {
+            true => target.display.offset_m(),
+            false => self.z_mm.unwrap_or(0.0) / 1e3,
+        };
+        let options = EncoderOptions {
+            brightness: self.scale.map_or(Brightness::FrameMax, Brightness::Fixed),
+            ..encoder.options.clone()
+        };
+        let plan = DisplayPlan::from_z((height, width), z_m, &target, &options)?;
+        if let Some(path) = &self.phases {
+            hologram::write_phases(path, phases(&plan, field.clone(), is_at_modulator).view())?;
+        }
+        let encoding = field::Encoding {
+            plan: &plan,
+            display: &target.display,
+            encoder,
+            is_at_modulator,
+            keeps_field: self.outputs.need_field(),
+        };
+        self.outputs
+            .finish(&self.output, &display, &encoding.of(field, stage), json)
+    }
+
+    /// Checks whether the field has a `.json` beside it, as `--complex` writes it, which says that it is at the
+    /// modulator.
+    fn is_of_the_modulator(&self, display: &DisplayFile) -> Result<bool> {
+        if !self.field.with_extension("json").is_file() {
+            return Ok(false);
+        }
+        let hologram = hologram::read_hologram(&self.field)?;
+        hologram
+            .check_display(display)
+            .map_err(|e| Error::file(&self.field, e))?;
+        Ok(true)
+    }
+}
+
+/// Returns the phases of `field`, (C, H, W), in radians.
+fn phases(plan: &DisplayPlan, mut field: Array3<Complex32>, is_at_modulator: bool) -> Array3<f32> {
+    let mut scratch = plan.scratch();
+    let mut phases = Array3::zeros(field.dim());
+    let values = field.as_slice_mut().expect("standard layout");
+    if !is_at_modulator {
+        plan.propagate(values, &mut scratch);
+    }
+    let out = phases.as_slice_mut().expect("standard layout");
+    plan.phases(None, values, out, &mut scratch);
+    phases
+}

@@ -1,0 +1,106 @@
+//! The files that are made of a hologram beside its levels.
+
+use crate::make::{HologramResult, Judged, infos, judge};
+use clap::Args;
+use phasefront::Encoding;
+use phasefront_command::terminal;
+use phasefront_io::Result;
+use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram::{self, packed};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What is made of a hologram beside its levels.
+#[derive(Args)]
+pub(crate) struct OutputFlags {
+    /// Also write the complex field at the modulator, with a .json beside it
+    #[arg(long, value_name = "FILE.npy")]
+    complex: Option<PathBuf>,
+    /// Compare the displayed image with the hologram's own wave, at the midpoint and over a stack of depths
+    #[arg(long)]
+    judge: bool,
+    /// Also write what the modulator's input takes: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
+    #[arg(long, value_name = "FRAME.png")]
+    packed: Option<PathBuf>,
+}
+
+impl OutputFlags {
+    /// Returns the name of a flag that is given, if there is one.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let all = [
+            (self.complex.is_some(), "--complex"),
+            (self.packed.is_some(), "--packed"),
+            (self.judge, "--judge"),
+        ];
+        all.iter().find(|(is_given, _)| *is_given).map(|(_, flag)| *flag)
+    }
+
+    /// Checks whether a result must keep its field.
+    pub(crate) fn need_field(&self) -> bool {
+        self.complex.is_some() || self.judge
+    }
+
+    /// Declares the files.
+    pub(crate) fn declare(&self, display: &DisplayFile) -> Result<()> {
+        if let Some(path) = &self.complex {
+            hologram::declare_complex(path)?;
+        }
+        self.packed.iter().try_for_each(|path| packed::declare(path, display))
+    }
+
+    /// Writes the levels of `made` to `output`, and the other files, and reports them.
+    pub(crate) fn finish(&self, output: &Path, display: &DisplayFile, made: &HologramResult, json: bool) -> Result<()> {
+        self.write(output, display, made)?;
+        let judged = self.judge.then(|| judge(display, made)).transpose()?;
+        self.report(output, made, judged.as_ref(), json);
+        Ok(())
+    }
+
+    fn write(&self, output: &Path, display: &DisplayFile, made: &HologramResult) -> Result<()> {
+        let (levels, field) = infos(display, made);
+        if let (Some(path), Some(values)) = (&self.complex, &made.field) {
+            if matches!(made.encoder.options.encoding, Encoding::Deep(_)) {
+                log::warn!(
+                    "{}: a field of --encoder deep is what its pre-filter was trained to take, not the displayed wave; for that one take another --network",
+                    path.display()
+                );
+            }
+            hologram::write_complex(path, values.view(), &field)?;
+        }
+        let hologram = made.hologram(levels);
+        if let Some(path) = &self.packed {
+            packed::write(path, &packed::pack(&hologram, display)?)?;
+        }
+        hologram::write_hologram(output, &hologram)
+    }
+
+    fn report(&self, output: &Path, made: &HologramResult, judged: Option<&Judged>, json: bool) {
+        let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        let stages: serde_json::Map<_, _> = (made.stages.iter())
+            .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
+            .collect();
+        let total: Duration = made.stages.iter().map(|(_, time)| *time).sum();
+        let (_, height, width) = made.levels.dim();
+        let list: Vec<_> = (made.stages.iter())
+            .map(|(stage, time)| format!("{stage} {:.1} ms", ms(time)))
+            .collect();
+        terminal::print(
+            json,
+            &json!({
+                "output": output.display().to_string(), "complex": self.complex, "width": width, "height": height,
+                "method": made.method, "encoder": made.encoder.name, "dark_threshold": made.encoder.options.dark_threshold,
+                "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
+                "stage_ms": stages, "total_ms": ms(&total), "shown": judged,
+            }),
+            format!(
+                "{}: {width}×{height} by {}; {}: {}{}",
+                terminal::name(output),
+                made.method,
+                made.encoder.describe(),
+                list.join(", "),
+                judged.map_or(String::new(), Judged::describe)
+            ),
+        );
+    }
+}
