@@ -18,5 +18,13 @@ pub mod optics;
 pub mod rehearse;
 pub mod simulated_display;
 
-/// The names of the three colours, in order, which are also the folders of their photographs.
-pub const COLOURS: [&str; 3] = ["red", "green", "blue"];
+use phasefront::Display;
+
+/// Returns the names of the display's colours, in order, which are also the folders of their photographs: red, green
+/// and blue, or laser for one laser.
+pub fn colours(display: &Display) -> &'static [&'static str] {
+    match display.colours() {
+        1 => &["laser"],
+        _ => &["red", "green", "blue"],
+    }
+}

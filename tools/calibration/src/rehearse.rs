@@ -1,9 +1,9 @@
 //! A complete calibration of a simulated display, compared with the true values that only a simulation knows.
 
-use crate::COLOURS;
 use crate::camera::marks;
 use crate::camera::pattern::{PATTERNS, Pattern};
 use crate::camera::photograph::Photograph;
+use crate::colours;
 use crate::curves::chart::{self, Curve, Map, Panel};
 use crate::curves::curve::LEVELS;
 use crate::curves::lut::{self, Refusal};
@@ -42,13 +42,13 @@ pub struct Rehearsal {
     pub keep_captures: bool,
 }
 
-/// A value for each of the three colours, before and after calibration.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+/// A value for each colour, before and after calibration.
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct BeforeAfter {
     /// The values with the factory's linear table and no correction.
-    pub before: [f64; 3],
+    pub before: Vec<f64>,
     /// The values with the calibration.
-    pub after: [f64; 3],
+    pub after: Vec<f64>,
 }
 
 /// The results of a rehearsal, measured against the simulation's true values.
@@ -65,9 +65,9 @@ pub struct Outcome {
     /// The Strehl ratio of the focused spot.
     pub strehl: BeforeAfter,
     /// The coefficients of the perfect correction, in radians.
-    pub true_coefficients: [Coefficients; 3],
+    pub true_coefficients: Vec<Coefficients>,
     /// The coefficients that the search found.
-    pub found_coefficients: [Coefficients; 3],
+    pub found_coefficients: Vec<Coefficients>,
     /// The number of photographs taken.
     pub photographs: usize,
 }
@@ -88,7 +88,7 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
         progress,
     };
     // The search for aberrations comes last and would otherwise fail only there.
-    for colour in 0..COLOURS.len() {
+    for colour in 0..display.colours() {
         spot::levels(&Target::from(display), colour, rehearsal.spot_z_m, MIDDLE, &[0.0; 5])?;
     }
     output::make_folder(folder)?;
@@ -111,12 +111,16 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
         black_db: worth.black_db,
         unevenness: worth.unevenness,
         strehl: BeforeAfter {
-            before: truth.map(|a| spot::strehl(&a)),
-            after: std::array::from_fn(|c| spot::strehl(&apart(&truth[c], &found[c]))),
+            before: truth.iter().map(spot::strehl).collect(),
+            after: truth
+                .iter()
+                .zip(&found)
+                .map(|(a, b)| spot::strehl(&apart(a, b)))
+                .collect(),
         },
         true_coefficients: truth,
         found_coefficients: found,
-        photographs: COLOURS.len() * (PATTERNS + 1) + aberrations.photographs,
+        photographs: display.colours() * (PATTERNS + 1) + aberrations.photographs,
     };
     let path = folder.join("outcome.json");
     let text = serde_json::to_string_pretty(&outcome).map_err(|e| Error::file(&path, e))?;
@@ -135,9 +139,9 @@ struct Stage<'a> {
 
 /// The result of the search for aberrations.
 struct Aberrations {
-    truth: [Coefficients; 3],
-    found: [Coefficients; 3],
-    /// The green spot without a correction and with the one found.
+    truth: Vec<Coefficients>,
+    found: Vec<Coefficients>,
+    /// The spot of [`Stage::middle`] without a correction and with the one found.
     spots: [Photograph; 2],
     photographs: usize,
 }
@@ -150,24 +154,35 @@ struct Worth {
 }
 
 impl Stage<'_> {
+    /// Returns the names of the colours.
+    fn colours(&self) -> &'static [&'static str] {
+        colours(&self.rehearsal.display)
+    }
+
+    /// Returns the colour that pictures are of: green, or the only one.
+    fn middle(&self) -> usize {
+        self.colours().len() / 2
+    }
+
     /// Returns the number of photographs and rows before the search for aberrations, and in total.
     fn work(&self) -> [usize; 2] {
-        let before = 3 * (PATTERNS + self.rehearsal.display.height());
-        [before, before + 3 * spot::ROUNDS * TRIALS]
+        let colours = self.colours().len();
+        let before = colours * (PATTERNS + self.rehearsal.display.height());
+        [before, before + colours * spot::ROUNDS * TRIALS]
     }
 
     /// Returns the folder for the photographs of a colour, if they are kept.
     fn captures(&self, colour: usize) -> Option<PathBuf> {
         let kept = self.rehearsal.keep_captures;
-        kept.then(|| self.folder.join("captures").join(COLOURS[colour]))
+        kept.then(|| self.folder.join("captures").join(self.colours()[colour]))
     }
 
     /// Measures the curves from 256 photographs per colour, focused on the modulator.
-    fn curves(&self) -> Result<[lut::Curves; 3]> {
+    fn curves(&self) -> Result<Vec<lut::Curves>> {
         let modulator_z_m = self.rehearsal.display.offset_m();
         let [_, work] = self.work();
         let mut curves = Vec::new();
-        for colour in 0..COLOURS.len() {
+        for (colour, name) in self.colours().iter().enumerate() {
             let captures = self.captures(colour);
             captures.as_deref().map_or(Ok(()), output::make_folder)?;
             let shoot = |k: usize| -> Result<Photograph> {
@@ -181,13 +196,13 @@ impl Stage<'_> {
             };
             let source = |k: usize| shoot(k).map_err(|e| lut::What::Unreadable(e.to_string()));
             let done = |n: usize, of: usize| (self.progress)(colour * of + n, work);
-            let measured = lut::measure(&self.pattern, colour, &source, self.folder, &done);
+            let measured = lut::measure(&self.pattern, name, &source, self.folder, &done);
             curves.push(measured.map_err(|refusal| match refusal {
                 Refusal::Other(e) => e,
                 Refusal::Problems(all) => Error::Input(all.first().map_or_else(String::new, ToString::to_string)),
             })?);
         }
-        curves.try_into().map_err(|_| Error::Input("three colours".into()))
+        Ok(curves)
     }
 
     /// Measures the laser's amplitude from one photograph of a diffuser per colour.
@@ -196,7 +211,7 @@ impl Stage<'_> {
         let shape = (display.height(), display.width());
         let frame = self.pattern.frame(0);
         let mut maps = Vec::new();
-        for colour in 0..COLOURS.len() {
+        for colour in 0..self.colours().len() {
             let marked = (self.simulated).photograph(frame.view(), colour, display.offset_m(), 0)?;
             let registration = marks::register(&marked, &self.pattern)?;
             let photo = self.simulated.photograph_diffuser(colour, 1 << 20)?;
@@ -218,17 +233,20 @@ impl Stage<'_> {
             display, spot_z_m: z_m, ..
         } = self.rehearsal;
         let mut dice = Dice::new(self.rehearsal.seed ^ 0xab);
-        let green: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
+        let middle: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
         let wavelengths = display.wavelengths_m();
-        let truth: [Coefficients; 3] = std::array::from_fn(|c| green.map(|a| a * wavelengths[1] / wavelengths[c]));
-        let aberrated = (self.simulated.clone()).with_aberration(Aberration::new(truth)?);
+        let middle_m = wavelengths[self.middle()];
+        let truth: Vec<Coefficients> = (wavelengths.iter())
+            .map(|wavelength_m| middle.map(|a| a * middle_m / wavelength_m))
+            .collect();
+        let aberrated = (self.simulated.clone()).with_aberration(Aberration::new(truth.clone())?);
         let target = Target {
             response: calibrated.clone(),
             ..Target::from(display)
         };
-        let (mut found, mut photographs) = ([[0.0; 5]; 3], 0);
+        let (mut found, mut photographs) = (Vec::new(), 0);
         let (mut tried, mut spots) = (Vec::new(), Vec::new());
-        for colour in 0..3 {
+        for (colour, name) in self.colours().iter().enumerate() {
             let mut camera = aberrated.camera().clone();
             camera.exposure = spot::exposure(display, colour, *z_m);
             let before_lens = aberrated.clone().with_camera(camera);
@@ -238,17 +256,17 @@ impl Stage<'_> {
             };
             let (search, points) = self.search(colour, &truth[colour], &shoot)?;
             photographs += search.round * TRIALS;
-            found[colour] = search.best;
+            found.push(search.best);
             tried.push(Curve {
-                name: COLOURS[colour].into(),
+                name: (*name).into(),
                 points,
                 dots: false,
             });
-            if colour == 1 {
+            if colour == self.middle() {
                 spots = vec![shoot(&[0.0; 5], 9000)?, shoot(&search.best, 9001)?];
             }
         }
-        self.write_aberrations(found, tried)?;
+        self.write_aberrations(&found, tried)?;
         Ok(Aberrations {
             truth,
             found,
@@ -282,17 +300,11 @@ impl Stage<'_> {
         Ok((search, history))
     }
 
-    fn write_aberrations(&self, found: [Coefficients; 3], tried: Vec<Curve>) -> Result<()> {
-        let [red, green, blue] = found;
-        let entry = Entry {
-            z_mm: self.rehearsal.spot_z_m * 1e3,
-            x: None,
-            y: None,
-            red,
-            green,
-            blue,
-            laser: None,
-        };
+    fn write_aberrations(&self, found: &[Coefficients], tried: Vec<Curve>) -> Result<()> {
+        let mut entry = Entry::flat(self.rehearsal.spot_z_m * 1e3, None, self.colours().len());
+        for (colour, found) in found.iter().enumerate() {
+            *entry.colour_mut(colour) = *found;
+        }
         calibration::write_aberrations(&self.folder.join("aberration.toml"), &[entry])?;
         let panel = Panel {
             title: "Strehl ratio of the search".into(),
@@ -311,16 +323,16 @@ impl Stage<'_> {
         let bare = Target::from(display);
         let both = |f: &dyn Fn(&Response, usize) -> Result<f64>| -> Result<BeforeAfter> {
             let mut all = BeforeAfter::default();
-            for colour in 0..3 {
-                all.before[colour] = f(&factory, colour)?;
-                all.after[colour] = f(calibrated, colour)?;
+            for colour in 0..self.colours().len() {
+                all.before.push(f(&factory, colour)?);
+                all.after.push(f(calibrated, colour)?);
             }
             Ok(all)
         };
         let mut unevenness = BeforeAfter::default();
-        for colour in 0..3 {
-            unevenness.before[colour] = flat_grey(simulated, &bare, colour)?;
-            unevenness.after[colour] = flat_grey(simulated, &file.target, colour)?;
+        for colour in 0..self.colours().len() {
+            unevenness.before.push(flat_grey(simulated, &bare, colour)?);
+            unevenness.after.push(flat_grey(simulated, &file.target, colour)?);
         }
         Ok(Worth {
             phase_error_rad: both(&|response, c| Ok(phase_error(simulated, response, c)))?,
@@ -339,7 +351,7 @@ impl Stage<'_> {
         black_pictures(&self.simulated, &factory, calibrated, folder)?;
         for k in [0usize, 128] {
             let frame = self.pattern.frame(k as u8);
-            let photo = (self.simulated).photograph(frame.view(), 1, display.offset_m(), k as u64)?;
+            let photo = (self.simulated).photograph(frame.view(), self.middle(), display.offset_m(), k as u64)?;
             photo.write(&folder.join(format!("capture_{k:03}.png")))?;
         }
         Ok(())
@@ -425,12 +437,12 @@ fn black_pictures(
     let mut camera = simulated.camera().clone();
     camera.exposure *= 10.0;
     let bright = simulated.clone().with_camera(camera);
-    let z_m = simulated.display().offset_m();
+    let (z_m, middle) = (simulated.display().offset_m(), simulated.display().colours() / 2);
     let photos: Result<Vec<_>> = [factory, calibrated]
         .into_iter()
         .map(|response| {
-            let levels = checkerboard(simulated, response, 1, std::f32::consts::FRAC_PI_2);
-            bright.photograph(levels.view(), 1, z_m, 1 << 22)
+            let levels = checkerboard(simulated, response, middle, std::f32::consts::FRAC_PI_2);
+            bright.photograph(levels.view(), middle, z_m, 1 << 22)
         })
         .collect();
     write_pair(&folder.join("black.png"), &photos?)
@@ -446,8 +458,9 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
         ..Encoding::DoublePhase.into()
     };
     let plan = DisplayPlan::new(shape, target, &options)?;
-    let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
-    let mut levels = Array3::zeros((3, h, w));
+    let colours = target.display.colours();
+    let mut field = Array3::from_elem((colours, h, w), Complex32::new(0.4, 0.0));
+    let mut levels = Array3::zeros((colours, h, w));
     plan.modulate(
         None,
         field.as_slice_mut().expect("standard layout"),
@@ -464,8 +477,9 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
 /// Draws the laser's map and its error.
 fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) -> Result<()> {
     let (_, rows, columns) = map.dim();
+    let names = colours(simulated.display());
     let (h, w) = (simulated.display().height(), simulated.display().width());
-    let maps: Vec<Map> = (0..3)
+    let maps: Vec<Map> = (0..names.len())
         .flat_map(|colour| {
             let found = map.index_axis(Axis(0), colour).to_owned();
             let truth = Array2::from_shape_fn((rows, columns), |(i, j)| {
@@ -476,11 +490,11 @@ fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) ->
             let off = &found / most(&found) - &truth / most(&truth);
             [
                 Map {
-                    title: format!("{}: laser amplitude", COLOURS[colour]),
+                    title: format!("{}: laser amplitude", names[colour]),
                     values: found,
                 },
                 Map {
-                    title: format!("{}: off the truth", COLOURS[colour]),
+                    title: format!("{}: off the truth", names[colour]),
                     values: off,
                 },
             ]
@@ -488,7 +502,7 @@ fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) ->
         .collect();
     let (amplitudes, off): (Vec<_>, Vec<_>) = maps.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
     let all: Vec<Map> = amplitudes.into_iter().chain(off).map(|(_, map)| map).collect();
-    chart::write_maps(&folder.join("laser.svg"), &all, 3)
+    chart::write_maps(&folder.join("laser.svg"), &all, names.len())
 }
 
 /// Returns the middle of a photograph.

@@ -27,8 +27,8 @@ use std::f64::consts::{PI, TAU};
 /// varies over the panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curves {
-    /// The mean phase of level 255 over the panel for red, green and blue, in units of 2π.
-    pub range: [f64; 3],
+    /// The mean phase of level 255 over the panel for each colour, in units of 2π.
+    pub range: Vec<f64>,
     /// The maximum relative variation of the range over the panel.
     pub unevenness: f64,
     /// The S shape: 0 for straight, below 1.
@@ -115,12 +115,17 @@ impl SimulatedDisplay {
             stray: 2e-4,
             bits: 12,
         };
+        // Liquid crystal delays all light by about the same path.
+        let range = match display.wavelengths_m() {
+            [laser_m] => vec![1.22 * 520e-9 / laser_m],
+            _ => vec![1.06, 1.22, 1.38],
+        };
         let beam = [dice.range(0.42, 0.58), dice.range(0.42, 0.58), 1.1];
         Ok(SimulatedDisplay {
             display: display.clone(),
             seed,
             curves: Curves {
-                range: [1.06, 1.22, 1.38],
+                range,
                 unevenness: 0.1,
                 steepness: 0.35,
                 bend: 0.15,
@@ -193,7 +198,7 @@ impl SimulatedDisplay {
         let intervals = per_pixel::MAX_INTERVALS;
         let (rows, columns) = per_pixel::nodes(height, width, spacing);
         let (mut levels, mut turns) = (Vec::new(), Vec::new());
-        for node in 0..3 * rows * columns {
+        for node in 0..self.display.colours() * rows * columns {
             let (colour, i, j) = (node / (rows * columns), node / columns % rows, node % columns);
             let curve = std::array::from_fn(|level| self.phase(colour, i * spacing, j * spacing, level as f64) as f32);
             let phase = |k: usize| k as f32 / intervals as f32 * std::f32::consts::TAU;
@@ -214,7 +219,7 @@ impl SimulatedDisplay {
         let w = self.display.width() as f64;
         let [cx, cy, radius] = self.beam;
         // Three beams are never perfectly coaxial.
-        let cx = cx + 0.03 * (colour as f64 - 1.0);
+        let cx = cx + 0.03 * (colour as f64 - (self.display.colours() / 2) as f64);
         let dx = (x + 0.5) / w - cx;
         let dy = (y + 0.5 - cy * self.display.height() as f64) / w;
         (-(dx * dx + dy * dy) / (radius * radius)).exp()

@@ -8,6 +8,7 @@ use phasefront::target::{Aberration, Response};
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use phasefront_calibration::camera::pattern::Pattern;
 use phasefront_calibration::camera::photograph::Photograph;
+use phasefront_calibration::colours;
 use phasefront_calibration::curves::lut::{self, Curves, Problem, Refusal, What};
 use phasefront_calibration::rehearse;
 use phasefront_calibration::simulated_display::{self, SimulatedDisplay};
@@ -44,7 +45,8 @@ fn measured_by(simulated: &SimulatedDisplay, colour: usize, pattern: Pattern) ->
             .photograph(pattern.frame(k as u8).view(), colour, 0.0, k as u64)
             .unwrap())
     };
-    lut::measure(&pattern, colour, &shoot, dir.path(), &|_, _| {}).unwrap()
+    let name = colours(&display())[colour];
+    lut::measure(&pattern, name, &shoot, dir.path(), &|_, _| {}).unwrap()
 }
 
 /// Computes the phase error according to the display's true curves.
@@ -65,7 +67,7 @@ fn per_pixel_calibration_brings_phases_and_black_back() {
             phase_error(&simulated, &factory, colour),
             phase_error(&simulated, &calibrated, colour),
         );
-        let errors = lut::errors(curves, &table);
+        let errors = lut::errors(curves, colour, &table);
         let (grey, black) = (
             rehearse::black_level(&simulated, &factory, colour).unwrap(),
             rehearse::black_level(&simulated, &calibrated, colour).unwrap(),
@@ -88,7 +90,7 @@ fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
     for (range, under_pi, dark) in [(0.8, false, 128), (0.45, true, 255)] {
         let simulated = simulated();
         let short = simulated_display::Curves {
-            range: [range; 3],
+            range: vec![range; 3],
             ..simulated.curves().clone()
         };
         let simulated = simulated.with_curves(short);
@@ -119,7 +121,7 @@ fn told(change: impl Fn(usize, Photograph) -> Result<Photograph, What>) -> Vec<P
         let levels = pattern.frame(k as u8);
         change(k, simulated.photograph(levels.view(), 1, 0.0, k as u64).unwrap())
     };
-    match lut::measure(&pattern, 1, &shoot, dir.path(), &|_, _| {}) {
+    match lut::measure(&pattern, "green", &shoot, dir.path(), &|_, _| {}) {
         Err(Refusal::Problems(problems)) => problems,
         other => panic!("{other:?}"),
     }
@@ -199,7 +201,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
         }
         Ok(photo)
     };
-    let curves = lut::measure(&pattern, 1, &shoot, dir.path(), &|_, _| {}).unwrap();
+    let curves = lut::measure(&pattern, "green", &shoot, dir.path(), &|_, _| {}).unwrap();
     assert!((1..=16).contains(&curves.silent.len()), "{:?}", curves.silent);
     for (y, x) in &curves.silent {
         assert!(y.abs_diff(SIZE.0 / 2) < 8 && x.abs_diff(SIZE.1 / 2) < 8);
@@ -220,7 +222,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
         photo.values[end..].copy_from_slice(&marked.values[end..]);
         Ok(photo)
     };
-    match lut::measure(&pattern, 1, &flat, dir.path(), &|_, _| {}) {
+    match lut::measure(&pattern, "green", &flat, dir.path(), &|_, _| {}) {
         Err(Refusal::Other(e)) => assert!(e.to_string().contains("do not answer"), "{e}"),
         other => panic!("{other:?}"),
     }

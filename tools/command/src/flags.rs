@@ -34,13 +34,19 @@ impl DisplayFlags {
 
     /// Reads the display for a command that supports only red, green and blue, and no offset.
     pub fn read_of_midpoint(&self) -> Result<DisplayFile> {
+        self.read_without_offset()?;
+        self.read_of_three()
+    }
+
+    /// Reads the display for a command that supports no offset.
+    pub fn read_without_offset(&self) -> Result<DisplayFile> {
         check_used(&[(
             "--offset-mm",
             self.offset_mm.is_some(),
             false,
             "holograms at the modulator",
         )])?;
-        self.read_of_three()
+        self.read()
     }
 
     /// Reads the display for a command that supports only red, green and blue.

@@ -6,7 +6,6 @@
 //! pixel and pattern (1 GB for 1920×1080). The fits read rows of it, pattern by pattern. The curves take 48 bytes per
 //! pixel.
 
-use crate::COLOURS;
 use crate::camera::marks::{NoMarks, Registration};
 use crate::camera::pattern::{PATTERNS, Pattern};
 use crate::camera::photograph::{Photograph, SATURATED_SHARE};
@@ -39,8 +38,8 @@ pub const SILENT_SHARE: f64 = 0.01;
 /// A problem with one photograph, with advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// The colour, from 0 for red to 2 for blue.
-    pub colour: usize,
+    /// The name of the colour.
+    pub colour: &'static str,
     /// The pattern that the photograph should show.
     pub pattern: usize,
     /// The kind of problem.
@@ -70,34 +69,34 @@ pub enum What {
 
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (colour, k) = (COLOURS[self.colour], self.pattern);
-        write!(f, "{colour}/capture_{k:03}: ")?;
-        match &self.what {
-            What::Missing => write!(
-                f,
-                "is missing; photograph pattern_{k:03}.png and name it capture_{k:03}.png or .tif"
-            ),
-            What::Unreadable(why) => write!(f, "{why}; photograph pattern_{k:03}.png again"),
-            What::Size([h, w], [first_h, first_w]) => write!(
-                f,
-                "is {w}×{h}, others are {first_w}×{first_h}; photograph all with one setting of the camera"
-            ),
-            What::Saturated(share) => write!(
-                f,
+        let (colour, k) = (self.colour, self.pattern);
+        write!(f, "{colour}/capture_{k:03}: {}", self.what.told(k))
+    }
+}
+
+impl What {
+    /// Describes the problem of a photograph of pattern `k`, with advice.
+    pub fn told(&self, k: usize) -> String {
+        match self {
+            What::Missing => {
+                format!("is missing; photograph pattern_{k:03}.png and name it capture_{k:03}.png or .tif")
+            }
+            What::Unreadable(why) => format!("{why}; photograph pattern_{k:03}.png again"),
+            What::Size([h, w], [first_h, first_w]) => {
+                format!("is {w}×{h}, others are {first_w}×{first_h}; photograph all with one setting of the camera")
+            }
+            What::Saturated(share) => format!(
                 "{:.1} % of its pixels are saturated; shorten the exposure and photograph all patterns again",
                 share * 100.0
             ),
-            What::NoMarks(why) => write!(f, "{why}"),
-            What::Shows(other) => write!(
-                f,
-                "shows pattern {other:03}; name the captures in the order of the patterns"
-            ),
-            What::NoCode => write!(
-                f,
+            What::NoMarks(why) => why.to_string(),
+            What::Shows(other) => {
+                format!("shows pattern {other:03}; name the captures in the order of the patterns")
+            }
+            What::NoCode => format!(
                 "its code cannot be read: blurred, too dark, or changed while it was taken; photograph pattern_{k:03}.png again"
             ),
-            What::Shifted([x, y]) => write!(
-                f,
+            What::Shifted([x, y]) => format!(
                 "is shifted by ({x:+.1}, {y:+.1}) pixels against the others; fix camera and display, and photograph all patterns again"
             ),
         }
@@ -123,7 +122,7 @@ impl From<Error> for Refusal {
 pub type Source<'a> = &'a dyn Fn(usize) -> std::result::Result<Photograph, What>;
 
 /// Returns the file of the photograph of pattern `k` in `folder`: `capture_000.png`, `.tif` or `.tiff`.
-fn capture_path(folder: &Path, k: usize) -> Option<PathBuf> {
+pub fn capture_path(folder: &Path, k: usize) -> Option<PathBuf> {
     ["png", "tif", "tiff", "PNG", "TIF", "TIFF"]
         .iter()
         .map(|extension| folder.join(format!("capture_{k:03}.{extension}")))
@@ -191,8 +190,8 @@ impl Stack {
 /// The phase curves of one colour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curves {
-    /// The colour, from 0 for red to 2 for blue.
-    pub colour: usize,
+    /// The name of the colour.
+    pub colour: &'static str,
     /// The coefficients of [`Basis`] for each pixel, (H, W). Pixels without a curve are NaN.
     pub coefficients: Array2<[f32; COEFFICIENTS]>,
     /// The residual of each fit, (H, W), relative to the light's amplitude. Pixels without a curve are NaN.
@@ -217,7 +216,7 @@ pub struct Curves {
 /// unresponsive.
 pub fn measure(
     pattern: &Pattern,
-    colour: usize,
+    colour: &'static str,
     source: Source<'_>,
     spool: &Path,
     progress: &dyn Fn(usize, usize),
@@ -226,7 +225,7 @@ pub fn measure(
     let work = PATTERNS + height;
     let mut problems = Vec::new();
     let mut stack = Stack::new(spool, (height, width))?;
-    let mut first: Option<([usize; 2], Registration, f32)> = None;
+    let (mut checks, mut dark) = (Checks::default(), None);
     for k in 0..PATTERNS {
         let mut add = |what| {
             problems.push(Problem {
@@ -237,12 +236,10 @@ pub fn measure(
         };
         match source(k) {
             Err(what) => add(what),
-            Ok(photograph) => match checked(&photograph, pattern, k, first.as_ref()) {
+            Ok(photograph) => match checks.check(&photograph, pattern, k) {
                 Err(what) => add(what),
                 Ok(registration) => {
-                    let dark = registration.surroundings(&photograph, (height, width));
-                    let size = [photograph.height, photograph.width];
-                    let (_, registration, _) = first.get_or_insert((size, registration, dark));
+                    dark.get_or_insert_with(|| registration.surroundings(&photograph, (height, width)));
                     if problems.is_empty() {
                         stack.push(&registration.resample(&photograph, (height, width)))?;
                     }
@@ -251,7 +248,7 @@ pub fn measure(
         }
         progress(k + 1, work);
     }
-    let (Some((_, registration, dark)), true) = (first, problems.is_empty()) else {
+    let (Some((_, registration)), Some(dark), true) = (checks.first, dark, problems.is_empty()) else {
         return Err(Refusal::Problems(problems));
     };
     let mut curves = fitted(pattern, colour, stack, dark, &|row| {
@@ -261,36 +258,47 @@ pub fn measure(
     Ok(curves)
 }
 
-/// Checks a photograph against the first one.
-fn checked(
-    photograph: &Photograph,
-    pattern: &Pattern,
-    k: usize,
-    first: Option<&([usize; 2], Registration, f32)>,
-) -> std::result::Result<Registration, What> {
-    let size = [photograph.height, photograph.width];
-    if let Some((others, _, _)) = first
-        && *others != size
-    {
-        return Err(What::Size(size, *others));
-    }
-    let share = photograph.saturated();
-    if share > SATURATED_SHARE {
-        return Err(What::Saturated(share));
-    }
-    let registration = Registration::find(photograph, pattern).map_err(What::NoMarks)?;
-    match registration.code(photograph, pattern) {
-        None => return Err(What::NoCode),
-        Some(code) if usize::from(code) != k => return Err(What::Shows(code)),
-        _ => {}
-    }
-    if let Some((_, first, _)) = first {
+/// The checks of photographs against the first good one.
+#[derive(Debug, Default)]
+pub struct Checks {
+    /// Its size, (H, W), and where it shows the modulator.
+    first: Option<([usize; 2], Registration)>,
+}
+
+impl Checks {
+    /// Checks a photograph of pattern `k`. Returns where the first good photograph shows the modulator.
+    ///
+    /// # Errors
+    /// Returns the problem of a photograph that cannot be used.
+    pub fn check(
+        &mut self,
+        photograph: &Photograph,
+        pattern: &Pattern,
+        k: usize,
+    ) -> std::result::Result<Registration, What> {
+        let size = [photograph.height, photograph.width];
+        if let Some((others, _)) = self.first
+            && others != size
+        {
+            return Err(What::Size(size, others));
+        }
+        let share = photograph.saturated();
+        if share > SATURATED_SHARE {
+            return Err(What::Saturated(share));
+        }
+        let registration = Registration::find(photograph, pattern).map_err(What::NoMarks)?;
+        match registration.code(photograph, pattern) {
+            None => return Err(What::NoCode),
+            Some(code) if usize::from(code) != k => return Err(What::Shows(code)),
+            _ => {}
+        }
+        let (_, first) = self.first.get_or_insert((size, registration));
         let [x, y] = first.shift(&registration);
         if x.hypot(y) > MOST_SHIFT * first.zoom {
             return Err(What::Shifted([x, y]));
         }
+        Ok(*first)
     }
-    Ok(registration)
 }
 
 /// The result for one pixel.
@@ -301,7 +309,13 @@ struct Pixel {
     passed_minimum: bool,
 }
 
-fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progress: &dyn Fn(usize)) -> Result<Curves> {
+fn fitted(
+    pattern: &Pattern,
+    colour: &'static str,
+    mut stack: Stack,
+    dark: f32,
+    progress: &dyn Fn(usize),
+) -> Result<Curves> {
     let (height, width) = pattern.shape();
     let basis = Basis::new();
     let none = [f32::NAN; COEFFICIENTS];
@@ -367,8 +381,7 @@ fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progres
     if silent.len() as f64 > SILENT_SHARE * measured as f64 {
         let (y, x) = silent[silent.len() / 2];
         return Err(Error::Input(format!(
-            "{}: {} of {measured} pixels do not answer to their level, one of them ({x}, {y}); focus on the modulator, light all of it, turn its polarisation, and let the camera's tone curve be linear",
-            COLOURS[colour],
+            "{colour}: {} of {measured} pixels do not answer to their level, one of them ({x}, {y}); focus on the modulator, light all of it, turn its polarisation, and let the camera's tone curve be linear",
             silent.len()
         )));
     }
@@ -412,12 +425,15 @@ pub fn spacing(height: usize, width: usize) -> usize {
     height.max(width).div_ceil(NODES)
 }
 
-/// Computes the compact table from the curves of red, green and blue. The nodes' curves lie on a smooth surface through
+/// Computes the compact table from the curves of all colours. The nodes' curves lie on a smooth surface through
 /// the pixels' curves ([`surface`]), which also suppresses the noise of single pixels and bridges marks and dust.
 ///
 /// # Errors
 /// Returns an error if the shapes differ or a colour has no curves.
-pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
+///
+/// # Panics
+/// Panics if `curves` is empty.
+pub fn compact(curves: &[Curves]) -> Result<PerPixel> {
     let (height, width) = curves[0].shape();
     if curves.iter().any(|c| c.shape() != (height, width)) {
         return Err(Error::Input("curves of modulators of different sizes".into()));
@@ -427,7 +443,7 @@ pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
     let (mut levels, mut turns) = (Vec::new(), Vec::new());
     for curves in curves {
         let nodes = surface::fit(curves.coefficients.view(), spacing)
-            .ok_or_else(|| Error::Input(format!("{}: no pixel has a curve", COLOURS[curves.colour])))?;
+            .ok_or_else(|| Error::Input(format!("{}: no pixel has a curve", curves.colour)))?;
         for coefficients in &nodes {
             let mut highest = 0.0f32;
             // A curve could decrease where the surface is extrapolated beyond the pixels.
@@ -466,12 +482,12 @@ pub struct Errors {
     pub between_most: f64,
 }
 
-/// Computes the phase errors of the tables for one colour, where its measured curves reach the phase. It tests every
-/// fourth of 256 phase steps.
-pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
+/// Computes the phase errors of the tables for the colour at `index` of the table, where its measured curves reach the
+/// phase. It tests every fourth of 256 phase steps.
+pub fn errors(curves: &Curves, index: usize, table: &PerPixel) -> Errors {
     let (height, width) = curves.shape();
     let basis = Basis::new();
-    let plane = curves.colour * height * width;
+    let plane = index * height * width;
     let apart = |a: f32, b: f32| {
         let d = (a - b).rem_euclid(TAU);
         f64::from(d.min(TAU - d))
@@ -539,12 +555,12 @@ pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
     }
 }
 
-/// Writes the full table of one colour, uint8 (H, W, 256), to `file` as .npy: the level of each of 256 phase steps for
-/// each pixel. Pixels without a curve use the levels of `table`.
+/// Writes the full table of the colour at `index` of `table`, uint8 (H, W, 256), to `file` as .npy: the level of each of
+/// 256 phase steps for each pixel. Pixels without a curve use the levels of `table`.
 ///
 /// # Errors
 /// Returns an error if writing fails.
-pub fn write_full(curves: &Curves, table: &PerPixel, file: &mut dyn Write) -> std::io::Result<()> {
+pub fn write_full(curves: &Curves, index: usize, table: &PerPixel, file: &mut dyn Write) -> std::io::Result<()> {
     let (height, width) = curves.shape();
     let mut header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({height}, {width}, {LEVELS}), }}");
     // Magic, version and length take 10 bytes. The total length is a multiple of 64 and ends with a line break.
@@ -555,7 +571,7 @@ pub fn write_full(curves: &Curves, table: &PerPixel, file: &mut dyn Write) -> st
     file.write_all(&(header.len() as u16).to_le_bytes())?;
     file.write_all(header.as_bytes())?;
     let basis = Basis::new();
-    let plane = curves.colour * height * width;
+    let plane = index * height * width;
     for y in 0..height {
         let row: Vec<[u8; LEVELS]> = (0..width)
             .into_par_iter()

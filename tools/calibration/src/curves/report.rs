@@ -1,6 +1,5 @@
 //! Numerical reports and charts of calibrated curves.
 
-use crate::COLOURS;
 use crate::curves::chart::{self, Curve, Map, Panel};
 use crate::curves::curve::{self, Basis, LEVELS};
 use crate::curves::lut::{self, Curves, Errors};
@@ -14,7 +13,7 @@ use std::path::Path;
 /// The results for one colour.
 #[derive(Debug, Clone, Serialize)]
 pub struct ColourReport {
-    /// The name of the colour: "red", "green" or "blue".
+    /// The name of the colour: "red", "green", "blue" or "laser".
     pub colour: &'static str,
     /// The phase of level 255, in units of 2π: minimum, median and maximum over the modulator.
     pub range_turns: [f32; 3],
@@ -34,10 +33,10 @@ pub struct ColourReport {
     pub errors_rad: Errors,
 }
 
-/// The results for all three colours and their table.
+/// The results for all colours and their table.
 #[derive(Debug, Clone, Serialize)]
 pub struct LutReport {
-    /// The results for red, green and blue.
+    /// The results for each colour.
     pub colours: Vec<ColourReport>,
     /// The size of the compact table's file, in bytes.
     pub table_bytes: usize,
@@ -50,14 +49,14 @@ pub struct LutReport {
 }
 
 /// Computes the report for these curves and their table.
-pub fn report(curves: &[Curves; 3], table: &PerPixel) -> LutReport {
-    let colours = curves.iter().map(|curves| {
+pub fn report(curves: &[Curves], table: &PerPixel) -> LutReport {
+    let colours = curves.iter().enumerate().map(|(index, curves)| {
         let ranges = curves.ranges();
         let under = ranges.partition_point(|r| *r < 1.0);
         let residuals = curves.residual.iter().filter(|r| !r.is_nan());
         let (sum, count) = residuals.fold((0.0, 0.0), |(s, n), r| (s + f64::from(r * r), n + 1.0));
         ColourReport {
-            colour: COLOURS[curves.colour],
+            colour: curves.colour,
             range_turns: [ranges[0], ranges[ranges.len() / 2], ranges[ranges.len() - 1]],
             under_two_pi: under as f64 / ranges.len() as f64,
             under_pi: curves.under_pi,
@@ -65,14 +64,14 @@ pub fn report(curves: &[Curves; 3], table: &PerPixel) -> LutReport {
             silent_at: curves.silent.iter().take(20).map(|(y, x)| [*x, *y]).collect(),
             residual: (sum / f64::max(count, 1.0)).sqrt(),
             zoom: curves.zoom,
-            errors_rad: lut::errors(curves, table),
+            errors_rad: lut::errors(curves, index, table),
         }
     });
     let (height, width) = table.shape();
     LutReport {
         colours: colours.collect(),
         table_bytes: table.to_bytes().len(),
-        full_bytes: 3 * height * width * LEVELS,
+        full_bytes: curves.len() * height * width * LEVELS,
         spacing: table.spacing(),
         intervals: table.intervals(),
     }
@@ -115,11 +114,11 @@ impl LutReport {
 ///
 /// # Errors
 /// Returns an error if a file cannot be written.
-pub fn draw(curves: &[Curves; 3], folder: &Path) -> Result<()> {
+pub fn draw(curves: &[Curves], folder: &Path) -> Result<()> {
     let basis = Basis::new();
     let (mut fits, mut residuals, mut maps) = (Vec::new(), Vec::new(), Vec::new());
     for curves in curves {
-        let name = COLOURS[curves.colour];
+        let name = curves.colour;
         let along = |values: &[f32]| -> Vec<(f64, f64)> {
             (values.iter().enumerate())
                 .map(|(k, v)| (k as f64, f64::from(*v)))
@@ -167,11 +166,12 @@ pub fn draw(curves: &[Curves; 3], folder: &Path) -> Result<()> {
     }
     for curves in curves {
         maps.push(Map {
-            title: format!("{}: residual", COLOURS[curves.colour]),
+            title: format!("{}: residual", curves.colour),
             values: curves.residual.clone(),
         });
     }
-    chart::write_curves(&folder.join("curves.svg"), &fits, 3)?;
-    chart::write_curves(&folder.join("residuals.svg"), &residuals, 3)?;
-    chart::write_maps(&folder.join("maps.svg"), &maps, 3)
+    let across = curves.len();
+    chart::write_curves(&folder.join("curves.svg"), &fits, across)?;
+    chart::write_curves(&folder.join("residuals.svg"), &residuals, across)?;
+    chart::write_maps(&folder.join("maps.svg"), &maps, across)
 }

@@ -12,6 +12,7 @@ mod ldi;
 mod skip;
 
 mod calibrate_command;
+mod capture;
 mod command;
 mod devices;
 mod doctor;

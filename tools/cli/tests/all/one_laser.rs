@@ -329,8 +329,8 @@ fn what_is_not_for_one_laser_is_one_line() {
             "one laser",
         ),
         (
-            "calibrate lut --patterns n --display one.toml".into(),
-            "for displays of three lasers",
+            "calibrate aberration n --z-mm 1 --colour red --display one.toml -o n.toml".into(),
+            "the display has one laser; leave it out",
         ),
     ] {
         let errors = folder.fails(&call.split(' ').collect::<Vec<_>>(), 1);

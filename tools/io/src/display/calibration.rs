@@ -131,12 +131,26 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Returns the coefficients of one colour.
+    /// Creates an entry without an aberration for a display of `colours` lasers, 3 or 1.
+    pub fn flat(z_mm: f64, place: Option<[f64; 2]>, colours: usize) -> Self {
+        Entry {
+            z_mm,
+            x: place.map(|p| p[0]),
+            y: place.map(|p| p[1]),
+            red: [0.0; 5],
+            green: [0.0; 5],
+            blue: [0.0; 5],
+            laser: (colours == 1).then_some([0.0; 5]),
+        }
+    }
+
+    /// Returns the coefficients of one colour; the only ones for one laser.
     pub fn colour_mut(&mut self, colour: usize) -> &mut Coefficients {
-        match colour {
-            0 => &mut self.red,
-            1 => &mut self.green,
-            _ => &mut self.blue,
+        match (&mut self.laser, colour) {
+            (Some(laser), _) => laser,
+            (None, 0) => &mut self.red,
+            (None, 1) => &mut self.green,
+            (None, _) => &mut self.blue,
         }
     }
 

@@ -1,0 +1,274 @@
+//! Photographs by a program of the user, which drives the modulator and the camera.
+//!
+//! For each photograph, the program reads a line of JSON from its standard input ([`Request`]), shows the levels of the
+//! PNG `show`, and writes the photograph to `photo`, a PNG. Then it writes a line to its standard output: `{"done": …}`
+//! with any settings, for example the exposure, or `{"error": "the reason"}`. Settings come back with later requests,
+//! also in another run. Other lines are messages for the user. The program ends when its input ends.
+//!
+//! A photograph that fails its check is asked for again. Only one that passes gets its name, so that a run that was cut
+//! off can be resumed.
+
+use crate::camera::photograph::Photograph;
+use ndarray::ArrayView2;
+use phasefront_io::{Error, Result};
+use serde::Serialize;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// The name of the photograph that is not checked yet.
+const INCOMING: &str = "incoming.png";
+/// The name of the levels that are shown.
+const SHOWN: &str = "show.png";
+/// The name of the program's settings.
+const SETTINGS: &str = "settings.json";
+/// The time that the program has to end after its input ended.
+const LAST: Duration = Duration::from_secs(5);
+
+/// One request to the program.
+#[derive(Debug, Clone, Serialize)]
+struct Request<'a> {
+    /// The levels to show, a grey PNG with one pixel for each pixel of the modulator.
+    show: &'a Path,
+    /// The photograph to write.
+    photo: &'a Path,
+    /// The name of the laser to switch on: red, green, blue or laser.
+    colour: &'a str,
+    wavelength_nm: f64,
+    /// The z that the camera focuses on.
+    z_mm: f64,
+    /// Whether the exposure may change. Otherwise it is that of the photograph before.
+    expose: bool,
+    /// What the program answered to an earlier request for the same folder.
+    settings: Option<&'a Value>,
+    /// The reason why the photograph before was not good enough.
+    again: Option<&'a str>,
+}
+
+/// A photograph to take.
+#[derive(Debug, Clone, Copy)]
+pub struct Shot<'a> {
+    /// The levels to show, (H, W).
+    pub levels: ArrayView2<'a, u8>,
+    /// The name of the laser's colour.
+    pub colour: &'a str,
+    /// The wavelength of the laser, in metres.
+    pub wavelength_m: f64,
+    /// The z that the camera focuses on, in metres.
+    pub z_m: f64,
+    /// Whether the exposure may change.
+    pub may_expose: bool,
+}
+
+/// A running program.
+#[derive(Debug)]
+pub struct CaptureProgram {
+    name: String,
+    child: Child,
+    input: Option<ChildStdin>,
+    lines: Receiver<String>,
+    tries: usize,
+    timeout: Duration,
+}
+
+impl CaptureProgram {
+    /// Starts `command`, its name and its arguments. A photograph is asked for at most `tries` times, and may take as
+    /// long as `timeout`.
+    ///
+    /// # Errors
+    /// Returns an error if the program cannot be started.
+    pub fn start(command: &[String], tries: usize, timeout: Duration) -> Result<Self> {
+        let refuse = |why: String| Error::Input(format!("--capture {}: {why}", command.join(" ")));
+        let [program, arguments @ ..] = command else {
+            return Err(refuse("names no program".into()));
+        };
+        let mut child = Command::new(program)
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|e| refuse(format!("cannot be started: {e}")))?;
+        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+            return Err(refuse("has no standard input and output".into()));
+        };
+        let (sender, lines) = channel();
+        // Ends when the program closes its output.
+        std::thread::spawn(move || {
+            for line in BufReader::new(output).lines().map_while(std::result::Result::ok) {
+                if sender.send(line).is_err() {
+                    return;
+                }
+            }
+        });
+        Ok(CaptureProgram {
+            name: program.clone(),
+            child,
+            input: Some(input),
+            lines,
+            tries,
+            timeout,
+        })
+    }
+
+    /// Takes a photograph that passes `check`, writes it to `path`, and returns what `check` returned. `check` gives
+    /// the reason, in one line, why a photograph is not good enough.
+    ///
+    /// # Errors
+    /// Returns an error if the last photograph asked for is not good enough, if the program reports an error that often,
+    /// ends or takes too long, or if a file cannot be written.
+    pub fn take<T>(
+        &mut self,
+        shot: &Shot<'_>,
+        path: &Path,
+        mut check: impl FnMut(&Path) -> std::result::Result<T, String>,
+    ) -> Result<T> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
+        let (show, photo, kept) = (folder.join(SHOWN), folder.join(INCOMING), folder.join(SETTINGS));
+        write_levels(shot.levels, &show)?;
+        let mut settings = read_settings(&kept)?;
+        let mut again: Option<String> = None;
+        for _ in 0..self.tries {
+            remove(&photo)?;
+            let request = Request {
+                show: &show,
+                photo: &photo,
+                colour: shot.colour,
+                wavelength_nm: (shot.wavelength_m * 1e15).round() / 1e6,
+                z_mm: (shot.z_m * 1e9).round() / 1e6,
+                expose: shot.may_expose,
+                settings: settings.as_ref(),
+                again: again.as_deref(),
+            };
+            let why = match self.ask(&request)? {
+                Err(why) => why,
+                Ok(done) => match check(&photo) {
+                    Ok(result) => {
+                        if done.is_object() && settings.as_ref() != Some(&done) {
+                            phasefront_io::output::write_atomically(&kept, |file| writeln!(file, "{done}"))?;
+                        }
+                        std::fs::rename(&photo, path).map_err(|e| Error::file(path, e))?;
+                        remove(&show)?;
+                        return Ok(result);
+                    }
+                    Err(why) => {
+                        settings = Some(done).filter(Value::is_object).or(settings);
+                        why
+                    }
+                },
+            };
+            log::warn!("{}: {why}", path.display());
+            again = Some(why);
+        }
+        let why = again.unwrap_or_default();
+        Err(Error::file(
+            path,
+            format!(
+                "{why}; no good photograph in {} tries; those before are kept, and the same command resumes",
+                self.tries
+            ),
+        ))
+    }
+
+    /// Sends a request and returns the settings of the answer or its error.
+    fn ask(&mut self, request: &Request<'_>) -> Result<std::result::Result<Value, String>> {
+        let line = serde_json::to_string(request).map_err(|e| Error::Input(e.to_string()))?;
+        let sent = self.input.as_mut().map(|input| {
+            writeln!(input, "{line}")?;
+            input.flush()
+        });
+        if !matches!(sent, Some(Ok(()))) {
+            return Err(self.ended());
+        }
+        let end = Instant::now() + self.timeout;
+        loop {
+            let line = match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok(line) => line,
+                Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
+                Err(RecvTimeoutError::Timeout) => {
+                    let seconds = self.timeout.as_secs_f64();
+                    // It hangs, and would not notice the end of its input.
+                    let _ = self.child.kill();
+                    return Err(self.refuse(&format!(
+                        "no answer in {seconds} seconds; --capture-timeout-s gives it more"
+                    )));
+                }
+            };
+            let answer = serde_json::from_str::<Value>(&line).unwrap_or_default();
+            if let Some(done) = answer.get("done") {
+                return Ok(Ok(done.clone()));
+            }
+            if let Some(why) = answer.get("error") {
+                let why = why.as_str().map_or_else(|| why.to_string(), str::to_owned);
+                return Ok(Err(why.lines().collect::<Vec<_>>().join(" ")));
+            }
+            log::info!("{}: {line}", self.name);
+        }
+    }
+
+    fn refuse(&self, why: &str) -> Error {
+        Error::Input(format!("--capture {}: {why}", self.name))
+    }
+
+    fn ended(&mut self) -> Error {
+        self.input = None;
+        let status = self.finish();
+        self.refuse(&format!("it ended ({status}); what was taken is kept"))
+    }
+
+    /// Waits for the program's end, or ends it, and describes its status.
+    fn finish(&mut self) -> String {
+        let end = Instant::now() + LAST;
+        while Instant::now() < end {
+            match self.child.try_wait() {
+                Ok(None) => std::thread::sleep(Duration::from_millis(10)),
+                Ok(Some(status)) => return status.to_string(),
+                Err(e) => return e.to_string(),
+            }
+        }
+        let ended = self.child.kill().and_then(|()| self.child.wait());
+        ended.map_or_else(|e| e.to_string(), |status| status.to_string())
+    }
+}
+
+impl Drop for CaptureProgram {
+    fn drop(&mut self) {
+        self.input = None;
+        self.finish();
+    }
+}
+
+/// Writes levels, (H, W), as a grey PNG of 8 bits.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write_levels(levels: ArrayView2<'_, u8>, path: &Path) -> Result<()> {
+    let (height, width) = levels.dim();
+    let photograph = Photograph {
+        height,
+        width,
+        values: levels.iter().map(|level| u16::from(*level)).collect(),
+        full: 255,
+    };
+    photograph.write(path)
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::file(path, e)),
+        _ => Ok(()),
+    }
+}
+
+fn read_settings(path: &Path) -> Result<Option<Value>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = phasefront_io::input::text(path)?;
+    serde_json::from_str(&text)
+        .map(Some)
+        .map_err(|e| Error::file(path, format!("{e}; remove the file")))
+}

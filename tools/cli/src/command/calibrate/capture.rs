@@ -1,0 +1,34 @@
+//! The flags for photographs by a program of the user.
+
+use clap::Args;
+use phasefront_calibration::camera::program::CaptureProgram;
+use phasefront_io::{Error, Result};
+use std::time::Duration;
+
+/// A program that shows patterns and photographs them.
+#[derive(Args)]
+pub(super) struct CaptureFlags {
+    /// Program that shows each pattern and photographs it, with its arguments; comes last (docs/calibration.md)
+    #[arg(long, value_name = "COMMAND", num_args = 1.., allow_hyphen_values = true)]
+    capture: Option<Vec<String>>,
+    /// How often --capture is asked for a photograph until it is good
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
+    capture_tries: u8,
+    /// Seconds that --capture has for a photograph
+    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    capture_timeout_s: f64,
+}
+
+impl CaptureFlags {
+    pub(super) fn is_given(&self) -> bool {
+        self.capture.is_some()
+    }
+
+    /// Starts the program, if one is given.
+    pub(super) fn start(&self) -> Result<Option<CaptureProgram>> {
+        let timeout = Duration::try_from_secs_f64(self.capture_timeout_s)
+            .map_err(|e| Error::Input(format!("--capture-timeout-s {}: {e}", self.capture_timeout_s)))?;
+        let start = |command: &Vec<String>| CaptureProgram::start(command, self.capture_tries.into(), timeout);
+        self.capture.as_ref().map(start).transpose()
+    }
+}
