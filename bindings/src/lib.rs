@@ -32,7 +32,9 @@ pub use hologram::{HologramInfo, RawHologram, RawImage, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use modulator::RawModulator;
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
-pub use options::{Brightness, EncoderOptions, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, session_options};
+pub use options::{
+    Brightness, EncoderOptions, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, session_options,
+};
 pub use phasefront::input::{ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix};
 pub use phasefront::output::{Layout, Placement};
 pub use phasefront::session::{Backend, Thermal};

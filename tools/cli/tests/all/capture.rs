@@ -4,7 +4,8 @@ use crate::folder;
 
 use folder::Folder;
 use phasefront_calibration::camera::photograph::Photograph;
-use phasefront_io::{metrics, picture};
+use phasefront_core::optics::metrics;
+use phasefront_io::picture;
 use std::fs;
 use std::path::Path;
 
