@@ -91,6 +91,83 @@ class DepthFormat(enum.Enum):
     NORMALIZED_U8 = 6
     NORMALIZED_U16 = 7
 
+class Encoding:
+    """The conversion of a field to phases.
+
+    One of:
+        DOUBLE_PHASE: Double phase of the unchanged field.
+        ANTI_ALIAS: Double phase after a small Gaussian blur (AA-DPM).
+        BAND_LIMIT: Double phase after a filter that removes high diagonal frequencies (BL-DPM).
+        DEEP: Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the offset of the display.
+    """
+    class DOUBLE_PHASE(Encoding):
+        """Double phase of the unchanged field."""
+        def __init__(self) -> None: ...
+    class ANTI_ALIAS(Encoding):
+        """Double phase after a small Gaussian blur (AA-DPM).
+
+        Fields:
+            sigma: The standard deviation in pixels; 0.7 in the paper.
+            width: The number of taps, an odd number; 3 in the paper.
+        """
+        sigma: float
+        width: int
+        def __init__(self, sigma: float, width: int) -> None: ...
+    class BAND_LIMIT(Encoding):
+        """Double phase after a filter that removes high diagonal frequencies (BL-DPM).
+
+        Fields:
+            k: The bound of |tan(πfx)·tan(πfy)|, where f is in cycles per pixel; 1 in the paper.
+        """
+        k: float
+        def __init__(self, k: float) -> None: ...
+    class DEEP(Encoding):
+        """Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
+        offset of the display.
+
+        Fields:
+            prefilter: The pre-filter.
+        """
+        prefilter: Network
+        def __init__(self, prefilter: Network) -> None: ...
+    def is_DOUBLE_PHASE(self) -> bool: ...
+    def is_double_phase(self) -> bool: ...
+    def is_ANTI_ALIAS(self) -> bool: ...
+    def is_anti_alias(self) -> bool: ...
+    def is_BAND_LIMIT(self) -> bool: ...
+    def is_band_limit(self) -> bool: ...
+    def is_DEEP(self) -> bool: ...
+    def is_deep(self) -> bool: ...
+
+class Brightness:
+    """The amplitude that maps to full light.
+
+    One of:
+        SMOOTHED: An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
+        FIXED: A fixed amplitude. Larger amplitudes are clipped.
+        FRAME_MAX: The largest amplitude of the frame.
+    """
+    class SMOOTHED(Brightness):
+        """An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker."""
+        def __init__(self) -> None: ...
+    class FIXED(Brightness):
+        """A fixed amplitude. Larger amplitudes are clipped.
+
+        Fields:
+            scale: The amplitude.
+        """
+        scale: float
+        def __init__(self, scale: float) -> None: ...
+    class FRAME_MAX(Brightness):
+        """The largest amplitude of the frame."""
+        def __init__(self) -> None: ...
+    def is_SMOOTHED(self) -> bool: ...
+    def is_smoothed(self) -> bool: ...
+    def is_FIXED(self) -> bool: ...
+    def is_fixed(self) -> bool: ...
+    def is_FRAME_MAX(self) -> bool: ...
+    def is_frame_max(self) -> bool: ...
+
 class Rotation(enum.Enum):
     """The clockwise rotation that turns a sensor's image upright.
 
@@ -196,83 +273,6 @@ class Quality:
     def is_adaptive(self) -> bool: ...
     def is_FIXED(self) -> bool: ...
     def is_fixed(self) -> bool: ...
-
-class Encoding:
-    """The conversion of a field to phases.
-
-    One of:
-        DOUBLE_PHASE: Double phase of the unchanged field.
-        ANTI_ALIAS: Double phase after a small Gaussian blur (AA-DPM).
-        BAND_LIMIT: Double phase after a filter that removes high diagonal frequencies (BL-DPM).
-        DEEP: Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the offset of the display.
-    """
-    class DOUBLE_PHASE(Encoding):
-        """Double phase of the unchanged field."""
-        def __init__(self) -> None: ...
-    class ANTI_ALIAS(Encoding):
-        """Double phase after a small Gaussian blur (AA-DPM).
-
-        Fields:
-            sigma: The standard deviation in pixels; 0.7 in the paper.
-            width: The number of taps, an odd number; 3 in the paper.
-        """
-        sigma: float
-        width: int
-        def __init__(self, sigma: float, width: int) -> None: ...
-    class BAND_LIMIT(Encoding):
-        """Double phase after a filter that removes high diagonal frequencies (BL-DPM).
-
-        Fields:
-            k: The bound of |tan(πfx)·tan(πfy)|, where f is in cycles per pixel; 1 in the paper.
-        """
-        k: float
-        def __init__(self, k: float) -> None: ...
-    class DEEP(Encoding):
-        """Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
-        offset of the display.
-
-        Fields:
-            prefilter: The pre-filter.
-        """
-        prefilter: Network
-        def __init__(self, prefilter: Network) -> None: ...
-    def is_DOUBLE_PHASE(self) -> bool: ...
-    def is_double_phase(self) -> bool: ...
-    def is_ANTI_ALIAS(self) -> bool: ...
-    def is_anti_alias(self) -> bool: ...
-    def is_BAND_LIMIT(self) -> bool: ...
-    def is_band_limit(self) -> bool: ...
-    def is_DEEP(self) -> bool: ...
-    def is_deep(self) -> bool: ...
-
-class Brightness:
-    """The amplitude that maps to full light.
-
-    One of:
-        SMOOTHED: An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
-        FIXED: A fixed amplitude. Larger amplitudes are clipped.
-        FRAME_MAX: The largest amplitude of the frame.
-    """
-    class SMOOTHED(Brightness):
-        """An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker."""
-        def __init__(self) -> None: ...
-    class FIXED(Brightness):
-        """A fixed amplitude. Larger amplitudes are clipped.
-
-        Fields:
-            scale: The amplitude.
-        """
-        scale: float
-        def __init__(self, scale: float) -> None: ...
-    class FRAME_MAX(Brightness):
-        """The largest amplitude of the frame."""
-        def __init__(self) -> None: ...
-    def is_SMOOTHED(self) -> bool: ...
-    def is_smoothed(self) -> bool: ...
-    def is_FIXED(self) -> bool: ...
-    def is_fixed(self) -> bool: ...
-    def is_FRAME_MAX(self) -> bool: ...
-    def is_frame_max(self) -> bool: ...
 
 class DepthRange:
     """The distances that map to the ends of the volume.
@@ -571,6 +571,23 @@ class Drops:
     closed: int
     total: int
     def __init__(self, *, superseded: int, above_target_rate: int, paused: int, reset: int, closed: int, total: int) -> None: ...
+
+class EncoderOptions:
+    """How a field becomes levels.
+
+    Fields:
+        encoding: How the field becomes phases.
+        brightness: Which amplitude full light stands for.
+        dark_threshold: Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+        local_steps: Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for what suits the encoding: 1, and 0 with a pre-filter.
+        midpoint_steps: Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
+    """
+    encoding: Encoding
+    brightness: Brightness
+    dark_threshold: float | None
+    local_steps: int | None
+    midpoint_steps: int
+    def __init__(self, *, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0) -> None: ...
 
 class Orientation:
     """The transformation from a sensor's image to the upright image: a rotation, then mirroring.
@@ -906,6 +923,15 @@ class RawHologram:
     """The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
     planes are read.
     """
+    @classmethod
+    def of_field(cls, field: bytes, width: int, height: int, z_mm: float, target: Target, options: EncoderOptions) -> RawHologram:
+        """Makes the hologram of a complex field of `height` × `width` pixels at `z_mm`, 0 the midpoint: the real and the
+        imaginary part of each pixel as 32-bit floats, planes of the target's colours row by row without gaps, one after
+        another.
+
+        Errors: A field of another size, one that is larger than the modulator, dark or not finite; a z too far away; options
+        out of their range.
+        """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def field(self, z_mm: float) -> RawPlanes:
         """Returns the complex field that the levels produce behind the aperture at `z_mm`, where 0 is the midpoint: the
@@ -944,6 +970,39 @@ class RawHologram:
     def z_at(self, x: float, y: float) -> float:
         """Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
         Coordinates run from 0 to 1 from the upper left corner.
+        """
+
+class RawModulator:
+    """A modulator: its display, the phases of its levels, and the frames that its input takes. For the layers by hand."""
+    @classmethod
+    def from_toml(cls, text: str) -> RawModulator:
+        """Reads a modulator's file.
+
+        Errors: Text that is not TOML, an unknown key, or a value out of its range.
+        """
+    @classmethod
+    def named(cls, name: str) -> RawModulator:
+        """A modulator that `phasefront devices` lists.
+
+        Errors: Another name.
+        """
+    def __init__(self, *args: object, **kwargs: object) -> None: ...
+    def pack(self, hologram: RawHologram) -> list[RawImage]:
+        """The images that its input takes of `hologram`, one, or one for each colour.
+
+        Errors: A hologram that is larger than the modulator or for another number of lasers or bits; with bit planes, one of
+        another size.
+        """
+    def target(self) -> Target:
+        """What holograms for it are made for.
+
+        Errors: Levels of more than 8 bits that are not evenly spaced.
+        """
+    def unpack(self, images: bytes, width: int, height: int) -> RawImage:
+        """Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
+        without gaps. The result has 2 bytes a level, planes of colours one after another.
+
+        Errors: Another number of bytes, or cells that are those of no level.
         """
 
 class RawSession:

@@ -1160,6 +1160,31 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
     }
 
     
+    /**
+     * Makes the hologram of a complex field of `height` × `width` pixels at `z_mm`, 0 the midpoint: the real and the
+     * imaginary part of each pixel as 32-bit floats, planes of the target's colours row by row without gaps, one after
+     * another.
+     *
+     * # Errors
+     * A field of another size, one that is larger than the modulator, dark or not finite; a z too far away; options
+     * out of their range.
+     */
+public static func ofField(field: Data, width: UInt32, height: UInt32, zMm: Double, target: Target, options: EncoderOptions)throws  -> RawHologram  {
+    return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(field) { fieldFb in
+    uniffi_phasefront_ffi_fn_constructor_rawhologram_of_field(
+        fieldFb,
+        FfiConverterUInt32.lower(width),
+        FfiConverterUInt32.lower(height),
+        FfiConverterDouble.lower(zMm),
+        FfiConverterTypeTarget_lower(target),
+        FfiConverterTypeEncoderOptions_lower(options),uniffiCallStatus
+    )
+        }
+})
+}
+    
 
     
     /**
@@ -1556,6 +1581,227 @@ public func FfiConverterTypeRawImage_lift(_ handle: UInt64) throws -> RawImage {
 #endif
 public func FfiConverterTypeRawImage_lower(_ value: RawImage) -> UInt64 {
     return FfiConverterTypeRawImage.lower(value)
+}
+
+
+
+
+
+
+/**
+ * A modulator: its display, the phases of its levels, and the frames that its input takes. For the layers by hand.
+ */
+public protocol RawModulatorProtocol: AnyObject, Sendable {
+    
+    /**
+     * The images that its input takes of `hologram`, one, or one for each colour.
+     *
+     * # Errors
+     * A hologram that is larger than the modulator or for another number of lasers or bits; with bit planes, one of
+     * another size.
+     */
+    func pack(hologram: RawHologram) throws  -> [RawImage]
+    
+    /**
+     * What holograms for it are made for.
+     *
+     * # Errors
+     * Levels of more than 8 bits that are not evenly spaced.
+     */
+    func target() throws  -> Target
+    
+    /**
+     * Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
+     * without gaps. The result has 2 bytes a level, planes of colours one after another.
+     *
+     * # Errors
+     * Another number of bytes, or cells that are those of no level.
+     */
+    func unpack(images: Data, width: UInt32, height: UInt32) throws  -> RawImage
+    
+}
+/**
+ * A modulator: its display, the phases of its levels, and the frames that its input takes. For the layers by hand.
+ */
+open class RawModulator: RawModulatorProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_rawmodulator(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_rawmodulator(handle, $0) }
+    }
+
+    
+    /**
+     * Reads a modulator's file.
+     *
+     * # Errors
+     * Text that is not TOML, an unknown key, or a value out of its range.
+     */
+public static func fromToml(text: String)throws  -> RawModulator  {
+    return try  FfiConverterTypeRawModulator_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_rawmodulator_from_toml(
+        FfiConverterString.lower(text),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * A modulator that `phasefront devices` lists.
+     *
+     * # Errors
+     * Another name.
+     */
+public static func named(name: String)throws  -> RawModulator  {
+    return try  FfiConverterTypeRawModulator_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_rawmodulator_named(
+        FfiConverterString.lower(name),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+    /**
+     * The images that its input takes of `hologram`, one, or one for each colour.
+     *
+     * # Errors
+     * A hologram that is larger than the modulator or for another number of lasers or bits; with bit planes, one of
+     * another size.
+     */
+open func pack(hologram: RawHologram)throws  -> [RawImage]  {
+    return try  FfiConverterSequenceTypeRawImage.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawmodulator_pack(
+            self.uniffiCloneHandle(),
+        FfiConverterTypeRawHologram_lower(hologram),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * What holograms for it are made for.
+     *
+     * # Errors
+     * Levels of more than 8 bits that are not evenly spaced.
+     */
+open func target()throws  -> Target  {
+    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawmodulator_target(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
+     * without gaps. The result has 2 bytes a level, planes of colours one after another.
+     *
+     * # Errors
+     * Another number of bytes, or cells that are those of no level.
+     */
+open func unpack(images: Data, width: UInt32, height: UInt32)throws  -> RawImage  {
+    return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(images) { imagesFb in
+    uniffi_phasefront_ffi_fn_method_rawmodulator_unpack(
+            self.uniffiCloneHandle(),
+        imagesFb,
+        FfiConverterUInt32.lower(width),
+        FfiConverterUInt32.lower(height),uniffiCallStatus
+    )
+        }
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeRawModulator: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = RawModulator
+
+    public static func lift(_ handle: UInt64) throws -> RawModulator {
+        return RawModulator(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: RawModulator) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> RawModulator {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: RawModulator, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawModulator_lift(_ handle: UInt64) throws -> RawModulator {
+    return try FfiConverterTypeRawModulator.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawModulator_lower(_ value: RawModulator) -> UInt64 {
+    return FfiConverterTypeRawModulator.lower(value)
 }
 
 
@@ -3684,6 +3930,109 @@ public func FfiConverterTypeDrops_lift(_ buf: RustBuffer) throws -> Drops {
 #endif
 public func FfiConverterTypeDrops_lower(_ value: Drops) -> RustBuffer {
     return FfiConverterTypeDrops.lower(value)
+}
+
+
+/**
+ * How a field becomes levels.
+ */
+public struct EncoderOptions {
+    /**
+     * How the field becomes phases.
+     */
+    public var encoding: Encoding
+    /**
+     * Which amplitude full light stands for.
+     */
+    public var brightness: Brightness
+    /**
+     * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
+     * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+     */
+    public var darkThreshold: Float?
+    /**
+     * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
+     * what suits the encoding: 1, and 0 with a pre-filter.
+     */
+    public var localSteps: UInt32?
+    /**
+     * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
+     */
+    public var midpointSteps: UInt32
+
+    // Default memberwise initializers are never public by default, so we
+    // declare one manually.
+    public init(
+        /**
+         * How the field becomes phases.
+         */encoding: Encoding, 
+        /**
+         * Which amplitude full light stands for.
+         */brightness: Brightness, 
+        /**
+         * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
+         * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+         */darkThreshold: Float? = nil, 
+        /**
+         * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
+         * what suits the encoding: 1, and 0 with a pre-filter.
+         */localSteps: UInt32? = nil, 
+        /**
+         * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
+         */midpointSteps: UInt32 = UInt32(0)) {
+        self.encoding = encoding
+        self.brightness = brightness
+        self.darkThreshold = darkThreshold
+        self.localSteps = localSteps
+        self.midpointSteps = midpointSteps
+    }
+
+    
+
+    
+}
+
+#if compiler(>=6)
+extension EncoderOptions: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeEncoderOptions: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> EncoderOptions {
+        return
+            try EncoderOptions(
+                encoding: FfiConverterTypeEncoding.read(from: &buf), 
+                brightness: FfiConverterTypeBrightness.read(from: &buf), 
+                darkThreshold: FfiConverterOptionFloat.read(from: &buf), 
+                localSteps: FfiConverterOptionUInt32.read(from: &buf), 
+                midpointSteps: FfiConverterUInt32.read(from: &buf)
+        )
+    }
+
+    public static func write(_ value: EncoderOptions, into buf: inout [UInt8]) {
+        FfiConverterTypeEncoding.write(value.encoding, into: &buf)
+        FfiConverterTypeBrightness.write(value.brightness, into: &buf)
+        FfiConverterOptionFloat.write(value.darkThreshold, into: &buf)
+        FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
+        FfiConverterUInt32.write(value.midpointSteps, into: &buf)
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeEncoderOptions_lift(_ buf: RustBuffer) throws -> EncoderOptions {
+    return try FfiConverterTypeEncoderOptions.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeEncoderOptions_lower(_ value: EncoderOptions) -> RustBuffer {
+    return FfiConverterTypeEncoderOptions.lower(value)
 }
 
 
@@ -7429,6 +7778,31 @@ fileprivate struct FfiConverterSequenceDouble: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterSequenceTypeRawImage: FfiConverterRustBuffer {
+    typealias SwiftType = [RawImage]
+
+    public static func write(_ value: [RawImage], into buf: inout [UInt8]) {
+        let len = Int32(value.count)
+        writeInt(&buf, len)
+        for item in value {
+            FfiConverterTypeRawImage.write(item, into: &buf)
+        }
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> [RawImage] {
+        let len: Int32 = try readInt(&buf)
+        var seq = [RawImage]()
+        seq.reserveCapacity(Int(len))
+        for _ in 0 ..< len {
+            seq.append(try FfiConverterTypeRawImage.read(from: &buf))
+        }
+        return seq
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterSequenceTypePlaneInfo: FfiConverterRustBuffer {
     typealias SwiftType = [PlaneInfo]
 
@@ -7656,6 +8030,15 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 36303) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_pack() != 23) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_target() != 23176) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_unpack() != 17997) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_network_info() != 43693) {
         return InitializationResult.apiChecksumMismatch
     }
@@ -7711,6 +8094,15 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 39953) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field() != 44076) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_from_toml() != 51094) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named() != 21491) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 54161) {

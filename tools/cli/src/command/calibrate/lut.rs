@@ -60,8 +60,11 @@ impl Lut {
         check_used(&[("--capture", self.capture.is_given(), self.captures.is_some(), with)])?;
         let by_hand = self.patterns.is_some() || self.capture.is_given();
         check_used(&[("--dark", self.dark.is_some(), by_hand, "--patterns or --capture")])?;
+        self.check_outputs()?;
         let display = self.display.read_without_offset()?.target.display;
-        self.check_outputs(colours(&display))?;
+        if let (Some(captures), false) = (&self.captures, self.capture.is_given()) {
+            reading_captures(captures, colours(&display))?;
+        }
         let pattern = Pattern::new(display.height(), display.width())?.with_dark(self.dark.unwrap_or(DARK));
         match (&self.patterns, &self.captures, &self.output) {
             (Some(folder), ..) => self.write_patterns(json, &pattern, folder),
@@ -73,15 +76,11 @@ impl Lut {
         }
     }
 
-    fn check_outputs(&self, colours: &[&str]) -> Result<()> {
+    fn check_outputs(&self) -> Result<()> {
         for folder in [&self.patterns, &self.full, &self.report].into_iter().flatten() {
             output::folder(folder, self.overwrite.holding())?;
         }
-        (self.output.iter()).try_for_each(|path| output::new_file(path, &[], self.overwrite.is_given()))?;
-        if self.capture.is_given() {
-            return Ok(());
-        }
-        (self.captures.iter()).try_for_each(|captures| reading_captures(captures, colours))
+        (self.output.iter()).try_for_each(|path| output::new_file(path, &[], self.overwrite.is_given()))
     }
 
     fn write_patterns(&self, json: bool, pattern: &Pattern, folder: &Path) -> Result<()> {
