@@ -69,7 +69,8 @@ class Modulator:
         display = self.target.display()
         height, width = shape or (display.height, display.width)
         values = numpy.concatenate([array.ravel() for array in arrays]) if arrays else numpy.zeros(0, numpy.uint8)
-        levels = self._raw.unpack(Memory(values), width, height)
+        memory: Any = Memory(values)
+        levels = self._raw.unpack(memory, width, height)
         return array_at(levels, levels.address(), (levels.height() // height, height, width), numpy.uint16)
 
 
@@ -113,7 +114,8 @@ def encode(
         midpoint_steps=midpoint_steps,
     )
     _, height, width = array.shape
-    raw = _ffi.RawHologram.of_field(Memory(array), width, height, z_mm, target, options)
+    memory: Any = Memory(array)
+    raw = _ffi.RawHologram.of_field(memory, width, height, z_mm, target, options)
     return Hologram(raw, Purpose(target, options.encoding))
 
 

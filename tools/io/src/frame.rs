@@ -170,8 +170,8 @@ pub fn relative(depth: ArrayView2<'_, f32>, near: Option<f32>, far: Option<f32>)
     Ok(depth::normalize(shifted.view(), DepthUnit::Metres, near, far)?.depth)
 }
 
-/// Creates a frame from `rgb`, (3, H, W), and normalized `depth`, (h, w) with NaN for no reading, placed on a modulator.
-/// The depth is conditioned along the edges of the colour image.
+/// Creates a frame from `rgb`, (3, H, W), and normalized `depth`, (h, w) with NaN for no reading, placed on a
+/// modulator. The depth is conditioned along the edges of the colour image.
 ///
 /// # Errors
 /// Returns an error if a shape is empty or too large.

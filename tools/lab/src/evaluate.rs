@@ -486,9 +486,9 @@ pub struct Sample {
     pub margin: usize,
 }
 
-/// Evaluates each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`, on the true depth and
-/// on that of each sensor. The rows are in that order: a depth's methods together, and a method's ways. `done` is called
-/// after each scene.
+/// Evaluates each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`, on the true depth
+/// and on that of each sensor. The rows are in that order: a depth's methods together, and a method's ways. `done` is
+/// called after each scene.
 ///
 /// A method with hidden layers as input has them only with the true depth.
 ///

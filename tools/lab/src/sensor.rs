@@ -5,7 +5,7 @@
 //!
 //! | sensor | resolution | what is wrong |
 //! |---|---|---|
-//! | `coarse-bilinear` (judge a) | 1/4 | mean of a cell, which mixes depths at edges; shift of 2 px right, 2 px down; noise 0.005 |
+//! | `coarse-bilinear` (judge a) | 1/4 | mean of a cell; shift of 2 px right and down; noise 0.005 |
 //! | `coarse-nearest` (judge b) | 1/4 | pixel in the middle of a cell; shift of 1 px right, 3 px up; noise 0.01 |
 //! | `half-bilinear` (judge c) | 1/2 | mean of a cell; noise 0.003 |
 //! | `noise` | 1 | noise 0.005 |

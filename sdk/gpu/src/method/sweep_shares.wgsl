@@ -1,6 +1,6 @@
 // The positions of points among the planes and their shares of light there, as in shares.rs of phasefront-core. The
-// header from sweep.rs defines COUNT, the number of planes, HIDDEN, the number of hidden layers, BETWEEN, whether points
-// can be between planes, and MEET.
+// header from sweep.rs defines COUNT, the number of planes, HIDDEN, the number of hidden layers, BETWEEN, whether
+// points can be between planes, and MEET.
 
 // Returns k for a depth on plane k.
 fn position(depth: f32) -> f32 {

@@ -117,8 +117,8 @@ impl CaptureProgram {
     /// the reason, in one line, why a photograph is not good enough.
     ///
     /// # Errors
-    /// Returns an error if the last photograph asked for is not good enough, if the program reports an error that often,
-    /// ends or takes too long, or if a file cannot be written.
+    /// Returns an error if the last photograph asked for is not good enough, if the program reports an error that
+    /// often, ends or takes too long, or if a file cannot be written.
     pub fn take<T>(
         &mut self,
         shot: &Shot<'_>,

@@ -555,8 +555,8 @@ pub fn errors(curves: &Curves, index: usize, table: &PerPixel) -> Errors {
     }
 }
 
-/// Writes the full table of the colour at `index` of `table`, uint8 (H, W, 256), to `file` as .npy: the level of each of
-/// 256 phase steps for each pixel. Pixels without a curve use the levels of `table`.
+/// Writes the full table of the colour at `index` of `table`, uint8 (H, W, 256), to `file` as .npy: the level of each
+/// of 256 phase steps for each pixel. Pixels without a curve use the levels of `table`.
 ///
 /// # Errors
 /// Returns an error if writing fails.

@@ -1,6 +1,6 @@
-//! `phasefront-lab study` computes the paper's Fig. 2a and 2b as a table, JSON and a plot. It also studies the benefit
-//! of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on slopes and on other
-//! displays.
+//! `phasefront-lab study` computes the paper's Fig. 2a and 2b as a table, JSON and a plot. It also studies the
+//! benefit of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on slopes
+//! and on other displays.
 
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};

@@ -3,8 +3,8 @@
 //! - Resolution: 160×120 pixels, the size on most phones; here for a frame of [`FRAME_WIDTH`].
 //! - Error: Google documents that it grows with the square of the distance. Its size is our choice: 1 % at 1 m for a
 //!   reading of raw depth, before the smoothing.
-//! - Smoothing: by a deviation of one reading, across edges. Google documents the filter ("smooth and interpolate"), not
-//!   its width.
+//! - Smoothing: by a deviation of one reading, across edges. Google documents the filter ("smooth and interpolate"),
+//!   not its width.
 //! - Unit: whole millimetres, which is the format of the image.
 
 use super::{FRAME_WIDTH, Reading, coarser, means, metres, normal, normalized, smooth};

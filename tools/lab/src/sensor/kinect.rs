@@ -2,11 +2,11 @@
 //!
 //! - Resolution: 640×480 pixels, here for a frame of [`FRAME_WIDTH`]; 57° along a row; 75 mm between the projector and
 //!   the camera.
-//! - Disparity: whole numbers of 11 bits with an error of half a step. One step is 2.85·10⁻³ m⁻¹ times the square of the
-//!   distance (Khoshelham and Elberink, Sensors 12, 2012).
+//! - Disparity: whole numbers of 11 bits with an error of half a step. One step is 2.85·10⁻³ m⁻¹ times the square of
+//!   the distance (Khoshelham and Elberink, Sensors 12, 2012).
 //! - Shadows: no reading where the projector's light does not arrive, on one side of near surfaces.
-//! - Edges: a reading is that of a place up to one reading away, so edges are not straight. 40 % of the readings at edges are
-//!   missing, and those in blobs. These sizes are our choice, from captured frames.
+//! - Edges: a reading is that of a place up to one reading away, so edges are not straight. 40 % of the readings at
+//!   edges are missing, and those in blobs. These sizes are our choice, from captured frames.
 
 use super::{FRAME_WIDTH, Reading, coarser, focal_length, metres, middles, normal, normalized};
 use super::{remove_at_edges, remove_blobs, shadows};

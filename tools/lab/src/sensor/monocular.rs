@@ -3,8 +3,8 @@
 //! - Resolution: 448 pixels along a row, as `--depth-network` takes pictures; here for a frame of [`FRAME_WIDTH`].
 //! - Scale and offset are unknown, as those of MiDaS (Ranftl et al., 2020) and Depth Anything (Yang et al., 2024) are.
 //!   The scene's normalized depth is the truth on that scale, whatever its relation to metres.
-//! - Warp: a smooth error of 0.05 of the volume (root mean square). Such networks err by 4 to 10 % of the distance after
-//!   their scale and offset are fitted, mostly smoothly.
+//! - Warp: a smooth error of 0.05 of the volume (root mean square). Such networks err by 4 to 10 % of the distance
+//!   after their scale and offset are fitted, mostly smoothly.
 //! - Edges are smoothed by a deviation of one reading, which is our choice.
 
 use super::{FRAME_WIDTH, Reading, coarser, means, smooth};

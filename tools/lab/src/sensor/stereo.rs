@@ -1,10 +1,10 @@
 //! A pair of cameras whose images are matched in windows: an Intel RealSense D435.
 //!
 //! - Cameras: baseline 50 mm, 87° over 848 pixels (data sheet of the D400 family).
-//! - Error: 0.08 pixels of disparity, which Intel's guide for tuning names for good surfaces; steps of 1/32 pixel, which
-//!   is the camera's resolution of disparity.
-//! - Shadows: no reading where the right camera does not see what the left one sees, left of near edges. The depth image
-//!   is the left camera's.
+//! - Error: 0.08 pixels of disparity, which Intel's guide for tuning names for good surfaces; steps of 1/32 pixel,
+//!   which is the camera's resolution of disparity.
+//! - Shadows: no reading where the right camera does not see what the left one sees, left of near edges. The depth
+//!   image is the left camera's.
 //! - Fattening: near surfaces grow by half a matching window, 2 pixels, in every direction. The size of the window is
 //!   our choice; such windows have 5 to 9 pixels.
 

@@ -1,4 +1,5 @@
-//! Tests the simulated sensors: their resolution, noise, holes and confidence, and the depth that sessions make of them.
+//! Tests the simulated sensors: their resolution, noise, holes and confidence, and the depth that sessions make of
+//! them.
 use clap::ValueEnum;
 use ndarray::{Array2, Array3};
 use phasefront_lab::sensor::coarse::{Coarse, Sampling};

@@ -81,8 +81,8 @@ pub fn shift(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) -
     }
 }
 
-/// Conditions the part `crop` of `depth`, (h, w), whose edges lie `shift` readings beside those of `rgb`, (3, H, W), and
-/// returns (H, W). `depth` has NaN for no reading and at least one reading.
+/// Conditions the part `crop` of `depth`, (h, w), whose edges lie `shift` readings beside those of `rgb`, (3, H, W),
+/// and returns (H, W). `depth` has NaN for no reading and at least one reading.
 pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>, shift: (f64, f64)) -> Array2<f32> {
     let (_, height, width) = rgb.dim();
     let rows = Axis::new(crop.y + shift.0, crop.height, depth.dim().0, height);

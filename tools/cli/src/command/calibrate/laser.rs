@@ -22,9 +22,9 @@ use std::path::{Path, PathBuf};
 
 /// Find the laser's amplitude over the modulator, from photographs of a diffuser in its place
 ///
-/// CAPTURES has folders red, green and blue, or laser. Each holds diffuser.png (or .tif) and capture_000.png, a photograph
-/// of pattern 0 from the same camera position, which shows where the modulator is. With --capture, a program takes
-/// flat.png instead, a photograph of the modulator with all pixels at level 0.
+/// CAPTURES has folders red, green and blue, or laser. Each holds diffuser.png (or .tif) and capture_000.png, a
+/// photograph of pattern 0 from the same camera position, which shows where the modulator is. With --capture, a
+/// program takes flat.png instead, a photograph of the modulator with all pixels at level 0.
 #[derive(Args)]
 pub(crate) struct Laser {
     /// Folder with the folders red, green and blue, or laser
