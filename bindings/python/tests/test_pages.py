@@ -60,7 +60,7 @@ def test_the_conventions_reconstruct_a_hologram(tmp_path, monkeypatch):
         (code,) = snippets(CONVENTIONS)
         exec(code, {"__name__": "conventions"})
         views = [numpy.asarray(Image.open(name)).astype(int) for name in ("near.png", "by_command.png")]
-        inside = [view[40:-40, 40:-40] for view in views]
+        inside = [view[48:-48, 48:-48] for view in views]
         assert inside[0].std() > 20
         assert abs(inside[0] - inside[1]).max() <= 2
 
