@@ -1,12 +1,12 @@
 //! Conditioning of depth: from a sensor's readings, with holes, noise, mixed depths and a shift, to clean depth of the
-//! display's resolution along the edges of the colour image. Tests compare the results with [`reference`].
+//! display's resolution along the edges of the colour image. Tests compare the results with [`mod@reference`].
 //!
 //! The steps work on the readings, except for the last two, which work on the display's pixels at edges:
-//! 1. [`register`]: the shift between depth and colour is found from their edges.
-//! 2. [`fill`]: holes take the depth of the surface with their colour.
-//! 3. [`smooth`]: noise within surfaces is removed; slopes stay.
-//! 4. [`edges`]: readings at edges are found, and those whose depth is a mixture of two surfaces.
-//! 5. [`surfaces`]: the 3×3 readings around a reading at an edge form surfaces. Each display pixel there takes the
+//! 1. `register`: the shift between depth and colour is found from their edges.
+//! 2. `fill`: holes take the depth of the surface with their colour.
+//! 3. `smooth`: noise within surfaces is removed; slopes stay.
+//! 4. `edges`: readings at edges are found, and those whose depth is a mixture of two surfaces.
+//! 5. `surfaces`: the 3×3 readings around a reading at an edge form surfaces. Each display pixel there takes the
 //!    surface that covers its place and has its colour. All other pixels are interpolated.
 //! 6. Pixels that are nearly undecided follow their neighbours of the same colour.
 //!

@@ -1,6 +1,6 @@
 //! Photographs by a program of the user, which drives the modulator and the camera.
 //!
-//! For each photograph, the program reads a line of JSON from its standard input ([`Request`]), shows the levels of the
+//! For each photograph, the program reads a line of JSON from its standard input (`Request`), shows the levels of the
 //! PNG `show`, and writes the photograph to `photo`, a PNG. Then it writes a line to its standard output: `{"done": …}`
 //! with any settings, for example the exposure, or `{"error": "the reason"}`. Settings come back with later requests,
 //! also in another run. Other lines are messages for the user. The program ends when its input ends.
