@@ -1,7 +1,10 @@
-//! The instruction sets that have kernels, and their detection on this processor.
+//! The instruction sets that have kernels, their detection on this processor, and the choice of a smaller one to
+//! measure or test.
 
-/// An instruction set with its own kernels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+use std::sync::OnceLock;
+
+/// An instruction set with its own kernels. Those of one architecture are in ascending order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Isa {
     /// Plain Rust, for every processor.
@@ -24,24 +27,30 @@ pub enum Isa {
     Simd128,
 }
 
+/// The largest instruction set that this process uses.
+static LIMIT: OnceLock<Isa> = OnceLock::new();
+
 impl Isa {
-    /// Returns a short name for reports.
+    /// The environment variable that names the largest instruction set of a process, for tests.
+    pub const VARIABLE: &str = "PHASEFRONT_KERNELS";
+
+    /// Returns a short name for flags and reports.
     pub fn name(self) -> &'static str {
         match self {
             Isa::Portable => "portable",
             Isa::Avx2 => "avx2",
             Isa::Avx512 => "avx512",
-            Isa::Avx512Vnni => "avx512-vnni",
-            Isa::Amx => "amx-int8",
+            Isa::Avx512Vnni => "vnni",
+            Isa::Amx => "amx",
             Isa::Neon => "neon",
-            Isa::NeonDotprod => "neon-dotprod",
-            Isa::NeonI8mm => "neon-i8mm",
+            Isa::NeonDotprod => "dotprod",
+            Isa::NeonI8mm => "i8mm",
             Isa::Simd128 => "simd128",
         }
     }
 
-    /// Returns the int8 kernels that this processor runs, fastest first. The last is always [`Isa::Portable`].
-    pub fn int8() -> Vec<Isa> {
+    /// Returns the instruction sets that this processor has, largest first. The last is always [`Isa::Portable`].
+    pub fn available() -> Vec<Isa> {
         let mut found = Vec::new();
         #[cfg(target_arch = "x86_64")]
         {
@@ -52,6 +61,9 @@ impl Isa {
             }
             if vnni {
                 found.push(Isa::Avx512Vnni);
+            }
+            if avx512 {
+                found.push(Isa::Avx512);
             }
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                 found.push(Isa::Avx2);
@@ -65,12 +77,53 @@ impl Isa {
             if std::arch::is_aarch64_feature_detected!("dotprod") {
                 found.push(Isa::NeonDotprod);
             }
+            // NEON is part of every ARM64 processor.
+            found.push(Isa::Neon);
         }
         if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
             found.push(Isa::Simd128);
         }
         found.push(Isa::Portable);
         found
+    }
+
+    /// Returns the instruction set of this name.
+    ///
+    /// # Errors
+    /// Returns one line with the names of [`Self::available`] if this processor has none of this name.
+    pub fn named(name: &str) -> Result<Isa, String> {
+        let available = Self::available();
+        available.iter().copied().find(|isa| isa.name() == name).ok_or_else(|| {
+            let names: Vec<_> = available.into_iter().map(Isa::name).collect();
+            format!("no kernels '{name}'; this processor has {}", names.join(", "))
+        })
+    }
+
+    /// Makes this process use no larger instruction set than this one, in all kernels and in [`wide!`](crate::wide).
+    ///
+    /// # Errors
+    /// Returns an error if kernels were chosen before.
+    pub fn limit(self) -> Result<(), String> {
+        LIMIT
+            .set(self)
+            .map_err(|before| format!("the kernels are already limited to '{before}'"))
+    }
+
+    /// Returns whether this process may use this instruction set, if the processor has it.
+    ///
+    /// # Panics
+    /// Panics if [`Self::VARIABLE`] names an instruction set that this processor lacks.
+    pub(crate) fn is_allowed(self) -> bool {
+        let limit = LIMIT.get_or_init(|| match std::env::var(Self::VARIABLE) {
+            Ok(name) => Self::named(&name).unwrap_or_else(|why| panic!("{}: {why}", Self::VARIABLE)),
+            Err(_) => Self::available()[0],
+        });
+        self <= *limit
+    }
+
+    /// Returns the int8 kernels to choose from, fastest first. The last is always [`Isa::Portable`].
+    pub fn int8() -> Vec<Isa> {
+        Self::of(|isa| !matches!(isa, Isa::Avx512 | Isa::Neon))
     }
 
     /// Returns the fastest int8 kernels here for hidden layers of `filters` filters. A half-empty AMX tile is slower
@@ -83,27 +136,14 @@ impl Isa {
         }
     }
 
-    /// Returns the f32 kernels that this processor runs, fastest first. The last is always [`Isa::Portable`].
+    /// Returns the f32 kernels to choose from, fastest first. The last is always [`Isa::Portable`].
     pub fn f32() -> Vec<Isa> {
-        let mut found = Vec::new();
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw") {
-                found.push(Isa::Avx512);
-            }
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                found.push(Isa::Avx2);
-            }
-        }
-        // NEON is part of every ARM64 processor.
-        if cfg!(target_arch = "aarch64") {
-            found.push(Isa::Neon);
-        }
-        if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
-            found.push(Isa::Simd128);
-        }
-        found.push(Isa::Portable);
-        found
+        Self::of(|isa| matches!(isa, Isa::Avx512 | Isa::Avx2 | Isa::Neon | Isa::Simd128 | Isa::Portable))
+    }
+
+    fn of(has_kernels: impl Fn(Isa) -> bool) -> Vec<Isa> {
+        let all = Self::available().into_iter();
+        all.filter(|isa| isa.is_allowed() && has_kernels(*isa)).collect()
     }
 }
 

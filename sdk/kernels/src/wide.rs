@@ -1,6 +1,9 @@
 //! Runs plain loops in the widest vectors of the processor.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+use crate::Isa;
+
 /// Computes an expression, compiled once for each instruction set with wider vectors than the target guarantees. Code
 /// that is inlined into it is vectorised accordingly. Sums and products keep their order and are not fused, so the
 /// result is bit-identical.
@@ -24,7 +27,8 @@ macro_rules! wide {
 #[inline]
 pub fn has_avx512() -> bool {
     #[cfg(target_arch = "x86_64")]
-    return is_x86_feature_detected!("avx512f")
+    return Isa::Avx512.is_allowed()
+        && is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512vl");
@@ -36,7 +40,7 @@ pub fn has_avx512() -> bool {
 #[inline]
 pub fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
-    return is_x86_feature_detected!("avx2");
+    return Isa::Avx2.is_allowed() && is_x86_feature_detected!("avx2");
     #[cfg(not(target_arch = "x86_64"))]
     false
 }

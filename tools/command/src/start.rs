@@ -2,6 +2,7 @@
 
 use crate::trace;
 use clap::Args;
+use phasefront_core::method::network::Isa;
 use phasefront_core::runtime::error::Line;
 use phasefront_io::{Error, Result};
 use std::io::Write;
@@ -43,6 +44,9 @@ impl Common {
     }
 
     fn traced(&self, command: impl FnOnce() -> Result<()>) -> Result<()> {
+        if let Ok(name) = std::env::var(Isa::VARIABLE) {
+            Isa::named(&name).map_err(|why| Error::Input(format!("{}: {why}", Isa::VARIABLE)))?;
+        }
         let mut pool = rayon::ThreadPoolBuilder::new();
         if let Some(threads) = self.threads {
             pool = pool.num_threads(threads.into());

@@ -10,7 +10,7 @@ use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
 use phasefront_command::networks::{self, Precision};
 use phasefront_command::terminal::{self, progress_bar};
-use phasefront_core::method::network;
+use phasefront_core::method::network::{self, Isa};
 use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront_io::picture::plot::{self, Bar};
 use phasefront_io::{Error, Result, output};
@@ -50,6 +50,10 @@ pub(crate) struct Bench {
     /// Number of layers that a GPU dispatch computes [default: both variants]
     #[arg(long, value_enum)]
     fusion: Option<FusionName>,
+    /// Largest instruction set to use, to measure a smaller one than the processor has: portable, avx2, avx512, vnni,
+    /// amx, neon, dotprod, i8mm
+    #[arg(long, value_name = "NAME")]
+    kernels: Option<String>,
     #[command(flatten)]
     display: DisplayFlags,
 }
@@ -71,8 +75,13 @@ impl Bench {
         if let Some(path) = &self.plot {
             output::file(path, &["svg"])?;
         }
+        if let Some(name) = &self.kernels {
+            let limit = Isa::named(name).and_then(Isa::limit);
+            limit.map_err(|why| Error::Input(format!("--kernels: {why}")))?;
+        }
         let on_gpu = self.backend.device()?.is_some();
         check_used(&[
+            ("--kernels", self.kernels.is_some(), !on_gpu, "--backend cpu"),
             ("--fusion", self.fusion.is_some(), on_gpu, "--backend gpu"),
             ("--plot", self.plot.is_some(), !on_gpu, "--backend cpu"),
             (

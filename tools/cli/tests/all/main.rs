@@ -18,6 +18,7 @@ mod devices;
 mod doctor;
 mod encode;
 mod inputs;
+mod kernels;
 mod one_laser;
 mod outputs;
 mod photos;
