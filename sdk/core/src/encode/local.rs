@@ -22,6 +22,8 @@ use std::ops::Range;
 
 /// The number of rows and columns to either side that a step reads.
 pub(super) const REACH: usize = 3;
+/// The number of columns whose sums are computed together: all of them stay in the first-level cache.
+const COLUMNS: usize = 192;
 /// The number of rows that a step keeps of the previous one.
 const KEPT: usize = 2 * REACH + 1;
 
@@ -81,7 +83,7 @@ pub(super) struct Wanted<'a> {
 pub(super) struct LocalScratch {
     /// The rows of g − L·e of each step in a ring, with REACH empty columns on either side.
     rings: Vec<Complex32>,
-    /// Sums of the rows 0, 1, 2 and 3 above and below.
+    /// Sums of the rows 0, 1, 2 and 3 above and below, for some columns.
     sums: Vec<Complex32>,
     /// A row of the starting field or of a step.
     row: Vec<Complex32>,
@@ -95,7 +97,7 @@ impl LocalScratch {
         let padded = width + 2 * REACH;
         LocalScratch {
             rings: vec![Complex32::ZERO; steps * KEPT * padded],
-            sums: vec![Complex32::ZERO; (REACH + 1) * padded],
+            sums: vec![Complex32::ZERO; (REACH + 1) * (COLUMNS + 2 * REACH)],
             row: vec![Complex32::ZERO; width],
             light: vec![1.0; width],
         }
@@ -153,7 +155,7 @@ impl LocalFilter {
                     [of_ring(y - i), of_ring(y + i)]
                 });
                 let goal = &plane[y * width..][..width];
-                wide!(self.draw(of_ring(y as isize), around, goal, per_scale, sums, row));
+                self.draw(of_ring(y as isize), around, goal, per_scale, sums, row);
                 if step < steps {
                     start.light_row(y, light);
                     let to = &mut after[y % KEPT * padded..][..padded];
@@ -168,8 +170,28 @@ impl LocalFilter {
 
     /// Computes z = g − d + B∗d for a row, where d = g − L·e. `own` is d of the row; `around` is d of the rows [above,
     /// below], nearest first.
-    #[inline(always)]
     fn draw(
+        &self,
+        own: &[Complex32],
+        around: [[&[Complex32]; 2]; REACH],
+        goal: &[Complex32],
+        per_scale: f32,
+        sums: &mut [Complex32],
+        out: &mut [Complex32],
+    ) {
+        let columns = goal.chunks(COLUMNS).zip(out.chunks_mut(COLUMNS)).enumerate();
+        for (run, (goal, out)) in columns {
+            let (from, padded) = (run * COLUMNS, goal.len() + 2 * REACH);
+            let own = &own[from..][..padded];
+            let around = around.map(|rows| rows.map(|row| &row[from..][..padded]));
+            let sums = &mut sums[..(REACH + 1) * padded];
+            wide!(self.draw_run(own, around, goal, per_scale, sums, out));
+        }
+    }
+
+    /// Computes [`Self::draw`] for some columns.
+    #[inline(always)]
+    fn draw_run(
         &self,
         own: &[Complex32],
         around: [[&[Complex32]; 2]; REACH],
@@ -229,28 +251,40 @@ fn mirror_ends(row: &mut [Complex32]) {
     }
 }
 
-/// Computes g − L·e for a row of double phase, whose phasors are (f/|f|)·(c ± i·√(1 − c²)) with c = |f| divided by the
-/// scale.
+/// The pixels that a loop computes together. The constant length lets it vectorise.
+const RUN: usize = 16;
+
+/// Computes g − L·e for a row of double phase.
 #[inline(always)]
 fn begin(field: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32, sign: f32, to: &mut [Complex32]) {
-    const RUN: usize = 16;
     let signs: [f32; RUN] = std::array::from_fn(|x| if x % 2 == 0 { sign } else { -sign });
-    let runs = (field.chunks(RUN).zip(goal.chunks(RUN))).zip(light.chunks(RUN));
-    for (((field, goal), light), to) in runs.zip(to.chunks_mut(RUN)) {
-        let values = (field.iter().zip(goal)).zip(light.iter().zip(signs));
-        for (((f, g), (light, sign)), to) in values.zip(to) {
-            let norm = (f.re * f.re + f.im * f.im).sqrt();
-            let cosine = (norm * per_scale).min(1.0);
-            let sine = sign * (1.0 - cosine * cosine).sqrt();
-            let dark = norm <= f32::MIN_POSITIVE;
-            let inverse = 1.0 / if dark { 1.0 } else { norm };
-            let (re, im) = (if dark { 1.0 } else { f.re * inverse }, f.im * inverse);
-            *to = counted(
-                g.re * per_scale - light * (re * cosine - im * sine),
-                g.im * per_scale - light * (re * sine + im * cosine),
-            );
+    let ((fields, field), (goals, goal)) = (field.as_chunks::<RUN>(), goal.as_chunks::<RUN>());
+    let ((lights, light), (runs, rest)) = (light.as_chunks::<RUN>(), to.as_chunks_mut::<RUN>());
+    for ((to, f), (g, light)) in runs.iter_mut().zip(fields).zip(goals.iter().zip(lights)) {
+        #[allow(clippy::needless_range_loop)]
+        for x in 0..RUN {
+            to[x] = begin_value(f[x], g[x], light[x], per_scale, signs[x]);
         }
     }
+    for (x, to) in rest.iter_mut().enumerate() {
+        *to = begin_value(field[x], goal[x], light[x], per_scale, signs[x]);
+    }
+}
+
+/// Returns g − L·e for a value f of double phase, whose phasor is (f/|f|)·(c ± i·√(1 − c²)) with c = |f| divided by the
+/// scale.
+#[inline(always)]
+fn begin_value(f: Complex32, g: Complex32, light: f32, per_scale: f32, sign: f32) -> Complex32 {
+    let norm = (f.re * f.re + f.im * f.im).sqrt();
+    let cosine = (norm * per_scale).min(1.0);
+    let sine = sign * (1.0 - cosine * cosine).sqrt();
+    let dark = norm <= f32::MIN_POSITIVE;
+    let inverse = 1.0 / if dark { 1.0 } else { norm };
+    let (re, im) = (if dark { 1.0 } else { f.re * inverse }, f.im * inverse);
+    counted(
+        g.re * per_scale - light * (re * cosine - im * sine),
+        g.im * per_scale - light * (re * sine + im * cosine),
+    )
 }
 
 /// Returns the difference at a pixel, or 0 if it is not finite, so that the pixel's neighbours are still corrected.
