@@ -21,6 +21,8 @@ use crate::{Isa, OUTPUTS};
 
 /// The channels of a group, which are adjacent in memory.
 pub(crate) const GROUP: usize = 4;
+/// The largest number of groups of a layer's input.
+pub(crate) const MOST_GROUPS: usize = 256;
 /// The bound on products of a sum and a multiplier, below which every conversion to an integer is exact.
 const LARGEST: f64 = (1u32 << 30) as f64;
 
@@ -183,7 +185,7 @@ impl Taps<'_> {
     }
 
     /// Returns each of [`Self::dot_words`] as two words of two 16-bit weights: the even channels, then the odd ones.
-    #[cfg(any(target_arch = "x86_64", target_arch = "wasm32"))]
+    #[cfg(target_arch = "wasm32")]
     pub(crate) fn pair_words(&self, sizes: &[usize]) -> Vec<i32> {
         let pair = |low: i8, high: i8| i32::from(low) & 0xffff | i32::from(high) << 16;
         let dots = self.dot_words(sizes);
@@ -382,6 +384,10 @@ impl Int8Chain {
 /// Checks that sums fit 32 bits and that their products with the factors can be converted exactly.
 fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
     let (outputs, per_filter) = (layer.outputs, layer.inputs * 9);
+    // A last layer's input has two parts, each in whole groups.
+    if layer.inputs > (MOST_GROUPS - 1) * GROUP {
+        return Err(format!("{} input channels; kernels take at most 1020", layer.inputs));
+    }
     if layer.kernel.len() != outputs * per_filter || layer.bias.len() != outputs || layer.multiplier.len() != outputs {
         return Err(format!(
             "weights, biases or multipliers do not fit {outputs} filters of {per_filter} weights"

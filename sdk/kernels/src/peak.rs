@@ -48,8 +48,8 @@ macro_rules! burn {
 }
 
 #[cfg(target_arch = "x86_64")]
-burn!(avx2_int8, "avx2", ymm_reg "/* {0} */", 12 x 16, _mm256_setzero_si256(),
-    |sum, x| _mm256_add_epi32(sum, _mm256_madd_epi16(sum, x)));
+burn!(avx2_int8, "avx2", ymm_reg "/* {0} */", 12 x 32, _mm256_setzero_si256(),
+    |sum, x| _mm256_add_epi16(sum, _mm256_maddubs_epi16(sum, x)));
 #[cfg(target_arch = "x86_64")]
 burn!(avx2_f32, "avx2,fma", ymm_reg "/* {0} */", 12 x 8, _mm256_setzero_ps(), |sum, x| _mm256_fmadd_ps(x, x, sum));
 #[cfg(target_arch = "x86_64")]

@@ -1,20 +1,20 @@
 //! The int8 and f32 kernels for AVX2: 8 pixels per register, 4 filters at a time.
 //!
-//! The byte multiply of AVX2 saturates its 16-bit sums, so int8 products are computed from 16-bit halves: a group's
-//! even and odd channels, each pair multiplied and added exactly in 32 bits.
+//! The byte multiply of AVX2 adds two products in 16 bits. The taps of two filters are packed in runs whose sums fit 16
+//! bits for any activations ([`runs`]), so only a run's end needs 32 bits.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
 use crate::f32;
-use crate::int8::{self, GROUP, Packed, Rounding, SkipSum, Taps};
+use crate::int8::{self, GROUP, MOST_GROUPS, Packed, Rounding, SkipSum};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
+use crate::x86::runs::{self, Words};
 use std::arch::x86_64::*;
-use std::hint::black_box;
 
 /// Returns the int8 kernels if the processor supports them.
 pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
     available().then_some(int8::Kernels {
-        pack,
+        pack: runs::pack,
         hidden_row,
         last_row,
         offset: 0,
@@ -38,30 +38,34 @@ fn available() -> bool {
 }
 
 /// The number of pixel registers computed together.
-const INT8_BLOCKS: usize = 2;
+const INT8_BLOCKS: usize = 4;
 const F32_BLOCKS: usize = 3;
 
-/// Packs words of two 16-bit weights as `[4 filters][ky][group][kx][filter][even, odd]`.
-fn pack(taps: &Taps<'_>) -> Vec<i32> {
-    taps.pair_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)])
-}
+/// The sums of four filters at `8·INT8_BLOCKS` pixels.
+type Int8Sums = [[__m256i; INT8_BLOCKS]; GROUP];
 
 fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-    let rows = window.rows();
+    let places = Places::new(layer, window, geometry);
     // SAFETY: `int8_kernels` has detected the features.
-    unsafe { int8_filters(layer, &rows, skip, out, geometry) }
+    unsafe { int8_filters(layer, &places, skip, out, geometry) }
 }
 
 #[target_feature(enable = "avx2,fma")]
-fn int8_filters(layer: &Packed, rows: &[&[u8]; 3], skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+fn int8_filters(layer: &Packed, places: &Places<'_>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     let groups = layer.outputs / GROUP;
     assert!(out.len() >= groups * geometry.stride());
     assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
     let zero = _mm256_set1_epi8(layer.zero_point as i8);
+    let mut words = layer.weights.as_chunks().0;
     for g in 0..groups {
-        let multiplier = &layer.multiplier[g * GROUP..][..GROUP];
+        let (bias, multiplier) = (
+            &layer.bias[g * GROUP..][..GROUP],
+            &layer.multiplier[g * GROUP..][..GROUP],
+        );
+        let mut rest = words;
         for x in (0..geometry.width).step_by(8 * INT8_BLOCKS) {
-            let sums = int8_sums(layer, g, rows, x, geometry);
+            let sums;
+            (sums, rest) = int8_sums(words, bias, places, x);
             #[allow(clippy::needless_range_loop)]
             for b in 0..INT8_BLOCKS {
                 let at = g * geometry.stride() + geometry.start() + (x + 8 * b) * GROUP;
@@ -79,57 +83,111 @@ fn int8_filters(layer: &Packed, rows: &[&[u8]; 3], skip: Option<&[u8]>, out: &mu
                 }
             }
         }
+        words = rest;
     }
 }
 
-/// Returns the sums of the four filters of group `g` at `8·INT8_BLOCKS` pixels from `x`.
-#[inline]
-#[target_feature(enable = "avx2,fma")]
-fn int8_sums(
-    layer: &Packed,
-    g: usize,
-    rows: &[&[u8]; 3],
-    x: usize,
-    geometry: Geometry,
-) -> [[__m256i; INT8_BLOCKS]; GROUP] {
-    let words = 9 * layer.groups * GROUP * 2;
-    let weights = &layer.weights[g * words..][..words];
-    assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
-    assert!(x + 8 * INT8_BLOCKS <= geometry.padded && MARGIN >= 1 && geometry.group == GROUP);
-    let even = _mm256_set1_epi16(255);
-    let mut sums = [[_mm256_setzero_si256(); INT8_BLOCKS]; GROUP];
-    for (sums, bias) in sums.iter_mut().zip(&layer.bias[g * GROUP..]) {
-        *sums = [_mm256_set1_epi32(*bias); INT8_BLOCKS];
-    }
-    // SAFETY: by the asserts above, rows extend one pixel past the block, and there are as many weights as the loops
-    // read.
-    unsafe {
-        let mut weight = weights.as_ptr();
-        // Prevent unrolling, which would run out of registers.
-        let taps = black_box(3);
-        for row in rows {
-            let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
-            for _ in 0..layer.groups {
-                for kx in 0..taps {
-                    let halves: [[__m256i; 2]; INT8_BLOCKS] = std::array::from_fn(|b| {
-                        let bytes = _mm256_loadu_si256(pixels.add((kx + 8 * b) * GROUP).cast());
-                        [_mm256_and_si256(bytes, even), _mm256_srli_epi16::<8>(bytes)]
-                    });
-                    for sums in &mut sums {
-                        for half in 0..2 {
-                            let pair = _mm256_set1_epi32(*weight);
-                            weight = weight.add(1);
-                            for (sum, halves) in sums.iter_mut().zip(halves) {
-                                *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(halves[half], pair));
-                            }
-                        }
-                    }
-                }
-                pixels = pixels.wrapping_add(geometry.stride());
-            }
+/// The places of a layer's taps in its window.
+struct Places<'a> {
+    slots: &'a [u8],
+    /// The place of each tap `(ky·groups + group)·3 + kx` for the first pixel of a row.
+    starts: [u32; 9 * MOST_GROUPS],
+    padded: usize,
+}
+
+impl<'a> Places<'a> {
+    fn new(layer: &Packed, window: Window<'a, u8>, geometry: Geometry) -> Self {
+        let row = window.slots.len() / 3;
+        assert!(row >= layer.groups * geometry.stride() && window.slots.len() <= u32::MAX as usize);
+        assert!(MARGIN >= 1 && geometry.group == GROUP);
+        let mut starts = [0; 9 * MOST_GROUPS];
+        for (tap, start) in starts[..9 * layer.groups].iter_mut().enumerate() {
+            let (ky, group, kx) = (tap / 3 / layer.groups, tap / 3 % layer.groups, tap % 3);
+            let at = (window.first + ky) % 3 * row + group * geometry.stride();
+            *start = (at + geometry.start() + kx * GROUP - GROUP) as u32;
+        }
+        Places {
+            slots: window.slots,
+            starts,
+            padded: geometry.padded,
         }
     }
-    sums
+}
+
+/// Returns the sums of the four filters of a group at `8·INT8_BLOCKS` pixels from `x`, and the words of the next group.
+/// A group has two pairs of filters; of the last layer's second group only one exists.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn int8_sums<'a>(mut words: &'a [Words], bias: &[i32], places: &Places<'_>, x: usize) -> (Int8Sums, &'a [Words]) {
+    assert!(x + 8 * INT8_BLOCKS <= places.padded);
+    let mut sums = [[_mm256_setzero_si256(); INT8_BLOCKS]; GROUP];
+    for (pair, bias) in sums.as_chunks_mut::<2>().0.iter_mut().zip(bias.as_chunks::<2>().0) {
+        for (sums, bias) in pair.iter_mut().zip(bias) {
+            *sums = [_mm256_set1_epi32(*bias); INT8_BLOCKS];
+        }
+        let Some(([runs, ..], rest)) = words.split_first() else {
+            break;
+        };
+        words = rest;
+        for _ in 0..*runs {
+            let [taps, ..] = words[0];
+            let (run, rest) = words[1..].split_at(taps as usize);
+            words = rest;
+            // SAFETY: `pack` wrote places of the layer's taps, whose rows extend one pixel past the block.
+            unsafe { add_run(run, places, x, pair) };
+        }
+    }
+    (sums, words)
+}
+
+/// Adds the products of a run's taps to the sums of a pair of filters. The run's sums fit 16 bits.
+///
+/// # Safety
+/// [`products`]' contract.
+#[inline]
+#[target_feature(enable = "avx2")]
+unsafe fn add_run(run: &[Words], places: &Places<'_>, x: usize, pair: &mut [[__m256i; INT8_BLOCKS]; 2]) {
+    let Some((first, rest)) = run.split_first() else {
+        return;
+    };
+    // SAFETY: the caller upholds this function's contract.
+    unsafe {
+        let mut narrow = products(first, places, x);
+        for tap in rest {
+            let products = products(tap, places, x);
+            for (narrow, products) in narrow.as_flattened_mut().iter_mut().zip(products.as_flattened()) {
+                *narrow = _mm256_add_epi16(*narrow, *products);
+            }
+        }
+        let ones = _mm256_set1_epi16(1);
+        for (sum, narrow) in pair.as_flattened_mut().iter_mut().zip(narrow.as_flattened()) {
+            *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(*narrow, ones));
+        }
+    }
+}
+
+/// Returns the products of a tap for a pair of filters, added in twos.
+///
+/// # Safety
+/// The tap's place must be below 9 times the layer's groups, and `x + 8·INT8_BLOCKS` within the padded row.
+#[inline]
+#[target_feature(enable = "avx2")]
+unsafe fn products([place, first, second]: &Words, places: &Places<'_>, x: usize) -> [[__m256i; INT8_BLOCKS]; 2] {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe {
+        let start = *places.starts.get_unchecked(*place as usize) as usize;
+        let pixels = places.slots.as_ptr().add(start + x * GROUP);
+        let mut products = [[_mm256_setzero_si256(); INT8_BLOCKS]; 2];
+        // Loads each weight by itself: from one load of both the compiler would move them through general registers.
+        for (products, four) in products.iter_mut().zip([first, second]) {
+            let four = _mm256_castps_si256(_mm256_broadcast_ss(&*std::ptr::from_ref(four).cast()));
+            for (b, products) in products.iter_mut().enumerate() {
+                let bytes = _mm256_loadu_si256(pixels.add(8 * b * GROUP).cast());
+                *products = _mm256_maddubs_epi16(bytes, four);
+            }
+        }
+        products
+    }
 }
 
 /// Returns `sat(rint(sum · multiplier))` of four filters as one register of groups.
@@ -177,27 +235,23 @@ fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
 }
 
 fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-    let rows = window.rows();
+    let places = Places::new(layer, window, geometry);
     last_row_by_blocks(out, from, |x, values| {
         // SAFETY: `int8_kernels` has detected the features.
-        unsafe { int8_last_block(layer, &rows, x, values, geometry) }
+        unsafe { int8_last_block(layer, &places, x, values) }
     });
 }
 
 #[target_feature(enable = "avx2,fma")]
-fn int8_last_block(
-    layer: &Packed,
-    rows: &[&[u8]; 3],
-    x: usize,
-    values: &mut [[f32; BLOCK]; OUTPUTS],
-    geometry: Geometry,
-) {
-    for g in 0..OUTPUTS.div_ceil(GROUP) {
-        for start in (0..BLOCK).step_by(8 * INT8_BLOCKS) {
-            let sums = int8_sums(layer, g, rows, x + start, geometry);
-            for (o, sums) in (g * GROUP..OUTPUTS).zip(sums) {
-                let multiplier = _mm256_set1_ps(layer.multiplier[o]);
-                for (values, sum) in values[o][start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
+fn int8_last_block(layer: &Packed, places: &Places<'_>, x: usize, values: &mut [[f32; BLOCK]; OUTPUTS]) {
+    for start in (0..BLOCK).step_by(8 * INT8_BLOCKS) {
+        let mut words = layer.weights.as_chunks().0;
+        for (g, values) in values.chunks_mut(GROUP).enumerate() {
+            let sums;
+            (sums, words) = int8_sums(words, &layer.bias[g * GROUP..][..GROUP], places, x + start);
+            for (o, (values, sums)) in values.iter_mut().zip(sums).enumerate() {
+                let multiplier = _mm256_set1_ps(layer.multiplier[g * GROUP + o]);
+                for (values, sum) in values[start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
                     let value = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), multiplier);
                     // SAFETY: the slice holds 8 values.
                     unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
