@@ -7,10 +7,10 @@ use crate::error::{PhasefrontError, guard};
 pub struct Display {
     /// The number of pixels along x.
     #[uniffi(default = 1920)]
-    pub width: u32,
+    pub width: usize,
     /// The number of pixels along y.
     #[uniffi(default = 1080)]
-    pub height: u32,
+    pub height: usize,
     /// The distance between neighbouring pixels, in µm.
     #[uniffi(default = 8.0)]
     pub pitch_um: f64,
@@ -35,7 +35,7 @@ pub struct Display {
     pub offset_mm: f64,
     /// The number of bits of a modulator level.
     #[uniffi(default = 8)]
-    pub bits: u32,
+    pub bits: usize,
     /// The radius of the aperture in the Fourier plane; 1 is the whole first order.
     #[uniffi(default = 1.0)]
     pub aperture_radius: f64,
@@ -61,8 +61,8 @@ impl From<phasefront::Display> for Display {
             _ => ([638.0, 520.0, 450.0], nm.first().copied()),
         };
         Display {
-            width: display.width() as u32,
-            height: display.height() as u32,
+            width: display.width(),
+            height: display.height(),
             pitch_um: round(display.pitch_m() * 1e6),
             red_nm,
             green_nm,
@@ -70,7 +70,7 @@ impl From<phasefront::Display> for Display {
             laser_nm,
             volume_depth_mm: round(display.volume_depth_m() * 1e3),
             offset_mm: round(display.offset_m() * 1e3),
-            bits: display.bits(),
+            bits: display.bits() as usize,
             aperture_radius: display.aperture_radius(),
         }
     }

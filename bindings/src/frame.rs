@@ -91,9 +91,9 @@ pub struct Orientation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct PlaneInfo {
     /// The number of bytes from one row to the next.
-    pub row_stride: u32,
+    pub row_stride: usize,
     /// The number of bytes from one pixel to the next in a row.
-    pub pixel_stride: u32,
+    pub pixel_stride: usize,
 }
 
 /// The format and size of a colour image.
@@ -102,9 +102,9 @@ pub struct ColourInfo {
     /// The memory layout.
     pub format: ColourFormat,
     /// The width of the sensor's image, in pixels.
-    pub width: u32,
+    pub width: usize,
     /// The height of the sensor's image, in pixels.
-    pub height: u32,
+    pub height: usize,
     /// The planes, in the format's order.
     pub planes: Vec<PlaneInfo>,
     /// The matrix of luma and chroma. Other formats ignore it.
@@ -119,9 +119,9 @@ pub struct DepthInfo {
     /// The memory layout.
     pub format: DepthFormat,
     /// The width of the sensor's image, in pixels.
-    pub width: u32,
+    pub width: usize,
     /// The height of the sensor's image, in pixels.
-    pub height: u32,
+    pub height: usize,
     /// The plane.
     pub plane: PlaneInfo,
 }
@@ -132,9 +132,9 @@ pub struct ConfidenceInfo {
     /// The memory layout.
     pub format: ConfidenceFormat,
     /// The width in pixels, equal to the depth image's.
-    pub width: u32,
+    pub width: usize,
     /// The height in pixels, equal to the depth image's.
-    pub height: u32,
+    pub height: usize,
     /// The plane.
     pub plane: PlaneInfo,
 }
@@ -179,7 +179,7 @@ pub struct Cameras {
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct FrameInfo {
     /// The time at which the frame was taken, in nanoseconds of any clock that runs forward.
-    pub timestamp_ns: u64,
+    pub timestamp_ns: i64,
     /// The colour image.
     pub colour: ColourInfo,
     /// The depth image.
@@ -228,19 +228,27 @@ impl FrameInfo {
             .zip(memory.colour)
             .map(|(info, bytes)| info.plane(bytes))
             .collect();
-        let size = |width: u32, height: u32| (width as usize, height as usize);
-        let (width, height) = size(self.colour.width, self.colour.height);
-        let colour = ColourImage::new(format, width, height, &planes)?;
+        let timestamp_ns = u64::try_from(self.timestamp_ns).map_err(|_| {
+            PhasefrontError::Frame(format!(
+                "frame: its timestamp is {} ns; 0 is the least",
+                self.timestamp_ns
+            ))
+        })?;
+        let colour = ColourImage::new(format, self.colour.width, self.colour.height, &planes)?;
 
-        let (width, height) = size(self.depth.width, self.depth.height);
-        let mut depth = DepthImage::new(self.depth.format, width, height, self.depth.plane.plane(memory.depth))?;
+        let DepthInfo {
+            format,
+            width,
+            height,
+            plane,
+        } = &self.depth;
+        let mut depth = DepthImage::new(*format, *width, *height, plane.plane(memory.depth))?;
         if let Some(info) = &self.confidence {
-            let (width, height) = size(info.width, info.height);
             let plane = info.plane.plane(memory.confidence);
-            depth = depth.with_confidence(info.format, width, height, plane)?;
+            depth = depth.with_confidence(info.format, info.width, info.height, plane)?;
         }
 
-        let mut frame = CameraFrame::new(self.timestamp_ns, colour, depth);
+        let mut frame = CameraFrame::new(timestamp_ns, colour, depth);
         frame.orientation = self.orientation;
         if let Some(cameras) = &self.cameras {
             frame.alignment = input::Alignment::Cameras(cameras.try_into()?);
@@ -251,7 +259,7 @@ impl FrameInfo {
 
 impl PlaneInfo {
     fn plane(self, bytes: &[u8]) -> Plane<'_> {
-        Plane::new(bytes, self.row_stride as usize, self.pixel_stride as usize)
+        Plane::new(bytes, self.row_stride, self.pixel_stride)
     }
 }
 

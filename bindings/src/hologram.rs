@@ -20,13 +20,13 @@ pub struct RawHologram {
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct HologramInfo {
     /// The timestamp of the frame.
-    pub timestamp_ns: u64,
+    pub timestamp_ns: i64,
     /// The width in pixels.
-    pub width: u32,
+    pub width: usize,
     /// The height in pixels.
-    pub height: u32,
+    pub height: usize,
     /// The number of colours of the levels: 3, or 1 for a display with one laser.
-    pub colours: u32,
+    pub colours: usize,
     /// The amplitude that maps to full light.
     pub scale: f32,
     /// The distance of the near end of the volume in metres; none for normalized depth.
@@ -36,7 +36,7 @@ pub struct HologramInfo {
     /// The share of the depth sensor's pixels that had a usable reading.
     pub valid_depth: f32,
     /// The quality level of the hologram; 0 is the best.
-    pub quality_level: u32,
+    pub quality_level: usize,
     /// The time that each stage took.
     pub times: FrameTimes,
 }
@@ -59,8 +59,8 @@ impl RawHologram {
     #[uniffi::constructor]
     pub fn of_field(
         field: &[u8],
-        width: u32,
-        height: u32,
+        width: usize,
+        height: usize,
         z_mm: f64,
         target: Arc<Target>,
         options: EncoderOptions,
@@ -81,35 +81,33 @@ impl RawHologram {
                     )
                 })
                 .collect();
-            let shape = (height as usize, width as usize);
+            let shape = (height, width);
             let core = session::Hologram::of_field(&values, shape, z_mm / 1e3, &target.core, &(&options).into())?;
             Ok(RawHologram::new(core))
         })
     }
 
     /// Returns the properties of the hologram.
-    pub fn info(&self) -> Result<HologramInfo, PhasefrontError> {
-        guard(|| {
-            let (height, width) = self.core.shape();
-            let (near_m, far_m) = self.core.range_m().unzip();
-            Ok(HologramInfo {
-                timestamp_ns: self.core.timestamp_ns(),
-                width: width as u32,
-                height: height as u32,
-                colours: self.core.colours() as u32,
-                scale: self.core.scale(),
-                near_m,
-                far_m,
-                valid_depth: self.core.valid_depth(),
-                quality_level: self.core.quality_level() as u32,
-                times: self.core.times().into(),
-            })
-        })
+    pub fn info(&self) -> HologramInfo {
+        let (height, width) = self.core.shape();
+        let (near_m, far_m) = self.core.range_m().unzip();
+        HologramInfo {
+            timestamp_ns: self.core.timestamp_ns() as i64,
+            width: width,
+            height: height,
+            colours: self.core.colours(),
+            scale: self.core.scale(),
+            near_m,
+            far_m,
+            valid_depth: self.core.valid_depth(),
+            quality_level: self.core.quality_level(),
+            times: self.core.times().into(),
+        }
     }
 
     /// Returns another handle to the same hologram. Each reader of its memory holds one.
-    pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
-        Ok(self)
+    pub fn share(self: Arc<Self>) -> Arc<Self> {
+        self
     }
 
     /// Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
@@ -117,30 +115,30 @@ impl RawHologram {
     ///
     /// # Errors
     /// Returns an error for other colours.
-    pub fn plane_address(&self, colour: u32) -> Result<u64, PhasefrontError> {
-        guard(|| Ok(self.core.plane(colour as usize)?.as_ptr() as u64))
+    pub fn plane_address(&self, colour: usize) -> Result<u64, PhasefrontError> {
+        guard(|| Ok(self.core.plane(colour)?.as_ptr() as u64))
     }
 
     /// Returns the number of bytes of a plane.
-    pub fn plane_len(&self) -> Result<u64, PhasefrontError> {
-        guard(|| Ok(self.core.plane(0)?.len() as u64))
+    pub fn plane_len(&self) -> u64 {
+        let (height, width) = self.core.shape();
+        (height * width) as u64
     }
 
     /// Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
     /// Coordinates run from 0 to 1 from the upper left corner.
-    pub fn z_at(&self, x: f64, y: f64) -> Result<f64, PhasefrontError> {
-        guard(|| Ok(self.core.z_at(x, y) * 1e3))
+    pub fn z_at(&self, x: f64, y: f64) -> f64 {
+        self.core.z_at(x, y) * 1e3
     }
 
     /// Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
     ///
     /// # Errors
     /// Returns an error if the image is empty or z is too far away.
-    pub fn preview(&self, z_mm: f64, width: u32, height: u32) -> Result<Arc<RawImage>, PhasefrontError> {
+    pub fn preview(&self, z_mm: f64, width: usize, height: usize) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
-            let (w, h) = (width as usize, height as usize);
-            let mut bytes = vec![0; session::Hologram::preview_bytes(h, w)?];
-            self.core.preview(z_mm / 1e3, h, w, &mut bytes)?;
+            let mut bytes = vec![0; session::Hologram::preview_bytes(height, width)?];
+            self.core.preview(z_mm / 1e3, height, width, &mut bytes)?;
             Ok(Arc::new(RawImage {
                 bytes,
                 width,
@@ -172,17 +170,17 @@ impl RawHologram {
     ///
     /// # Errors
     /// Returns an error if the layout does not have this image.
-    pub fn output(&self, placement: Placement, image: u32) -> Result<Arc<RawImage>, PhasefrontError> {
+    pub fn output(&self, placement: Placement, image: usize) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
             let plan = Output::new(self.core.target(), self.core.shape(), placement)?;
             let mut bytes = vec![0; plan.image_bytes()];
-            plan.write(self.core.output_levels(), image as usize, &mut bytes)?;
+            plan.write(self.core.output_levels(), image, &mut bytes)?;
             let (height, width) = plan.shape();
             Ok(Arc::new(RawImage {
                 bytes,
-                width: width as u32,
-                height: height as u32,
-                pixel_bytes: placement.layout.pixel_bytes() as u32,
+                width: width,
+                height: height,
+                pixel_bytes: placement.layout.pixel_bytes(),
             }))
         })
     }
@@ -194,9 +192,9 @@ impl RawHologram {
         let (height, width) = self.core.shape();
         Arc::new(RawPlanes {
             numbers,
-            width: width as u32,
-            height: height as u32,
-            colours: self.core.colours() as u32,
+            width: width,
+            height: height,
+            colours: self.core.colours(),
         })
     }
 }
@@ -206,9 +204,9 @@ impl RawHologram {
 #[derive(Debug, uniffi::Object)]
 pub struct RawPlanes {
     numbers: Numbers,
-    width: u32,
-    height: u32,
-    colours: u32,
+    width: usize,
+    height: usize,
+    colours: usize,
 }
 
 #[derive(Debug)]
@@ -220,8 +218,8 @@ enum Numbers {
 #[uniffi::export]
 impl RawPlanes {
     /// Returns another handle to the same planes. Each reader of their memory holds one.
-    pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
-        Ok(self)
+    pub fn share(self: Arc<Self>) -> Arc<Self> {
+        self
     }
 
     /// Returns the address of the plane of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. The address is valid
@@ -229,7 +227,7 @@ impl RawPlanes {
     ///
     /// # Errors
     /// Returns an error for other colours.
-    pub fn plane_address(&self, colour: u32) -> Result<u64, PhasefrontError> {
+    pub fn plane_address(&self, colour: usize) -> Result<u64, PhasefrontError> {
         guard(|| {
             if colour >= self.colours {
                 return Err(PhasefrontError::Setting(format!(
@@ -237,38 +235,36 @@ impl RawPlanes {
                     self.colours
                 )));
             }
-            let size = u64::from(self.pixel_bytes()?) * u64::from(self.width) * u64::from(self.height);
+            let size = self.pixel_bytes() * self.width * self.height;
             let first = match &self.numbers {
                 Numbers::Amplitudes(values) => values.as_ptr() as u64,
                 Numbers::Field(values) => values.as_ptr() as u64,
             };
-            Ok(first + u64::from(colour) * size)
+            Ok(first + (colour * size) as u64)
         })
     }
 
     /// Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part.
-    pub fn pixel_bytes(&self) -> Result<u32, PhasefrontError> {
-        guard(|| {
-            Ok(match &self.numbers {
-                Numbers::Amplitudes(_) => size_of::<f32>() as u32,
-                Numbers::Field(_) => size_of::<Complex32>() as u32,
-            })
-        })
+    pub fn pixel_bytes(&self) -> usize {
+        match &self.numbers {
+            Numbers::Amplitudes(_) => size_of::<f32>(),
+            Numbers::Field(_) => size_of::<Complex32>(),
+        }
     }
 
     /// Returns the width in pixels.
-    pub fn width(&self) -> Result<u32, PhasefrontError> {
-        Ok(self.width)
+    pub fn width(&self) -> usize {
+        self.width
     }
 
     /// Returns the height in pixels.
-    pub fn height(&self) -> Result<u32, PhasefrontError> {
-        Ok(self.height)
+    pub fn height(&self) -> usize {
+        self.height
     }
 
     /// Returns the number of planes: 3, or 1 for a display with one laser.
-    pub fn colours(&self) -> Result<u32, PhasefrontError> {
-        Ok(self.colours)
+    pub fn colours(&self) -> usize {
+        self.colours
     }
 }
 
@@ -276,40 +272,40 @@ impl RawPlanes {
 #[derive(Debug, uniffi::Object)]
 pub struct RawImage {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-    pub(crate) pixel_bytes: u32,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) pixel_bytes: usize,
 }
 
 #[uniffi::export]
 impl RawImage {
     /// Returns another handle to the same image. Each reader of its memory holds one.
-    pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
-        Ok(self)
+    pub fn share(self: Arc<Self>) -> Arc<Self> {
+        self
     }
 
     /// Returns the address of the bytes. It is valid as long as this object.
-    pub fn address(&self) -> Result<u64, PhasefrontError> {
-        Ok(self.bytes.as_ptr() as u64)
+    pub fn address(&self) -> u64 {
+        self.bytes.as_ptr() as u64
     }
 
     /// Returns the number of bytes.
-    pub fn byte_len(&self) -> Result<u64, PhasefrontError> {
-        Ok(self.bytes.len() as u64)
+    pub fn byte_len(&self) -> u64 {
+        self.bytes.len() as u64
     }
 
     /// Returns the width in pixels.
-    pub fn width(&self) -> Result<u32, PhasefrontError> {
-        Ok(self.width)
+    pub fn width(&self) -> usize {
+        self.width
     }
 
     /// Returns the height in pixels.
-    pub fn height(&self) -> Result<u32, PhasefrontError> {
-        Ok(self.height)
+    pub fn height(&self) -> usize {
+        self.height
     }
 
     /// Returns the number of bytes of a pixel.
-    pub fn pixel_bytes(&self) -> Result<u32, PhasefrontError> {
-        Ok(self.pixel_bytes)
+    pub fn pixel_bytes(&self) -> usize {
+        self.pixel_bytes
     }
 }

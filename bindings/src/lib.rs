@@ -7,7 +7,7 @@
 //!
 //! - Images are passed as `&[u8]`, which UniFFI passes without a copy. Results are objects whose memory is read in
 //!   place, at an address that is valid as long as the object. Nothing is passed pixel by pixel.
-//! - Every call returns a result. A panic becomes [`PhasefrontError::Internal`].
+//! - Every call that can fail returns a result. A panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 
 mod display;
@@ -45,8 +45,22 @@ pub use trace::{Stage, StageListener, set_stage_listener};
 
 uniffi::setup_scaffolding!();
 
+type Int = usize;
+
+uniffi::custom_type!(
+    /// A number of pixels, steps and the like.
+    Int,
+    i32,
+    {
+        remote,
+        lower: |number| i32::try_from(number).unwrap_or(i32::MAX),
+        // A negative number becomes one that every check of a range refuses.
+        try_lift: |number| Ok(u32::try_from(number).unwrap_or(u32::MAX) as usize),
+    }
+);
+
 /// Returns the version of the library.
 #[uniffi::export]
-pub fn version() -> Result<String, PhasefrontError> {
-    Ok(env!("CARGO_PKG_VERSION").to_owned())
+pub fn version() -> String {
+    env!("CARGO_PKG_VERSION").to_owned()
 }

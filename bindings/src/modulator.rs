@@ -94,9 +94,9 @@ impl RawModulator {
     ///
     /// # Errors
     /// Another number of bytes, or cells that are those of no level.
-    pub fn unpack(&self, images: &[u8], width: u32, height: u32) -> Result<Arc<RawImage>, PhasefrontError> {
+    pub fn unpack(&self, images: &[u8], width: usize, height: usize) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
-            let shape @ (rows, columns) = (height as usize, width as usize);
+            let shape @ (rows, columns) = (height, width);
             let frames = Frames::new(&self.core, shape)?;
             let needed = match &frames {
                 Frames::Planes(plan) => plan.frame_bytes(),
@@ -169,8 +169,8 @@ impl Frames {
 fn image(bytes: Vec<u8>, (height, width): (usize, usize), pixel_bytes: usize) -> Arc<RawImage> {
     Arc::new(RawImage {
         bytes,
-        width: width as u32,
-        height: height as u32,
-        pixel_bytes: pixel_bytes as u32,
+        width: width,
+        height: height,
+        pixel_bytes: pixel_bytes,
     })
 }

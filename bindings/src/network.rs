@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 /// A hologram network. It is immutable and can be used by several sessions.
 #[derive(Debug, uniffi::Object)]
+#[uniffi(name = "HologramNetwork")]
 pub struct Network {
     pub(crate) core: Arc<phasefront::Network>,
 }
@@ -15,9 +16,9 @@ pub struct Network {
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct NetworkInfo {
     /// The number of convolutions.
-    pub layers: u32,
+    pub layers: usize,
     /// The number of filters of each hidden layer.
-    pub filters: u32,
+    pub filters: usize,
     /// The number format of the layers.
     pub precision: String,
     /// The distance between neighbouring pixels, in µm.
@@ -106,7 +107,7 @@ mod built_in {
     }
 }
 
-#[uniffi::export]
+#[uniffi::export(name = "HologramNetwork")]
 impl Network {
     /// Reads a network from the bytes of an ONNX file.
     ///
@@ -151,16 +152,14 @@ impl Network {
     }
 
     /// Returns the properties of the network.
-    pub fn info(&self) -> Result<NetworkInfo, PhasefrontError> {
-        guard(|| {
-            let display = self.core.display();
-            Ok(NetworkInfo {
-                layers: self.core.layers() as u32,
-                filters: self.core.filters() as u32,
-                precision: self.core.precision().to_string(),
-                pitch_um: display.pitch_m * 1e6,
-                volume_depth_mm: display.volume_depth_m * 1e3,
-            })
-        })
+    pub fn info(&self) -> NetworkInfo {
+        let display = self.core.display();
+        NetworkInfo {
+            layers: self.core.layers(),
+            filters: self.core.filters(),
+            precision: self.core.precision().to_string(),
+            pitch_um: display.pitch_m * 1e6,
+            volume_depth_mm: display.volume_depth_m * 1e3,
+        }
     }
 }

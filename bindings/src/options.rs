@@ -31,7 +31,7 @@ pub enum Encoding {
         /// The standard deviation in pixels; 0.7 in the paper.
         sigma: f32,
         /// The number of taps, an odd number; 3 in the paper.
-        width: u32,
+        width: usize,
     },
     /// Double phase after a filter that removes high diagonal frequencies (BL-DPM).
     BandLimit {
@@ -76,6 +76,7 @@ pub enum DepthRange {
 
 /// The method that computes holograms.
 #[derive(Debug, Clone, uniffi::Enum)]
+#[uniffi(name = "HologramMethod")]
 pub enum Method {
     /// A trained network.
     Trained {
@@ -99,15 +100,15 @@ pub struct QualityLevel {
     /// The method that computes the hologram.
     pub method: Method,
     /// The width of the hologram in pixels.
-    pub width: u32,
+    pub width: usize,
     /// The height of the hologram in pixels.
-    pub height: u32,
+    pub height: usize,
     /// The number of local steps; none for the session's number.
     #[uniffi(default = None)]
-    pub local_steps: Option<u32>,
+    pub local_steps: Option<usize>,
     /// The number of steps at the midpoint; none for the session's number.
     #[uniffi(default = None)]
-    pub midpoint_steps: Option<u32>,
+    pub midpoint_steps: Option<usize>,
 }
 
 /// Determines whether a session may change its quality level.
@@ -119,7 +120,7 @@ pub enum Quality {
     /// The session stays at this quality level.
     Fixed {
         /// The quality level; 0 is the best.
-        quality_level: u32,
+        quality_level: usize,
     },
 }
 
@@ -161,10 +162,10 @@ pub struct EncoderOptions {
     /// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
     /// what suits the encoding: 1, and 0 with a pre-filter.
     #[uniffi(default = None)]
-    pub local_steps: Option<u32>,
+    pub local_steps: Option<usize>,
     /// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
     #[uniffi(default = 0)]
-    pub midpoint_steps: u32,
+    pub midpoint_steps: usize,
 }
 
 /// The options of a session. [`session_options`] returns the defaults.
@@ -190,21 +191,21 @@ pub struct SessionOptions {
     /// The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for
     /// the encoding's default: 1, and 0 with a pre-filter.
     #[uniffi(default = None)]
-    pub local_steps: Option<u32>,
+    pub local_steps: Option<usize>,
     /// The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
     /// stills; 1 suits video, where each frame continues from the previous one.
     #[uniffi(default = 0)]
-    pub midpoint_steps: u32,
+    pub midpoint_steps: usize,
     /// The distances that map to the ends of the volume.
     pub depth_range: DepthRange,
     /// The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
     pub least_confidence: f32,
     /// The number of threads to compute with, at most 256; none for as many as the device has.
-    pub threads: Option<u32>,
+    pub threads: Option<usize>,
     /// The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
     /// session is a multiple of it.
     #[uniffi(default = 33554432)]
-    pub most_pixels: u64,
+    pub most_pixels: usize,
     /// The backend that computes frames.
     pub backend: Backend,
 }
@@ -296,23 +297,21 @@ impl SessionOptions {
             quality_levels: (core.quality_levels.iter())
                 .map(|quality_level| QualityLevel {
                     method: method(&quality_level.method),
-                    width: quality_level.width as u32,
-                    height: quality_level.height as u32,
+                    width: quality_level.width,
+                    height: quality_level.height,
                     local_steps: None,
                     midpoint_steps: None,
                 })
                 .collect(),
             quality: match core.quality {
                 session::Quality::Adaptive => Quality::Adaptive,
-                session::Quality::Fixed(quality_level) => Quality::Fixed {
-                    quality_level: quality_level as u32,
-                },
+                session::Quality::Fixed(quality_level) => Quality::Fixed { quality_level },
             },
             target_rate_hz: core.target_rate_hz,
             encoding: match &core.encoder.encoding {
                 phasefront::Encoding::AntiAlias { sigma, width } => Encoding::AntiAlias {
                     sigma: *sigma,
-                    width: *width as u32,
+                    width: *width,
                 },
                 phasefront::Encoding::BandLimit { k } => Encoding::BandLimit { k: *k },
                 phasefront::Encoding::Deep(core) => Encoding::Deep {
@@ -327,11 +326,11 @@ impl SessionOptions {
             },
             dark_threshold: None,
             local_steps: None,
-            midpoint_steps: core.encoder.midpoint_steps as u32,
+            midpoint_steps: core.encoder.midpoint_steps,
             depth_range: core.depth.range,
             least_confidence: core.depth.least_confidence,
-            threads: core.threads.map(|threads| threads.get() as u32),
-            most_pixels: core.most_pixels as u64,
+            threads: core.threads.map(NonZeroUsize::get),
+            most_pixels: core.most_pixels,
             backend: core.backend,
         }
     }
@@ -343,16 +342,15 @@ impl From<&EncoderOptions> for phasefront::EncoderOptions {
             Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
             Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
                 sigma: *sigma,
-                width: *width as usize,
+                width: *width,
             },
             Encoding::BandLimit { k } => phasefront::Encoding::BandLimit { k: *k },
             Encoding::Deep { prefilter } => phasefront::Encoding::Deep(prefilter.core.clone()),
         });
-        let steps = options.local_steps;
         phasefront::EncoderOptions {
             dark_threshold: options.dark_threshold.unwrap_or(defaults.dark_threshold),
-            local_steps: steps.map_or(defaults.local_steps, |steps| steps as usize),
-            midpoint_steps: options.midpoint_steps as usize,
+            local_steps: options.local_steps.unwrap_or(defaults.local_steps),
+            midpoint_steps: options.midpoint_steps,
             brightness: match options.brightness {
                 Brightness::Smoothed => phasefront::Brightness::Smoothed,
                 Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
@@ -385,16 +383,15 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             midpoint_steps: options.midpoint_steps,
         })
             .into();
-        let steps = |asked: Option<u32>, defaults: usize| asked.map_or(defaults, |steps| steps as usize);
         to.quality_levels = (options.quality_levels.iter())
             .map(|quality_level| session::QualityLevel {
                 method: method(quality_level),
-                height: quality_level.height as usize,
-                width: quality_level.width as usize,
+                height: quality_level.height,
+                width: quality_level.width,
                 backend: None,
                 encoder: Some(phasefront::EncoderOptions {
-                    local_steps: steps(quality_level.local_steps, to.encoder.local_steps),
-                    midpoint_steps: steps(quality_level.midpoint_steps, to.encoder.midpoint_steps),
+                    local_steps: quality_level.local_steps.unwrap_or(to.encoder.local_steps),
+                    midpoint_steps: quality_level.midpoint_steps.unwrap_or(to.encoder.midpoint_steps),
                     ..to.encoder.clone()
                 }),
             })
@@ -402,10 +399,10 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
         to.backend = options.backend;
-        to.most_pixels = usize::try_from(options.most_pixels).unwrap_or(usize::MAX);
+        to.most_pixels = options.most_pixels;
         to.threads = match options.threads {
             None => None,
-            Some(threads) => Some(NonZeroUsize::new(threads as usize).ok_or_else(|| {
+            Some(threads) => Some(NonZeroUsize::new(threads).ok_or_else(|| {
                 PhasefrontError::Setting("0 threads compute nothing; give at least 1, or none for all".into())
             })?),
         };
@@ -417,7 +414,7 @@ impl From<Quality> for session::Quality {
     fn from(quality: Quality) -> Self {
         match quality {
             Quality::Adaptive => session::Quality::Adaptive,
-            Quality::Fixed { quality_level } => session::Quality::Fixed(quality_level as usize),
+            Quality::Fixed { quality_level } => session::Quality::Fixed(quality_level),
         }
     }
 }

@@ -66,9 +66,9 @@ pub enum QualityReason {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct QualityChange {
     /// The previous quality level.
-    pub from_quality_level: u32,
+    pub from_quality_level: usize,
     /// The new quality level; the previous one if the reason is `Refused`.
-    pub to_quality_level: u32,
+    pub to_quality_level: usize,
     /// The reason.
     pub reason: QualityReason,
 }
@@ -81,13 +81,13 @@ pub trait SessionListener: Send + Sync {
     fn on_processed(&self, hologram: Arc<RawHologram>) -> Result<(), ListenerError>;
 
     /// Reports that a frame was dropped.
-    fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> Result<(), ListenerError>;
+    fn on_dropped(&self, timestamp_ns: i64, reason: DropReason) -> Result<(), ListenerError>;
 
     /// Reports that a frame could not be processed. The session continues.
-    fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), ListenerError>;
+    fn on_failed(&self, timestamp_ns: i64, message: String) -> Result<(), ListenerError>;
 
     /// Reports that the session uses another quality level after the frame of `timestamp_ns`.
-    fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), ListenerError>;
+    fn on_quality_changed(&self, timestamp_ns: i64, change: QualityChange) -> Result<(), ListenerError>;
 
     /// Reports that the session is closed and its memory is freed. This is the last call. It is made exactly once, even
     /// if shutting down does not wait for it.
@@ -262,22 +262,17 @@ impl RawSession {
     }
 
     /// Returns the statistics of the session, also after it was closed. Never waits for a frame.
-    pub fn statistics(&self) -> Result<Statistics, PhasefrontError> {
-        guard(|| {
-            let failures = self.listener_failures.load(Ordering::Relaxed);
-            Ok(Statistics::new(self.core.statistics(), failures))
-        })
+    pub fn statistics(&self) -> Statistics {
+        let failures = self.listener_failures.load(Ordering::Relaxed);
+        Statistics::new(self.core.statistics(), failures)
     }
 
     /// Closes the session: it accepts no more frames and frees its memory. When this returns, the listener has received
     /// all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
     /// listener while a session computes, does not wait for that. Closing twice does nothing.
-    pub fn shut_down(&self) -> Result<(), PhasefrontError> {
-        guard(|| {
-            self.closed.store(true, Ordering::Relaxed);
-            self.core.close();
-            Ok(())
-        })
+    pub fn shut_down(&self) {
+        self.closed.store(true, Ordering::Relaxed);
+        self.core.close();
     }
 }
 
@@ -313,10 +308,10 @@ impl Deref for Core {
 fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerError> {
     match event {
         Event::Processed(hologram) => listener.on_processed(RawHologram::new(hologram)),
-        Event::Dropped { timestamp_ns, reason } => listener.on_dropped(timestamp_ns, reason.into()),
+        Event::Dropped { timestamp_ns, reason } => listener.on_dropped(timestamp_ns as i64, reason.into()),
         Event::Failed { timestamp_ns, error } => {
             log::warn!("the frame of {timestamp_ns} ns failed: {error}");
-            listener.on_failed(timestamp_ns, error.to_string())
+            listener.on_failed(timestamp_ns as i64, error.to_string())
         }
         Event::QualityChanged {
             timestamp_ns,
@@ -334,11 +329,11 @@ fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerErro
             };
             log::info!("from quality level {from} to {to}: {reason:?}");
             let change = QualityChange {
-                from_quality_level: from as u32,
-                to_quality_level: to as u32,
+                from_quality_level: from,
+                to_quality_level: to,
                 reason,
             };
-            listener.on_quality_changed(timestamp_ns, change)
+            listener.on_quality_changed(timestamp_ns as i64, change)
         }
         Event::Closed => listener.on_closed(),
         other => {

@@ -38,17 +38,17 @@ impl From<session::FrameTimes> for FrameTimes {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct Drops {
     /// Frames that waited when a newer frame arrived.
-    pub superseded: u64,
+    pub superseded: i64,
     /// Frames that arrived sooner than the target rate allows.
-    pub above_target_rate: u64,
+    pub above_target_rate: i64,
     /// Frames that arrived while the session was paused.
-    pub paused: u64,
+    pub paused: i64,
     /// Frames that were not finished when the session was reset.
-    pub reset: u64,
+    pub reset: i64,
     /// Frames that were not finished when the session was closed.
-    pub closed: u64,
+    pub closed: i64,
     /// The sum of all reasons.
-    pub total: u64,
+    pub total: i64,
 }
 
 /// The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
@@ -56,17 +56,17 @@ pub struct Drops {
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
 pub struct Statistics {
     /// Frames that were submitted.
-    pub submitted: u64,
+    pub submitted: i64,
     /// Frames that became holograms.
-    pub processed: u64,
+    pub processed: i64,
     /// Frames that could not be processed.
-    pub failed: u64,
+    pub failed: i64,
     /// Frames that were refused because they were late or the session was closed.
-    pub refused: u64,
+    pub refused: i64,
     /// Frames that were dropped.
     pub dropped: Drops,
     /// Frames that wait or are being processed.
-    pub pending: u64,
+    pub pending: i64,
     /// Holograms per second over the last 30.
     pub rate_hz: f64,
     /// The mean times of the stages over the last 30 holograms.
@@ -76,41 +76,34 @@ pub struct Statistics {
     /// The reason for using this backend.
     pub backend_why: String,
     /// The quality level; 0 is the best.
-    pub quality_level: u32,
+    pub quality_level: usize,
     /// The number of errors that the listener threw.
-    pub listener_failures: u64,
+    pub listener_failures: i64,
 }
 
 impl Statistics {
     pub(crate) fn new(core: session::Statistics, listener_failures: u64) -> Self {
-        let total = core.dropped.total();
-        let session::Drops {
-            superseded,
-            above_target_rate,
-            paused,
-            reset,
-            closed,
-        } = core.dropped;
+        let dropped = core.dropped;
         Statistics {
-            submitted: core.submitted,
-            processed: core.processed,
-            failed: core.failed,
-            refused: core.refused,
+            submitted: core.submitted as i64,
+            processed: core.processed as i64,
+            failed: core.failed as i64,
+            refused: core.refused as i64,
             dropped: Drops {
-                superseded,
-                above_target_rate,
-                paused,
-                reset,
-                closed,
-                total,
+                superseded: dropped.superseded as i64,
+                above_target_rate: dropped.above_target_rate as i64,
+                paused: dropped.paused as i64,
+                reset: dropped.reset as i64,
+                closed: dropped.closed as i64,
+                total: dropped.total() as i64,
             },
-            pending: core.pending,
+            pending: core.pending as i64,
             rate_hz: core.rate_hz,
             times: core.times.into(),
             backend: core.backend.name,
             backend_why: core.backend.why,
-            quality_level: core.quality_level as u32,
-            listener_failures: core.listener_panics + listener_failures,
+            quality_level: core.quality_level,
+            listener_failures: (core.listener_panics + listener_failures) as i64,
         }
     }
 }

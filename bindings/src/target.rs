@@ -10,11 +10,12 @@ use std::sync::Arc;
 /// The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
 /// light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
 #[derive(Debug, uniffi::Object)]
+#[uniffi(name = "HologramTarget")]
 pub struct Target {
     pub(crate) core: phasefront::Target,
 }
 
-#[uniffi::export]
+#[uniffi::export(name = "HologramTarget")]
 impl Target {
     /// Creates a target whose levels are equal steps of phase, with as many levels as the display's bits allow.
     ///
@@ -77,7 +78,7 @@ impl Target {
     }
 
     /// Returns the display.
-    pub fn display(&self) -> Result<Display, PhasefrontError> {
-        guard(|| Ok(self.core.display.clone().into()))
+    pub fn display(&self) -> Display {
+        self.core.display.clone().into()
     }
 }

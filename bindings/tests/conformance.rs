@@ -20,8 +20,8 @@ fn folder() -> PathBuf {
 
 /// Returns the levels of `hologram`, read as the other languages read them.
 fn levels(hologram: &RawHologram) -> Vec<u8> {
-    let len = hologram.plane_len().unwrap() as usize;
-    (0..hologram.info().unwrap().colours)
+    let len = hologram.plane_len() as usize;
+    (0..hologram.info().colours)
         .flat_map(|colour| {
             let address = hologram.plane_address(colour).unwrap() as usize;
             // SAFETY: the hologram is alive, and `address` points to its plane of `len` bytes.
@@ -34,9 +34,9 @@ fn levels(hologram: &RawHologram) -> Vec<u8> {
 /// Returns the bytes of all numbers of `planes`, read as the other languages read them.
 fn numbers(planes: &RawPlanes) -> Vec<u8> {
     let sides = [planes.pixel_bytes(), planes.width(), planes.height(), planes.colours()];
-    let len = sides.map(|side| side.unwrap() as usize).iter().product();
+    let len = sides.iter().product();
     let address = planes.plane_address(0).unwrap() as usize;
-    assert!(planes.plane_address(planes.colours().unwrap()).is_err());
+    assert!(planes.plane_address(planes.colours()).is_err());
     // SAFETY: the planes are alive and contiguous at `address`.
     #[allow(unsafe_code)]
     unsafe { std::slice::from_raw_parts(address as *const u8, len) }.to_vec()
@@ -48,8 +48,8 @@ fn model(name: &str) -> Arc<Network> {
     Network::from_file(path.to_str().unwrap().into()).unwrap()
 }
 
-fn int(value: &Value) -> u32 {
-    value.as_u64().unwrap() as u32
+fn int(value: &Value) -> usize {
+    value.as_u64().unwrap() as usize
 }
 
 fn plane(value: &Value) -> PlaneInfo {
@@ -63,7 +63,7 @@ fn plane(value: &Value) -> PlaneInfo {
 fn bytes<'a>(frames: &'a [u8], plane: &Value) -> &'a [u8] {
     match plane {
         Value::Null => &[],
-        _ => &frames[int(&plane["offset"]) as usize..][..int(&plane["length"]) as usize],
+        _ => &frames[int(&plane["offset"])..][..int(&plane["length"])],
     }
 }
 
@@ -114,7 +114,7 @@ fn options(case: &Value) -> SessionOptions {
 fn info(frame: &Value) -> FrameInfo {
     let (colour, depth, confidence) = (&frame["colour"], &frame["depth"], &frame["confidence"]);
     FrameInfo {
-        timestamp_ns: frame["timestamp_ns"].as_u64().unwrap(),
+        timestamp_ns: frame["timestamp_ns"].as_i64().unwrap(),
         colour: ColourInfo {
             format: match colour["format"].as_str().unwrap() {
                 "rgba" => ColourFormat::Rgba,

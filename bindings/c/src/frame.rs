@@ -256,19 +256,19 @@ impl PfFrame {
             depth: memory(&self.depth.plane, "depth.plane.data")?,
             confidence: memory(&self.confidence.plane, "confidence.plane.data")?,
             info: FrameInfo {
-                timestamp_ns: self.timestamp_ns,
+                timestamp_ns: i64::try_from(self.timestamp_ns).unwrap_or(i64::MAX),
                 colour: ColourInfo {
                     format: pick(&COLOUR_FORMATS, self.colour.format, "colour.format")?,
-                    width: self.colour.width,
-                    height: self.colour.height,
+                    width: self.colour.width as usize,
+                    height: self.colour.height as usize,
                     planes: planes.map(PlaneInfo::from).collect(),
                     matrix: pick(&YUV_MATRICES, self.colour.matrix, "colour.matrix")?,
                     video_range: self.colour.video_range,
                 },
                 depth: DepthInfo {
                     format: pick(&DEPTH_FORMATS, self.depth.format, "depth.format")?,
-                    width: self.depth.width,
-                    height: self.depth.height,
+                    width: self.depth.width as usize,
+                    height: self.depth.height as usize,
                     plane: (&self.depth.plane).into(),
                 },
                 confidence,
@@ -286,8 +286,8 @@ impl PfConfidence {
     fn info(&self) -> Result<ConfidenceInfo> {
         Ok(ConfidenceInfo {
             format: pick(&CONFIDENCE_FORMATS, self.format, "confidence.format")?,
-            width: self.width,
-            height: self.height,
+            width: self.width as usize,
+            height: self.height as usize,
             plane: (&self.plane).into(),
         })
     }
@@ -296,8 +296,8 @@ impl PfConfidence {
 impl From<&PfPlane> for PlaneInfo {
     fn from(plane: &PfPlane) -> Self {
         PlaneInfo {
-            row_stride: plane.row_stride,
-            pixel_stride: plane.pixel_stride,
+            row_stride: plane.row_stride as usize,
+            pixel_stride: plane.pixel_stride as usize,
         }
     }
 }

@@ -144,13 +144,13 @@ pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mu
     // SAFETY: the rules of this border.
     call(|| unsafe {
         give(info, "info", || {
-            let known = read(hologram, "hologram")?.0.info()?;
+            let known = read(hologram, "hologram")?.0.info();
             Ok(PfHologramInfo {
-                timestamp_ns: known.timestamp_ns,
-                width: known.width,
-                height: known.height,
-                colours: known.colours,
-                quality_level: known.quality_level,
+                timestamp_ns: known.timestamp_ns as u64,
+                width: known.width as u32,
+                height: known.height as u32,
+                colours: known.colours as u32,
+                quality_level: known.quality_level as u32,
                 scale: known.scale,
                 near_m: known.near_m.unwrap_or(f32::NAN),
                 far_m: known.far_m.unwrap_or(f32::NAN),
@@ -173,9 +173,9 @@ pub unsafe extern "C" fn pf_hologram_levels(
     // SAFETY: the rules of this border.
     call(|| unsafe {
         let hologram = &read(hologram, "hologram")?.0;
-        let address = hologram.plane_address(colour)?;
+        let address = hologram.plane_address(colour as usize)?;
         give(levels, "levels", || {
-            give(length, "length", || Ok(hologram.plane_len()? as usize))?;
+            give(length, "length", || Ok(hologram.plane_len() as usize))?;
             Ok(address as usize as *const u8)
         })
     })
@@ -186,7 +186,7 @@ pub unsafe extern "C" fn pf_hologram_levels(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_z_at(hologram: *const PfHologram, x: f64, y: f64, z_mm: *mut f64) -> PfStatus {
     // SAFETY: the rules of this border.
-    call(|| unsafe { give(z_mm, "z_mm", || read(hologram, "hologram")?.0.z_at(x, y)) })
+    call(|| unsafe { give(z_mm, "z_mm", || Ok(read(hologram, "hologram")?.0.z_at(x, y))) })
 }
 
 /// Creates the view of an eye focused at z, with 4 bytes for each pixel: red, green, blue, 255.
@@ -202,7 +202,11 @@ pub unsafe extern "C" fn pf_hologram_preview(
     call(|| unsafe {
         give(image, "image", || {
             let hologram = &read(hologram, "hologram")?.0;
-            Ok(object(PfImage(hologram.preview(z_mm, width, height)?)))
+            Ok(object(PfImage(hologram.preview(
+                z_mm,
+                width as usize,
+                height as usize,
+            )?)))
         })
     })
 }
@@ -247,15 +251,15 @@ pub unsafe extern "C" fn pf_planes_info(planes: *const PfPlanes, info: *mut PfPl
     call(|| unsafe {
         give(info, "info", || {
             let planes = &read(planes, "planes")?.0;
-            let (width, height, colours) = (planes.width()?, planes.height()?, planes.colours()?);
-            let numbers = planes.pixel_bytes()? / size_of::<f32>() as u32;
+            let (width, height, colours) = (planes.width(), planes.height(), planes.colours());
+            let numbers = planes.pixel_bytes() / size_of::<f32>();
             Ok(PfPlanesInfo {
                 data: planes.plane_address(0)? as usize as *const f32,
-                length: [width, height, colours, numbers].iter().map(|n| *n as usize).product(),
-                width,
-                height,
-                colours,
-                numbers,
+                length: width * height * colours * numbers,
+                width: width as u32,
+                height: height as u32,
+                colours: colours as u32,
+                numbers: numbers as u32,
             })
         })
     })
@@ -289,7 +293,7 @@ pub unsafe extern "C" fn pf_hologram_output(
                 shift_y: placement.shift_y,
             };
             let hologram = &read(hologram, "hologram")?.0;
-            Ok(object(PfImage(hologram.output(placement, number)?)))
+            Ok(object(PfImage(hologram.output(placement, number as usize)?)))
         })
     })
 }
@@ -309,11 +313,11 @@ pub unsafe extern "C" fn pf_image_info(image: *const PfImage, info: *mut PfImage
         give(info, "info", || {
             let image = &read(image, "image")?.0;
             Ok(PfImageInfo {
-                data: image.address()? as usize as *const u8,
-                length: image.byte_len()? as usize,
-                width: image.width()?,
-                height: image.height()?,
-                pixel_bytes: image.pixel_bytes()?,
+                data: image.address() as usize as *const u8,
+                length: image.byte_len() as usize,
+                width: image.width() as u32,
+                height: image.height() as u32,
+                pixel_bytes: image.pixel_bytes() as u32,
             })
         })
     })

@@ -138,10 +138,10 @@ pub unsafe extern "C" fn pf_options_push_quality_level(
             })?;
             options.quality_levels.push(QualityLevel {
                 method,
-                width: quality_level.width,
-                height: quality_level.height,
-                local_steps: u32::try_from(quality_level.local_steps).ok(),
-                midpoint_steps: u32::try_from(quality_level.midpoint_steps).ok(),
+                width: quality_level.width as usize,
+                height: quality_level.height as usize,
+                local_steps: usize::try_from(quality_level.local_steps).ok(),
+                midpoint_steps: usize::try_from(quality_level.midpoint_steps).ok(),
             });
             Ok(())
         })
@@ -179,7 +179,15 @@ pub unsafe extern "C" fn pf_options_set_double_phase(options: *mut PfOptions) ->
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_anti_alias(options: *mut PfOptions, sigma: f32, width: u32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { encode(options, Encoding::AntiAlias { sigma, width }) }
+    unsafe {
+        encode(
+            options,
+            Encoding::AntiAlias {
+                sigma,
+                width: width as usize,
+            },
+        )
+    }
 }
 
 /// Selects double phase after a filter that removes high diagonal frequencies (BL-DPM). `k` is the bound of
@@ -246,7 +254,7 @@ pub unsafe extern "C" fn pf_options_set_dark_threshold(options: *mut PfOptions, 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_local_steps(options: *mut PfOptions, steps: u32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { set(options, |options| options.local_steps = Some(steps)) }
+    unsafe { set(options, |options| options.local_steps = Some(steps as usize)) }
 }
 
 /// Sets the number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
@@ -254,7 +262,7 @@ pub unsafe extern "C" fn pf_options_set_local_steps(options: *mut PfOptions, ste
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_midpoint_steps(options: *mut PfOptions, steps: u32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { set(options, |options| options.midpoint_steps = steps) }
+    unsafe { set(options, |options| options.midpoint_steps = steps as usize) }
 }
 
 /// Sets the distances, in metres, that map to the ends of the volume. The default is the 1st and 99th percentile of the
@@ -280,7 +288,7 @@ pub unsafe extern "C" fn pf_options_set_least_confidence(options: *mut PfOptions
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_threads(options: *mut PfOptions, threads: u32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { set(options, |options| options.threads = Some(threads)) }
+    unsafe { set(options, |options| options.threads = Some(threads as usize)) }
 }
 
 /// Sets the maximum number of pixels of a quality level and of the modulator; 8192x4096 by default. The memory of a
@@ -288,7 +296,11 @@ pub unsafe extern "C" fn pf_options_set_threads(options: *mut PfOptions, threads
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_most_pixels(options: *mut PfOptions, pixels: u64) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { set(options, |options| options.most_pixels = pixels) }
+    unsafe {
+        set(options, |options| {
+            options.most_pixels = usize::try_from(pixels).unwrap_or(usize::MAX)
+        })
+    }
 }
 
 /// Sets the backend that computes frames, a PfBackend.

@@ -109,8 +109,8 @@ pub struct PfQualityChange {
 impl From<QualityChange> for PfQualityChange {
     fn from(change: QualityChange) -> Self {
         PfQualityChange {
-            from_quality_level: change.from_quality_level,
-            to_quality_level: change.to_quality_level,
+            from_quality_level: change.from_quality_level as u32,
+            to_quality_level: change.to_quality_level as u32,
             reason: match change.reason {
                 QualityReason::TooSlow => PfQualityReason::TooSlow,
                 QualityReason::Room => PfQualityReason::Room,
@@ -164,27 +164,27 @@ impl SessionListener for Listener {
         Ok(())
     }
 
-    fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> std::result::Result<(), ListenerError> {
+    fn on_dropped(&self, timestamp_ns: i64, reason: DropReason) -> std::result::Result<(), ListenerError> {
         if let Some(tell) = self.0.on_dropped {
             // SAFETY: as above.
-            unsafe { tell(self.0.context, timestamp_ns, reason.into()) };
+            unsafe { tell(self.0.context, timestamp_ns as u64, reason.into()) };
         }
         Ok(())
     }
 
-    fn on_failed(&self, timestamp_ns: u64, message: String) -> std::result::Result<(), ListenerError> {
+    fn on_failed(&self, timestamp_ns: i64, message: String) -> std::result::Result<(), ListenerError> {
         if let Some(tell) = self.0.on_failed {
             let message = c_text(&message);
             // SAFETY: as above; the message lives until the call returns.
-            unsafe { tell(self.0.context, timestamp_ns, message.as_ptr()) };
+            unsafe { tell(self.0.context, timestamp_ns as u64, message.as_ptr()) };
         }
         Ok(())
     }
 
-    fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> std::result::Result<(), ListenerError> {
+    fn on_quality_changed(&self, timestamp_ns: i64, change: QualityChange) -> std::result::Result<(), ListenerError> {
         if let Some(tell) = self.0.on_quality_changed {
             // SAFETY: as above.
-            unsafe { tell(self.0.context, timestamp_ns, change.into()) };
+            unsafe { tell(self.0.context, timestamp_ns as u64, change.into()) };
         }
         Ok(())
     }
@@ -230,13 +230,13 @@ pub struct PfStatistics {
 impl From<Statistics> for PfStatistics {
     fn from(statistics: Statistics) -> Self {
         PfStatistics {
-            submitted: statistics.submitted,
-            processed: statistics.processed,
-            failed: statistics.failed,
-            refused: statistics.refused,
-            dropped: statistics.dropped.total,
-            pending: statistics.pending,
-            quality_level: statistics.quality_level,
+            submitted: statistics.submitted as u64,
+            processed: statistics.processed as u64,
+            failed: statistics.failed as u64,
+            refused: statistics.refused as u64,
+            dropped: statistics.dropped.total as u64,
+            pending: statistics.pending as u64,
+            quality_level: statistics.quality_level as u32,
             rate_hz: statistics.rate_hz,
             times: statistics.times.into(),
             backend: cut(&statistics.backend),
@@ -260,8 +260,7 @@ pub struct PfSession(Arc<RawSession>);
 
 impl Drop for PfSession {
     fn drop(&mut self) {
-        // It fails only because of a bug of ours, which cannot be reported anywhere.
-        let _ = self.0.shut_down();
+        self.0.shut_down();
     }
 }
 
@@ -398,7 +397,13 @@ pub unsafe extern "C" fn pf_session_set_thermal(session: *const PfSession, therm
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_fix_quality_level(session: *const PfSession, quality_level: u32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { with(session, |session| session.set_quality(Quality::Fixed { quality_level })) }
+    unsafe {
+        with(session, |session| {
+            session.set_quality(Quality::Fixed {
+                quality_level: quality_level as usize,
+            })
+        })
+    }
 }
 
 /// Lets the session change its quality level: it lowers the level if frames take longer than the target rate allows or
@@ -415,7 +420,7 @@ pub unsafe extern "C" fn pf_session_statistics(session: *const PfSession, statis
     // SAFETY: the rules of this border.
     call(|| unsafe {
         give(statistics, "statistics", || {
-            Ok(read(session, "session")?.0.statistics()?.into())
+            Ok(read(session, "session")?.0.statistics().into())
         })
     })
 }

@@ -74,9 +74,9 @@ pub unsafe extern "C" fn pf_target_from_file(path: *const c_char, target: *mut *
 pub unsafe extern "C" fn pf_target_size(target: *const PfTarget, width: *mut u32, height: *mut u32) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe {
-        let display = read(target, "target")?.0.display()?;
+        let display = read(target, "target")?.0.display();
         give(width, "width", || {
-            give(height, "height", || Ok(display.height)).map(|()| display.width)
+            give(height, "height", || Ok(display.height as u32)).map(|()| display.width as u32)
         })
     })
 }

@@ -38,36 +38,6 @@ class ConfidenceFormat(enum.Enum):
     LOW_MEDIUM_HIGH = 0
     U8 = 1
 
-class PhasefrontError(Exception):
-    """The error of a call. The message is one line that names what is wrong and what would be right.
-
-    Kinds:
-        Display: The physics of a display is impossible or out of range.
-        Frame: A frame, plane or image has the wrong shape or unusable values.
-        Timestamp: A frame is not later than the previous one. It is refused; later frames are not affected.
-        Setting: A setting or an argument is invalid or cannot be planned.
-        Network: A file is not a hologram network, or the network is for another display.
-        File: A file cannot be read.
-        Session: A session cannot answer the call in its mode or state.
-        Internal: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
-    """
-    class Display(PhasefrontError):
-        """The physics of a display is impossible or out of range."""
-    class Frame(PhasefrontError):
-        """A frame, plane or image has the wrong shape or unusable values."""
-    class Timestamp(PhasefrontError):
-        """A frame is not later than the previous one. It is refused; later frames are not affected."""
-    class Setting(PhasefrontError):
-        """A setting or an argument is invalid or cannot be planned."""
-    class Network(PhasefrontError):
-        """A file is not a hologram network, or the network is for another display."""
-    class File(PhasefrontError):
-        """A file cannot be read."""
-    class Session(PhasefrontError):
-        """A session cannot answer the call in its mode or state."""
-    class Internal(PhasefrontError):
-        """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
-
 class DepthFormat(enum.Enum):
     """The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
     are not finite mean no reading.
@@ -342,6 +312,36 @@ class LogLevel(enum.Enum):
     WARNING = 1
     INFO = 2
     DEBUG = 3
+
+class PhasefrontError(Exception):
+    """The error of a call. The message is one line that names what is wrong and what would be right.
+
+    Kinds:
+        Display: The physics of a display is impossible or out of range.
+        Frame: A frame, plane or image has the wrong shape or unusable values.
+        Timestamp: A frame is not later than the previous one. It is refused; later frames are not affected.
+        Setting: A setting or an argument is invalid or cannot be planned.
+        Network: A file is not a hologram network, or the network is for another display.
+        File: A file cannot be read.
+        Session: A session cannot answer the call in its mode or state.
+        Internal: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
+    """
+    class Display(PhasefrontError):
+        """The physics of a display is impossible or out of range."""
+    class Frame(PhasefrontError):
+        """A frame, plane or image has the wrong shape or unusable values."""
+    class Timestamp(PhasefrontError):
+        """A frame is not later than the previous one. It is refused; later frames are not affected."""
+    class Setting(PhasefrontError):
+        """A setting or an argument is invalid or cannot be planned."""
+    class Network(PhasefrontError):
+        """A file is not a hologram network, or the network is for another display."""
+    class File(PhasefrontError):
+        """A file cannot be read."""
+    class Session(PhasefrontError):
+        """A session cannot answer the call in its mode or state."""
+    class Internal(PhasefrontError):
+        """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
 
 class RunningMode(enum.Enum):
     """The running mode of a session. It is fixed when the session is created.

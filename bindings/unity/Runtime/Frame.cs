@@ -73,7 +73,7 @@ namespace Phasefront
     }
 
     /// <summary>One plane of an image, in an array or in native memory that stays valid during the call.</summary>
-    public struct Plane
+    public struct ImagePlane
     {
         internal readonly byte[] Bytes;
         internal readonly int Offset;
@@ -83,7 +83,7 @@ namespace Phasefront
         internal readonly int PixelStride;
 
         /// <summary>Creates a plane in an array, from <paramref name="offset"/> to its end.</summary>
-        public Plane(byte[] bytes, int rowStride, int pixelStride, int offset = 0)
+        public ImagePlane(byte[] bytes, int rowStride, int pixelStride, int offset = 0)
         {
             if (bytes == null) throw new ArgumentNullException(nameof(bytes));
             if (offset < 0 || offset > bytes.Length) throw new ArgumentOutOfRangeException(nameof(offset));
@@ -92,7 +92,7 @@ namespace Phasefront
         }
 
         /// <summary>Creates a plane in native memory, for example of a NativeArray or a camera image.</summary>
-        public Plane(IntPtr data, long length, int rowStride, int pixelStride)
+        public ImagePlane(IntPtr data, long length, int rowStride, int pixelStride)
         {
             (Bytes, Offset, Data, Length, RowStride, PixelStride) = (null, 0, data, length, rowStride, pixelStride);
         }
@@ -117,7 +117,7 @@ namespace Phasefront
     }
 
     /// <summary>A colour image.</summary>
-    public struct Colour
+    public struct ColourImage
     {
         /// <summary>The memory layout.</summary>
         public ColourFormat Format;
@@ -130,11 +130,11 @@ namespace Phasefront
         /// <summary>Whether luma spans 16 to 235 and chroma 16 to 240. RGB formats ignore it.</summary>
         public bool VideoRange;
         /// <summary>The planes, in the order of the format.</summary>
-        public Plane[] Planes;
+        public ImagePlane[] Planes;
     }
 
     /// <summary>A depth image.</summary>
-    public struct Depth
+    public struct DepthImage
     {
         /// <summary>The memory layout.</summary>
         public DepthFormat Format;
@@ -143,11 +143,11 @@ namespace Phasefront
         /// <summary>The height in pixels.</summary>
         public int Height;
         /// <summary>The plane.</summary>
-        public Plane Plane;
+        public ImagePlane Plane;
     }
 
     /// <summary>The confidence map of a depth image.</summary>
-    public struct Confidence
+    public struct ConfidenceMap
     {
         /// <summary>The memory layout.</summary>
         public ConfidenceFormat Format;
@@ -156,20 +156,20 @@ namespace Phasefront
         /// <summary>The height in pixels, equal to that of the depth image.</summary>
         public int Height;
         /// <summary>The plane.</summary>
-        public Plane Plane;
+        public ImagePlane Plane;
     }
 
     /// <summary>A frame: a colour image, a depth image and their orientation.</summary>
-    public sealed class Frame
+    public sealed class CameraFrame
     {
         /// <summary>The capture time in nanoseconds of any monotonic clock.</summary>
         public ulong TimestampNs;
         /// <summary>The colour image.</summary>
-        public Colour Colour;
+        public ColourImage Colour;
         /// <summary>The depth image.</summary>
-        public Depth Depth;
+        public DepthImage Depth;
         /// <summary>The confidence map of the depth, or null.</summary>
-        public Confidence? Confidence;
+        public ConfidenceMap? Confidence;
         /// <summary>The rotation that brings all images upright.</summary>
         public Rotation Rotation;
         /// <summary>Whether the images are mirrored left to right after the rotation, as for front cameras.</summary>
@@ -191,7 +191,7 @@ namespace Phasefront
 
         private NativeFrame Write(List<GCHandle> pins)
         {
-            var planes = Colour.Planes ?? new Plane[0];
+            var planes = Colour.Planes ?? new ImagePlane[0];
             if (planes.Length > 3) throw new PhasefrontException(Status.Frame, "frame: a colour image has 3 planes at most");
             var native = new NativeFrame
             {
@@ -217,7 +217,7 @@ namespace Phasefront
                 Rotation = (uint)Rotation,
                 Mirrored = Mirrored,
             };
-            if (Confidence is Confidence map)
+            if (Confidence is ConfidenceMap map)
             {
                 native.Confidence = new NativeDepth
                 {

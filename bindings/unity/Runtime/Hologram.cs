@@ -49,7 +49,7 @@ namespace Phasefront
     }
 
     /// <summary>The layout of the colours' levels in images for a modulator's driver.</summary>
-    public enum Layout : uint
+    public enum ModulatorLayout : uint
     {
         /// <summary>One image, bytes red, green, blue.</summary>
         Rgb = 0,
@@ -62,7 +62,7 @@ namespace Phasefront
     }
 
     /// <summary>An image whose rows have no gaps.</summary>
-    public sealed class Image
+    public sealed class PixelImage
     {
         /// <summary>The bytes of the image.</summary>
         public byte[] Bytes { get; }
@@ -74,7 +74,7 @@ namespace Phasefront
         public int PixelBytes { get; }
 
         // Copies an image of the C interface and frees it.
-        internal Image(IntPtr image)
+        internal PixelImage(IntPtr image)
         {
             try
             {
@@ -157,10 +157,10 @@ namespace Phasefront
         }
 
         /// <summary>Returns the displayed image for an eye focused at z: red, green, blue, 255.</summary>
-        public Image Preview(double zMm, int width, int height)
+        public PixelImage Preview(double zMm, int width, int height)
         {
             Check(Native.pf_hologram_preview(this, zMm, checked((uint)width), checked((uint)height), out var image));
-            return new Image(image);
+            return new PixelImage(image);
         }
 
         /// <summary>Returns the displayed image of the whole hologram for an eye focused at z, as amplitudes; 1 is
@@ -180,7 +180,7 @@ namespace Phasefront
         }
 
         /// <summary>Returns image <paramref name="number"/> of the images for the modulator's driver.</summary>
-        public Image Output(Layout layout, int number = 0, bool flipX = false, bool flipY = false, int shiftX = 0, int shiftY = 0)
+        public PixelImage Output(ModulatorLayout layout, int number = 0, bool flipX = false, bool flipY = false, int shiftX = 0, int shiftY = 0)
         {
             var placement = new NativePlacement
             {
@@ -191,7 +191,7 @@ namespace Phasefront
                 ShiftY = shiftY,
             };
             Check(Native.pf_hologram_output(this, ref placement, checked((uint)number), out var image));
-            return new Image(image);
+            return new PixelImage(image);
         }
 
         /// <summary>Frees the hologram.</summary>

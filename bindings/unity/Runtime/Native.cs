@@ -128,14 +128,14 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_from_toml(byte[] toml, out IntPtr target);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_with_look_up_table(byte[] toml, byte[] levels, UIntPtr count, out IntPtr target);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_from_bytes(byte[] file, UIntPtr length, out IntPtr target);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_size(Target target, out uint width, out uint height);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_size(HologramTarget target, out uint width, out uint height);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_target_free(IntPtr target);
 
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_network_built_in(byte[] name, out IntPtr network);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_network_from_bytes(byte[] onnx, UIntPtr length, out IntPtr network);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_network_free(IntPtr network);
 
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_new(Target target, uint method, IntPtr network, out IntPtr options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_new(HologramTarget target, uint method, IntPtr network, out IntPtr options);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_options_free(IntPtr options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_clear_quality_levels(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_push_quality_level(SessionOptions options, ref NativeQualityLevel qualityLevel);
@@ -143,7 +143,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_double_phase(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_anti_alias(SessionOptions options, float sigma, uint width);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_band_limit(SessionOptions options, float k);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_deep(SessionOptions options, Network prefilter);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_deep(SessionOptions options, HologramNetwork prefilter);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_smoothed(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_fixed(SessionOptions options, float scale);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_frame_max(SessionOptions options);
@@ -159,16 +159,16 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_new(SessionOptions options, RunningMode mode, IntPtr listener, out IntPtr session);
         [DllImport(Library, CallingConvention = C, EntryPoint = "pf_session_new")] public static extern Status pf_session_new_live(SessionOptions options, RunningMode mode, ref NativeListener listener, out IntPtr session);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_session_free(IntPtr session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_process(Session session, ref NativeFrame frame, out IntPtr hologram);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_submit(Session session, ref NativeFrame frame, out DropReason dropped);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_warm_up(Session session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_reset(Session session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_pause(Session session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_resume(Session session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_set_thermal(Session session, Thermal thermal);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_fix_quality_level(Session session, uint qualityLevel);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_step_by_itself(Session session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_statistics(Session session, out Statistics statistics);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_process(HologramSession session, ref NativeFrame frame, out IntPtr hologram);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_submit(HologramSession session, ref NativeFrame frame, out DropReason dropped);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_warm_up(HologramSession session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_reset(HologramSession session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_pause(HologramSession session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_resume(HologramSession session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_set_thermal(HologramSession session, Thermal thermal);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_fix_quality_level(HologramSession session, uint qualityLevel);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_step_by_itself(HologramSession session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_statistics(HologramSession session, out Statistics statistics);
 
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_info(Hologram hologram, out HologramInfo info);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_levels(Hologram hologram, uint colour, out IntPtr levels, out UIntPtr length);

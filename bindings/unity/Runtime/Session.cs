@@ -109,7 +109,7 @@ namespace Phasefront
     /// Receives the events of a live session, one call after another, on the session's own thread and not on Unity's
     /// main thread. The session processes no frame during a call. It counts the exceptions of the listener.
     /// </summary>
-    public interface IListener
+    public interface ISessionListener
     {
         /// <summary>A frame became a hologram. The listener must dispose of it.</summary>
         void OnProcessed(Hologram hologram);
@@ -123,7 +123,7 @@ namespace Phasefront
 
     /// <summary>A session that turns frames into holograms. Every method may be called from any thread at any
     /// time.</summary>
-    public sealed class Session : NativeObject
+    public sealed class HologramSession : NativeObject
     {
         // Native code calls these delegates, so they live as long as the process.
         private static readonly Native.OnProcessed Processed = OnProcessed;
@@ -134,21 +134,21 @@ namespace Phasefront
 
         private sealed class Hearing
         {
-            public IListener Listener;
+            public ISessionListener Listener;
             public int Failures;
         }
 
         private readonly Hearing hearing;
 
-        private Session(IntPtr handle, Hearing hearing) : base(handle) => this.hearing = hearing;
+        private HologramSession(IntPtr handle, Hearing hearing) : base(handle) => this.hearing = hearing;
 
         /// <summary>Opens an image or a video session, or with a listener a live session.</summary>
-        public static Session Open(SessionOptions options, RunningMode mode, IListener listener = null)
+        public static HologramSession Open(SessionOptions options, RunningMode mode, ISessionListener listener = null)
         {
             if (listener == null)
             {
                 Check(Native.pf_session_new(options, mode, IntPtr.Zero, out var still));
-                return new Session(still, null);
+                return new HologramSession(still, null);
             }
             var hearing = new Hearing { Listener = listener };
             // Native code holds the context until OnClosed, which may run after the session is disposed of.
@@ -165,11 +165,11 @@ namespace Phasefront
             var status = Native.pf_session_new_live(options, mode, ref native, out var session);
             if (status != Status.Ok) context.Free();
             Check(status);
-            return new Session(session, hearing);
+            return new HologramSession(session, hearing);
         }
 
         /// <summary>Returns the hologram of a frame, in an image or a video session.</summary>
-        public Hologram Process(Frame frame)
+        public Hologram Process(CameraFrame frame)
         {
             return frame.Pinned(native =>
             {
@@ -180,7 +180,7 @@ namespace Phasefront
 
         /// <summary>Submits a frame to a live session, which copies it. Returns the reason if the frame was dropped at
         /// once.</summary>
-        public DropReason Submit(Frame frame)
+        public DropReason Submit(CameraFrame frame)
         {
             return frame.Pinned(native =>
             {
@@ -235,7 +235,7 @@ namespace Phasefront
         }
 
         // No exception may propagate into native code.
-        private static void Tell(IntPtr context, Action<IListener> call)
+        private static void Tell(IntPtr context, Action<ISessionListener> call)
         {
             var hearing = (Hearing)GCHandle.FromIntPtr(context).Target;
             try

@@ -4,7 +4,7 @@ using static Phasefront.PhasefrontException;
 namespace Phasefront
 {
     /// <summary>The method that computes holograms.</summary>
-    public enum Method : uint
+    public enum HologramMethod : uint
     {
         /// <summary>The built-in network, or the plane sweep if that network was not trained for the display.</summary>
         Default = 0,
@@ -33,7 +33,7 @@ namespace Phasefront
         private SessionOptions(IntPtr handle) : base(handle) { }
 
         /// <summary>Returns the default options for <paramref name="target"/>.</summary>
-        public static SessionOptions For(Target target, Method method = Method.Default, Network network = null)
+        public static SessionOptions For(HologramTarget target, HologramMethod method = HologramMethod.Default, HologramNetwork network = null)
         {
             return With(network, native =>
             {
@@ -43,7 +43,7 @@ namespace Phasefront
         }
 
         // Keeps the network alive while C reads it.
-        private static T With<T>(Network network, Func<IntPtr, T> call)
+        private static T With<T>(HologramNetwork network, Func<IntPtr, T> call)
         {
             if (network == null) return call(IntPtr.Zero);
             var held = false;
@@ -64,7 +64,7 @@ namespace Phasefront
         /// <summary>
         /// Adds a quality level below the existing ones: a method, a resolution and the steps that correct the
         /// displayed image. A negative number of steps means the session's number. </summary>
-        public void PushQualityLevel(Method method, Network network, int width, int height, int localSteps = -1, int midpointSteps = -1)
+        public void PushQualityLevel(HologramMethod method, HologramNetwork network, int width, int height, int localSteps = -1, int midpointSteps = -1)
         {
             With(network, native =>
             {
@@ -98,7 +98,7 @@ namespace Phasefront
 
         /// <summary>Encodes the field after a pre-filter network (DDPM) that was trained together with the hologram
         /// network.</summary>
-        public void Deep(Network prefilter) => Check(Native.pf_options_set_deep(this, prefilter));
+        public void Deep(HologramNetwork prefilter) => Check(Native.pf_options_set_deep(this, prefilter));
 
         /// <summary>Makes full light follow the frame's largest amplitude smoothly. This is the default.</summary>
         public void SmoothedBrightness() => Check(Native.pf_options_set_brightness_smoothed(this));

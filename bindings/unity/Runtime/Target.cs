@@ -16,33 +16,33 @@ namespace Phasefront
     /// <summary>
     /// The display that holograms are made for and, if it is calibrated, the response of its modulator, the light of
     /// its lasers and the correction of its optics. Immutable. Many sessions can share it. </summary>
-    public sealed class Target : NativeObject
+    public sealed class HologramTarget : NativeObject
     {
-        private Target(IntPtr handle) : base(handle) { }
+        private HologramTarget(IntPtr handle) : base(handle) { }
 
         /// <summary>Reads a display in TOML, such as "width = 1920\npitch_um = 8.0". Missing keys have default
         /// values.</summary>
-        public static Target FromToml(string toml)
+        public static HologramTarget FromToml(string toml)
         {
             Check(Native.pf_target_from_toml(Text.Write(toml), out var target));
-            return new Target(target);
+            return new HologramTarget(target);
         }
 
         /// <summary>
         /// Creates a display whose modulator was calibrated as a whole: the i-th of 256 levels has the phase 2πi/256.
         /// </summary>
-        public static Target WithLookUpTable(string toml, byte[] levels)
+        public static HologramTarget WithLookUpTable(string toml, byte[] levels)
         {
             Check(Native.pf_target_with_look_up_table(Text.Write(toml), levels, (UIntPtr)levels.Length, out var target));
-            return new Target(target);
+            return new HologramTarget(target);
         }
 
         /// <summary>Reads a target from the bytes of a calibration file that `phasefront calibrate pack`
         /// wrote.</summary>
-        public static Target FromBytes(byte[] file)
+        public static HologramTarget FromBytes(byte[] file)
         {
             Check(Native.pf_target_from_bytes(file, (UIntPtr)file.Length, out var target));
-            return new Target(target);
+            return new HologramTarget(target);
         }
 
         /// <summary>The width and height of the modulator in pixels.</summary>
@@ -64,22 +64,22 @@ namespace Phasefront
     }
 
     /// <summary>A hologram network or a pre-filter. Immutable. Many sessions can share it.</summary>
-    public sealed class Network : NativeObject
+    public sealed class HologramNetwork : NativeObject
     {
-        private Network(IntPtr handle) : base(handle) { }
+        private HologramNetwork(IntPtr handle) : base(handle) { }
 
         /// <summary>Returns a bundled int8 network.</summary>
-        public static Network BuiltIn(string name = "rgbd-8")
+        public static HologramNetwork BuiltIn(string name = "rgbd-8")
         {
             Check(Native.pf_network_built_in(Text.Write(name), out var network));
-            return new Network(network);
+            return new HologramNetwork(network);
         }
 
         /// <summary>Reads a network from the bytes of an ONNX file.</summary>
-        public static Network FromBytes(byte[] onnx)
+        public static HologramNetwork FromBytes(byte[] onnx)
         {
             Check(Native.pf_network_from_bytes(onnx, (UIntPtr)onnx.Length, out var network));
-            return new Network(network);
+            return new HologramNetwork(network);
         }
 
         /// <summary>Frees the network.</summary>

@@ -65,23 +65,23 @@ internal static class Tests
         Console.WriteLine("{0} cases, {1} levels: the bits that Rust has", ran, got.Count);
     }
 
-    private static Plane PlaneOf(object json, byte[] memory)
+    private static ImagePlane PlaneOf(object json, byte[] memory)
     {
         var plane = Object(json);
         var bytes = new byte[Int(plane["length"])];
         Array.Copy(memory, Int(plane["offset"]), bytes, 0, bytes.Length);
-        return new Plane(bytes, Int(plane["row_stride"]), Int(plane["pixel_stride"]));
+        return new ImagePlane(bytes, Int(plane["row_stride"]), Int(plane["pixel_stride"]));
     }
 
-    private static Frame FrameOf(object json, byte[] memory)
+    private static CameraFrame FrameOf(object json, byte[] memory)
     {
         var frame = Object(json);
         var colour = Object(frame["colour"]);
         var depth = Object(frame["depth"]);
-        return new Frame
+        return new CameraFrame
         {
             TimestampNs = Convert.ToUInt64(frame["timestamp_ns"]),
-            Colour = new Colour
+            Colour = new ColourImage
             {
                 Format = (ColourFormat)Array.IndexOf(Colours, colour["format"]),
                 Width = Int(colour["width"]),
@@ -90,23 +90,23 @@ internal static class Tests
                 VideoRange = (bool)colour["video_range"],
                 Planes = ((IEnumerable)colour["planes"]).Cast<object>().Select(plane => PlaneOf(plane, memory)).ToArray(),
             },
-            Depth = new Depth
+            Depth = new DepthImage
             {
                 Format = (DepthFormat)Array.IndexOf(Depths, depth["format"]),
                 Width = Int(depth["width"]),
                 Height = Int(depth["height"]),
                 Plane = PlaneOf(depth["plane"], memory),
             },
-            Confidence = frame["confidence"] == null ? (Confidence?)null : ConfidenceOf(frame["confidence"], memory),
+            Confidence = frame["confidence"] == null ? (ConfidenceMap?)null : ConfidenceOf(frame["confidence"], memory),
             Rotation = (Rotation)(Int(frame["rotation"]) / 90),
             Mirrored = (bool)frame["mirrored"],
         };
     }
 
-    private static Confidence ConfidenceOf(object json, byte[] memory)
+    private static ConfidenceMap ConfidenceOf(object json, byte[] memory)
     {
         var map = Object(json);
-        return new Confidence
+        return new ConfidenceMap
         {
             Format = (ConfidenceFormat)Array.IndexOf(Confidences, map["format"]),
             Width = Int(map["width"]),
@@ -115,23 +115,23 @@ internal static class Tests
         };
     }
 
-    private static Target TargetOf(IDictionary<string, object> one, string suite)
+    private static HologramTarget TargetOf(IDictionary<string, object> one, string suite)
     {
         if (one["calibration"] != null)
-            return Target.FromBytes(File.ReadAllBytes(Path.Combine(suite, (string)one["calibration"])));
-        if (one["lut"] == null) return Target.FromToml((string)one["display"]);
+            return HologramTarget.FromBytes(File.ReadAllBytes(Path.Combine(suite, (string)one["calibration"])));
+        if (one["lut"] == null) return HologramTarget.FromToml((string)one["display"]);
         var levels = ((IEnumerable)one["lut"]).Cast<object>().Select(level => (byte)Int(level)).ToArray();
-        return Target.WithLookUpTable((string)one["display"], levels);
+        return HologramTarget.WithLookUpTable((string)one["display"], levels);
     }
 
-    private static Network Model(string models, string file) => Network.FromBytes(File.ReadAllBytes(Path.Combine(models, file)));
+    private static HologramNetwork Model(string models, string file) => HologramNetwork.FromBytes(File.ReadAllBytes(Path.Combine(models, file)));
 
-    private static SessionOptions OptionsOf(IDictionary<string, object> one, Target target, string models)
+    private static SessionOptions OptionsOf(IDictionary<string, object> one, HologramTarget target, string models)
     {
         var name = (string)one["method"];
-        var method = name == "sweep" ? Method.Sweep : name == "auto" ? Method.Auto : Method.Trained;
+        var method = name == "sweep" ? HologramMethod.Sweep : name == "auto" ? HologramMethod.Auto : HologramMethod.Trained;
         var builtIn = name == "network" || name == "auto";
-        using (var network = method == Method.Sweep ? null : builtIn ? Network.BuiltIn() : Model(models, name))
+        using (var network = method == HologramMethod.Sweep ? null : builtIn ? HologramNetwork.BuiltIn() : Model(models, name))
         {
             var options = SessionOptions.For(target, method, network);
             switch ((string)one["encoding"])
@@ -172,7 +172,7 @@ internal static class Tests
     {
         using (var target = TargetOf(one, suite))
         using (var options = OptionsOf(one, target, models))
-        using (var session = Session.Open(options, (RunningMode)Array.IndexOf(Modes, one["mode"])))
+        using (var session = HologramSession.Open(options, (RunningMode)Array.IndexOf(Modes, one["mode"])))
         {
             foreach (var frame in (IEnumerable)one["frames"])
                 using (var hologram = session.Process(FrameOf(frame, memory)))
@@ -198,41 +198,41 @@ internal static class Tests
         throw new Exception("nothing was refused that is about " + word);
     }
 
-    private static Frame Sample(ulong timestampNs) => new Frame
+    private static CameraFrame Sample(ulong timestampNs) => new CameraFrame
     {
         TimestampNs = timestampNs,
-        Colour = new Colour
+        Colour = new ColourImage
         {
             Format = ColourFormat.Rgb,
             Width = 48,
             Height = 36,
-            Planes = new[] { new Plane(Enumerable.Range(0, 48 * 36 * 3).Select(i => (byte)i).ToArray(), 48 * 3, 3) },
+            Planes = new[] { new ImagePlane(Enumerable.Range(0, 48 * 36 * 3).Select(i => (byte)i).ToArray(), 48 * 3, 3) },
         },
-        Depth = new Depth
+        Depth = new DepthImage
         {
             Format = DepthFormat.NormalizedU8,
             Width = 48,
             Height = 36,
-            Plane = new Plane(Enumerable.Range(0, 48 * 36).Select(i => (byte)(i % 251)).ToArray(), 48, 1),
+            Plane = new ImagePlane(Enumerable.Range(0, 48 * 36).Select(i => (byte)(i % 251)).ToArray(), 48, 1),
         },
     };
 
     private static void Mistakes()
     {
-        Refused(Status.Display, "width", () => Target.FromToml("width = 0"));
-        Refused(Status.Network, "rgbd-9", () => Network.BuiltIn("rgbd-9"));
-        using (var target = Target.FromToml("width = 48\nheight = 36"))
-        using (var options = SessionOptions.For(target, Method.Sweep))
+        Refused(Status.Display, "width", () => HologramTarget.FromToml("width = 0"));
+        Refused(Status.Network, "rgbd-9", () => HologramNetwork.BuiltIn("rgbd-9"));
+        using (var target = HologramTarget.FromToml("width = 48\nheight = 36"))
+        using (var options = SessionOptions.For(target, HologramMethod.Sweep))
         {
             Require(target.Size.Equals((48, 36)), "the display's size");
-            Refused(Status.Session, "listener", () => Session.Open(options, RunningMode.Live));
-            using (var session = Session.Open(options, RunningMode.Video))
+            Refused(Status.Session, "listener", () => HologramSession.Open(options, RunningMode.Live));
+            using (var session = HologramSession.Open(options, RunningMode.Video))
             {
                 var frame = Sample(2);
                 using (var hologram = session.Process(frame))
                 {
                     Require(hologram.Info.Width == 48 && float.IsNaN(hologram.Info.NearM), "what is known");
-                    var image = hologram.Output(Layout.Rgba);
+                    var image = hologram.Output(ModulatorLayout.Rgba);
                     Require(image.Bytes.Length == 48 * 36 * 4 && image.Bytes[0] == hologram.Levels(0)[0], "its image");
                     Require(hologram.Preview(hologram.ZAt(0.5, 0.5), 24, 18).Width == 24, "its preview");
                     Refused(Status.Setting, "a shorter distance", () => hologram.Refocus(1e5));
@@ -252,7 +252,7 @@ internal static class Tests
         }
     }
 
-    private sealed class Heard : IListener
+    private sealed class Heard : ISessionListener
     {
         public int Holograms, Dropped;
 
@@ -272,14 +272,14 @@ internal static class Tests
     private static void Live()
     {
         var heard = new Heard();
-        using (var target = Target.FromToml("width = 48\nheight = 36"))
+        using (var target = HologramTarget.FromToml("width = 48\nheight = 36"))
         using (var options = SessionOptions.For(target))
         {
             options.TargetRateHz = 1000;
             options.ClearQualityLevels();
-            options.PushQualityLevel(Method.Sweep, null, 48, 36);
-            options.PushQualityLevel(Method.Sweep, null, 24, 18, localSteps: 0);
-            var session = Session.Open(options, RunningMode.Live, heard);
+            options.PushQualityLevel(HologramMethod.Sweep, null, 48, 36);
+            options.PushQualityLevel(HologramMethod.Sweep, null, 24, 18, localSteps: 0);
+            var session = HologramSession.Open(options, RunningMode.Live, heard);
             session.WarmUp();
             for (var i = 1ul; i <= 20; i++) session.Submit(Sample(i * 1000000));
             while (session.Statistics.Pending > 0) Thread.Sleep(1);
@@ -292,11 +292,11 @@ internal static class Tests
     }
 
     // Disposes of its session at the first hologram, when other frames wait to be reported as dropped.
-    private sealed class Closing : IListener
+    private sealed class Closing : ISessionListener
     {
         public readonly ManualResetEventSlim Begun = new ManualResetEventSlim(), Submitted = new ManualResetEventSlim();
         public readonly CountdownEvent Told = new CountdownEvent(20);
-        public Session Session;
+        public HologramSession Session;
 
         public void OnProcessed(Hologram hologram)
         {
@@ -319,10 +319,10 @@ internal static class Tests
     private static void ClosedByItsListener()
     {
         var listener = new Closing();
-        using (var target = Target.FromToml("width = 48\nheight = 36"))
-        using (var options = SessionOptions.For(target, Method.Sweep))
+        using (var target = HologramTarget.FromToml("width = 48\nheight = 36"))
+        using (var options = SessionOptions.For(target, HologramMethod.Sweep))
         {
-            listener.Session = Session.Open(options, RunningMode.Live, listener);
+            listener.Session = HologramSession.Open(options, RunningMode.Live, listener);
             listener.Session.Submit(Sample(1));
             Require(listener.Begun.Wait(60000), "the first frame is a hologram");
             for (var i = 2ul; i <= 20; i++) listener.Session.Submit(Sample(i));

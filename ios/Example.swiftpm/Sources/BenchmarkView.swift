@@ -58,7 +58,7 @@ final class Bench: ObservableObject {
         guard let scene = SampleScene(), let deep = Bundle.module.path(forResource: "rgbd-30-int8", ofType: "onnx")
         else { throw CocoaError(.fileReadNoSuchFile) }
         let benchmark = Benchmark(
-            runs: try Run.all(deep: Network.fromFile(path: deep)), scene: { scene.frame(0) },
+            runs: try Run.all(deep: HologramNetwork.fromFile(path: deep)), scene: { scene.frame(0) },
             conditions: { await Self.conditions() })
         // Processing blocks, so it must not run on the main thread.
         let work = Task.detached {
@@ -72,7 +72,7 @@ final class Bench: ObservableObject {
         // A cancelled run leaves no record.
         if Task.isCancelled { return nil }
         let record = Record(
-            phasefront: try version(), device: Self.device(), begun: begun.formatted(.iso8601), runs: runs)
+            phasefront: version(), device: Self.device(), begun: begun.formatted(.iso8601), runs: runs)
         let folder = URL.documentsDirectory.appending(path: "benchmarks")
         try FileManager.default.createDirectory(at: folder, withIntermediateDirectories: true)
         let file = folder.appending(path: "\(Int(begun.timeIntervalSince1970)).json")

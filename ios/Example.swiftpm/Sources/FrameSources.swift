@@ -6,7 +6,7 @@ import UIKit
 @MainActor
 protocol FrameSource {
     /// Submits frames to `session` until `stop()`.
-    func start(_ session: Phasefront.Session)
+    func start(_ session: HologramSession)
     func stop()
 }
 
@@ -16,9 +16,9 @@ final class CameraSource: NSObject, FrameSource, ARSessionDelegate {
 
     private let camera = ARSession()
     /// The session, written before the camera runs and read on its queue.
-    nonisolated(unsafe) private var session: Phasefront.Session?
+    nonisolated(unsafe) private var session: HologramSession?
 
-    func start(_ session: Phasefront.Session) {
+    func start(_ session: HologramSession) {
         self.session = session
         let configuration = ARWorldTrackingConfiguration()
         configuration.frameSemantics.insert(.smoothedSceneDepth)
@@ -42,7 +42,7 @@ final class CameraSource: NSObject, FrameSource, ARSessionDelegate {
 final class SampleSource: FrameSource {
     private var task: Task<Void, Never>?
 
-    func start(_ session: Phasefront.Session) {
+    func start(_ session: HologramSession) {
         task = Task.detached {
             guard let scene = SampleScene() else { return }
             var step = 0
@@ -74,11 +74,11 @@ struct SampleScene: Sendable {
     }
 
     /// Returns a frame with the current time, of a window that has moved `step` pixels to and fro.
-    func frame(_ step: Int) -> Frame {
+    func frame(_ step: Int) -> CameraFrame {
         let most = colour.width / 8
         let x = step / most % 2 == 0 ? step % most : most - 1 - step % most
-        return Frame(
-            timestampNs: DispatchTime.now().uptimeNanoseconds,
+        return CameraFrame(
+            timestampNs: Int64(DispatchTime.now().uptimeNanoseconds),
             colour: window(colour, x: x, channels: 4) { width, height, plane in
                 ColourImage(format: .rgba, width: width, height: height, planes: [plane])
             },
@@ -95,10 +95,10 @@ private struct Pixels: Sendable {
 
 /// Returns seven eighths of `pixels`, starting at column `x`.
 private func window<Image>(
-    _ pixels: Pixels, x: Int, channels: Int, _ make: (Int, Int, Plane) -> Image
+    _ pixels: Pixels, x: Int, channels: Int, _ make: (Int, Int, ImagePlane) -> Image
 ) -> Image {
     let bytes = pixels.bytes.dropFirst(channels * x)
-    let plane = Plane(bytes: bytes, rowStride: channels * pixels.width, pixelStride: channels)
+    let plane = ImagePlane(bytes: bytes, rowStride: channels * pixels.width, pixelStride: channels)
     return make(pixels.width - pixels.width / 8, pixels.height - pixels.height / 8, plane)
 }
 

@@ -13,14 +13,14 @@ final class Show: ObservableObject {
     private(set) var message = ""
     private var latest: Hologram?
     private let screen = ExternalScreen()
-    private let display = Display(width: 960, height: 540)
+    private let display = HologramDisplay(width: 960, height: 540)
 
     func run() async {
         do {
-            try Log.sendToSystem()
+            try HologramLog.sendToSystem()
             var options = try SessionOptions(display: display)
             options.targetRateHz = 30
-            let session = try Session(options, mode: .live)
+            let session = try HologramSession(options, mode: .live)
             let source: FrameSource = CameraSource.isSupported ? CameraSource() : SampleSource()
             source.start(session)
             defer { source.stop() }
@@ -38,17 +38,17 @@ final class Show: ObservableObject {
         }
     }
 
-    private func show(_ hologram: Hologram, of session: Session) async throws {
+    private func show(_ hologram: Hologram, of session: HologramSession) async throws {
         let (zMm, display, needsLevels) = (zMm, display, screen.isConnected)
         // Takes some milliseconds, so it must not run on the main thread.
         let images = try await Task.detached {
-            let view = try hologram.preview(zMm: zMm, width: Int(display.width) / 2, height: Int(display.height) / 2)
+            let view = try hologram.preview(zMm: zMm, width: display.width / 2, height: display.height / 2)
             return (try view.cgImage(), needsLevels ? try hologram.output().cgImage(colourSpace: nil) : nil)
         }.value
         latest = hologram
         preview = images.0
         if let levels = images.1 { screen.show(levels) }
-        let of = try session.statistics()
+        let of = session.statistics
         statistics = String(
             format: "%.1f holograms a second, %d dropped of %d\n%@: %.1f ms, of which the network takes %.1f",
             of.rateHz, of.dropped.total, of.submitted, of.backend, of.times.totalMs, of.times.methodMs)
@@ -56,7 +56,7 @@ final class Show: ObservableObject {
 
     /// Focuses on the scene point at (`x`, `y`) of the image, each 0...1.
     func focus(atX x: Double, y: Double) {
-        if let z = try? latest?.z(atX: x, y: y) { zMm = z }
+        if let z = latest?.z(atX: x, y: y) { zMm = z }
     }
 
     private func say(_ message: String) {

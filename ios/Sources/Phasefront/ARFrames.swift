@@ -2,7 +2,7 @@
     import ARKit
     import PhasefrontCore
 
-    extension Session {
+    extension HologramSession {
         /// Returns the hologram of an ARKit frame, in an image or a video session. The configuration needs
         /// `frameSemantics.insert(.sceneDepth)` or `.smoothedSceneDepth`. ``Frame`` lists the errors.
         ///
@@ -19,10 +19,10 @@
     }
 
     private func withFrame<R>(
-        _ frame: ARFrame, orientation: Orientation, _ body: (Frame) throws -> R
+        _ frame: ARFrame, orientation: Orientation, _ body: (CameraFrame) throws -> R
     ) throws -> R {
         guard let depth = frame.smoothedSceneDepth ?? frame.sceneDepth else {
-            throw PhasefrontError.Frame(
+            throw PhasefrontError.frame(
                 message:
                     "frame: ARKit gave no depth; run a configuration with the frame semantics sceneDepth, on a device with LiDAR"
             )
@@ -30,8 +30,8 @@
         return try withColourImage(frame.capturedImage) { colour in
             try withDepthImage(depth.depthMap, confidence: depth.confidenceMap) { depth in
                 try body(
-                    Frame(
-                        timestampNs: UInt64(max(0, frame.timestamp) * 1e9), colour: colour, depth: depth,
+                    CameraFrame(
+                        timestampNs: Int64(frame.timestamp * 1e9), colour: colour, depth: depth,
                         orientation: orientation))
             }
         }

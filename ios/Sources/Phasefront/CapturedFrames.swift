@@ -2,7 +2,7 @@
     import AVFoundation
     import PhasefrontCore
 
-    extension Session {
+    extension HologramSession {
         /// Returns the hologram of a camera image and its depth, in an image or a video session. ``Frame`` lists the
         /// errors.
         ///
@@ -26,15 +26,15 @@
     }
 
     private func withFrame<R>(
-        _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation, _ body: (Frame) throws -> R
+        _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation, _ body: (CameraFrame) throws -> R
     ) throws -> R {
         guard let buffer = CMSampleBufferGetImageBuffer(image) else {
-            throw PhasefrontError.Frame(message: "frame: the sample buffer holds no image")
+            throw PhasefrontError.frame(message: "frame: the sample buffer holds no image")
         }
         let timestampNs = CMSampleBufferGetPresentationTimeStamp(image).phasefrontTimestampNs
         return try withColourImage(buffer) { colour in
             try withDepthImage(depth.depthDataMap) { depth in
-                try body(Frame(timestampNs: timestampNs, colour: colour, depth: depth, orientation: orientation))
+                try body(CameraFrame(timestampNs: timestampNs, colour: colour, depth: depth, orientation: orientation))
             }
         }
     }

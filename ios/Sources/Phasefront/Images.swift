@@ -6,13 +6,13 @@
         /// Returns the image for Core Graphics and UIKit without a copy; the result retains this image. `colourSpace`
         /// is sRGB for previews, or nil for device values that must reach a modulator unchanged.
         ///
-        /// - Throws: ``PhasefrontError/Setting(message:)`` if the image does not have 4 bytes per pixel.
+        /// - Throws: ``PhasefrontError/setting(message:)`` if the image does not have 4 bytes per pixel.
         public func cgImage(colourSpace: CGColorSpace? = CGColorSpace(name: CGColorSpace.sRGB)) throws -> CGImage {
             guard pixelBytes == 4 else {
-                throw PhasefrontError.Setting(
+                throw PhasefrontError.setting(
                     message: "an image of \(pixelBytes) bytes a pixel; the layout RGBA is needed for Core Graphics")
             }
-            let provider = try withBytes { bytes in
+            let provider = withBytes { bytes in
                 CGDataProvider(
                     dataInfo: Unmanaged.passRetained(self).toOpaque(), data: bytes.baseAddress!, size: bytes.count,
                     releaseData: { owner, _, _ in
@@ -27,7 +27,7 @@
                     decode: nil, shouldInterpolate: colourSpace != nil, intent: .defaultIntent)
             }
             guard let image else {
-                throw PhasefrontError.Setting(message: "Core Graphics makes no image of \(width)×\(height) pixels")
+                throw PhasefrontError.setting(message: "Core Graphics makes no image of \(width)×\(height) pixels")
             }
             return image
         }

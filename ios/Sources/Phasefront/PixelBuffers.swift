@@ -7,7 +7,7 @@
     /// Calls `body` with the image in `buffer`, which stays locked during the call: 32BGRA, 32RGBA, 420f or 420v, the
     /// formats of cameras and ARKit. Nothing is copied.
     ///
-    /// - Throws: ``PhasefrontError/Frame(message:)`` for any other pixel format. The message names it.
+    /// - Throws: ``PhasefrontError/frame(message:)`` for any other pixel format. The message names it.
     public func withColourImage<R>(_ buffer: CVPixelBuffer, _ body: (ColourImage) throws -> R) throws -> R {
         let format: ColourFormat
         var isVideoRange = false
@@ -19,7 +19,7 @@
             format = .nv12
             isVideoRange = true
         case let other:
-            throw PhasefrontError.Frame(
+            throw PhasefrontError.frame(
                 message: "frame: colour is \(fourCharacters(other)); BGRA, RGBA, 420f or 420v are needed")
         }
         let matrix = CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String
@@ -42,7 +42,7 @@
     /// disparity. The format is read from the buffer. Nothing is copied.
     ///
     /// - Parameter confidence: ARKit's confidence map of the same size.
-    /// - Throws: ``PhasefrontError/Frame(message:)`` for any other pixel format. The message names it.
+    /// - Throws: ``PhasefrontError/frame(message:)`` for any other pixel format. The message names it.
     public func withDepthImage<R>(
         _ buffer: CVPixelBuffer, confidence: CVPixelBuffer? = nil, _ body: (DepthImage) throws -> R
     ) throws -> R {
@@ -53,7 +53,7 @@
         case kCVPixelFormatType_DisparityFloat32: format = .disparityF32
         case kCVPixelFormatType_DisparityFloat16: format = .disparityF16
         case let other:
-            throw PhasefrontError.Frame(
+            throw PhasefrontError.frame(
                 message: "frame: depth is \(fourCharacters(other)); 16- or 32-bit floats of depth or disparity are needed")
         }
         return try withLocked(buffer) {
@@ -71,34 +71,33 @@
     }
 
     extension CMTime {
-        /// The time in nanoseconds, for ``Frame/timestampNs``.
-        public var phasefrontTimestampNs: UInt64 {
-            let time = CMTimeConvertScale(self, timescale: 1_000_000_000, method: .roundTowardZero)
-            return UInt64(max(0, time.value))
+        /// The time in nanoseconds, for ``CameraFrame/timestampNs``.
+        public var phasefrontTimestampNs: Int64 {
+            CMTimeConvertScale(self, timescale: 1_000_000_000, method: .roundTowardZero).value
         }
     }
 
     private func withLocked<R>(_ buffer: CVPixelBuffer, _ body: () throws -> R) throws -> R {
         let status = CVPixelBufferLockBaseAddress(buffer, .readOnly)
         guard status == kCVReturnSuccess else {
-            throw PhasefrontError.Frame(message: "frame: its pixel buffer cannot be locked (CVReturn \(status))")
+            throw PhasefrontError.frame(message: "frame: its pixel buffer cannot be locked (CVReturn \(status))")
         }
         defer { CVPixelBufferUnlockBaseAddress(buffer, .readOnly) }
         return try body()
     }
 
     /// Returns plane `index` of a locked buffer.
-    private func plane(_ index: Int, of buffer: CVPixelBuffer, pixelStride: Int) throws -> Plane {
+    private func plane(_ index: Int, of buffer: CVPixelBuffer, pixelStride: Int) throws -> ImagePlane {
         let isPlanar = CVPixelBufferIsPlanar(buffer)
         let address =
             isPlanar ? CVPixelBufferGetBaseAddressOfPlane(buffer, index) : CVPixelBufferGetBaseAddress(buffer)
         guard let address else {
-            throw PhasefrontError.Frame(message: "frame: plane \(index) of its pixel buffer is not in memory")
+            throw PhasefrontError.frame(message: "frame: plane \(index) of its pixel buffer is not in memory")
         }
         let rowStride =
             isPlanar ? CVPixelBufferGetBytesPerRowOfPlane(buffer, index) : CVPixelBufferGetBytesPerRow(buffer)
         let height = isPlanar ? CVPixelBufferGetHeightOfPlane(buffer, index) : CVPixelBufferGetHeight(buffer)
-        return Plane(unsafeAddress: address, count: rowStride * height, rowStride: rowStride, pixelStride: pixelStride)
+        return ImagePlane(unsafeAddress: address, count: rowStride * height, rowStride: rowStride, pixelStride: pixelStride)
     }
 
     private func fourCharacters(_ code: OSType) -> String {

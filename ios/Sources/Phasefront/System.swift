@@ -3,7 +3,7 @@
     import PhasefrontCore
     import os
 
-    extension Log {
+    extension HologramLog {
         /// Sends messages of `level` and above to the system log. Console and Xcode show them under the category
         /// "phasefront".
         public static func sendToSystem(_ level: LogLevel = .info) throws {
@@ -19,7 +19,7 @@
         }
     }
 
-    extension Trace {
+    extension HologramTrace {
         /// Sends the stages to Instruments, which shows them under os_signpost in the category "phasefront".
         public static func sendToInstruments() throws {
             let log = OSLog(subsystem: Bundle.main.bundleIdentifier ?? "phasefront", category: "phasefront")

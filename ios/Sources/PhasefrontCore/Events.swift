@@ -5,11 +5,11 @@ public enum SessionEvent: Sendable {
     /// A frame became a hologram.
     case processed(Hologram)
     /// A frame was dropped.
-    case dropped(timestampNs: UInt64, reason: DropReason)
+    case dropped(timestampNs: Int64, reason: DropReason)
     /// A frame could not be processed. The session continues.
-    case failed(timestampNs: UInt64, message: String)
+    case failed(timestampNs: Int64, message: String)
     /// The session processes the frames after this one at another quality level.
-    case qualityChanged(timestampNs: UInt64, change: QualityChange)
+    case qualityChanged(timestampNs: Int64, change: QualityChange)
 }
 
 /// The events of a live stream, for one reader. At most two holograms wait in the queue. A newer one replaces the
@@ -120,17 +120,17 @@ final class Listener: SessionListener {
         self.end = end
     }
 
-    func onProcessed(hologram: RawHologram) throws { tell(.processed(try Hologram(hologram))) }
+    func onProcessed(hologram: RawHologram) throws { tell(.processed(Hologram(hologram))) }
 
-    func onDropped(timestampNs: UInt64, reason: DropReason) throws {
+    func onDropped(timestampNs: Int64, reason: DropReason) throws {
         tell(.dropped(timestampNs: timestampNs, reason: reason))
     }
 
-    func onFailed(timestampNs: UInt64, message: String) throws {
+    func onFailed(timestampNs: Int64, message: String) throws {
         tell(.failed(timestampNs: timestampNs, message: message))
     }
 
-    func onQualityChanged(timestampNs: UInt64, change: QualityChange) throws {
+    func onQualityChanged(timestampNs: Int64, change: QualityChange) throws {
         tell(.qualityChanged(timestampNs: timestampNs, change: change))
     }
 

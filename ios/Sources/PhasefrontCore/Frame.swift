@@ -2,7 +2,7 @@ import Foundation
 
 /// One plane of an image in memory that the platform owns. A session reads it only during the call that takes the
 /// frame.
-public struct Plane: Sendable {
+public struct ImagePlane: Sendable {
     /// The memory, starting at the first pixel of the first row.
     public var bytes: Data
     /// The strides of rows and pixels.
@@ -11,7 +11,7 @@ public struct Plane: Sendable {
     /// Creates a plane whose rows are `rowStride` bytes apart and whose pixels are `pixelStride` bytes apart.
     public init(bytes: Data, rowStride: Int, pixelStride: Int) {
         self.bytes = bytes
-        info = PlaneInfo(rowStride: UInt32(clamping: rowStride), pixelStride: UInt32(clamping: pixelStride))
+        info = PlaneInfo(rowStride: rowStride, pixelStride: pixelStride)
     }
 
     /// Creates a plane at `address` without a copy. The memory must stay valid as long as the plane is used.
@@ -32,7 +32,7 @@ public struct ColourImage: Sendable {
     /// The height in pixels.
     public var height: Int
     /// The planes, in the order of the format.
-    public var planes: [Plane]
+    public var planes: [ImagePlane]
     /// The matrix of luma and chroma. RGB formats ignore it.
     public var matrix: YuvMatrix
     /// Whether luma spans 16...235 and chroma 16...240. RGB formats ignore it.
@@ -40,7 +40,7 @@ public struct ColourImage: Sendable {
 
     /// Creates an image of planes with any strides.
     public init(
-        format: ColourFormat, width: Int, height: Int, planes: [Plane], matrix: YuvMatrix = .bt601,
+        format: ColourFormat, width: Int, height: Int, planes: [ImagePlane], matrix: YuvMatrix = .bt601,
         videoRange: Bool = false
     ) {
         self.format = format
@@ -56,7 +56,7 @@ public struct ColourImage: Sendable {
         let pixel = format == .rgb ? 3 : 4
         self.init(
             format: format, width: width, height: height,
-            planes: [Plane(bytes: bytes, rowStride: pixel * width, pixelStride: pixel)])
+            planes: [ImagePlane(bytes: bytes, rowStride: pixel * width, pixelStride: pixel)])
     }
 }
 
@@ -69,10 +69,10 @@ public struct ConfidenceMap: Sendable {
     /// The height in pixels, equal to that of the depth image.
     public var height: Int
     /// The plane.
-    public var plane: Plane
+    public var plane: ImagePlane
 
     /// Creates a map whose plane has any strides.
-    public init(format: ConfidenceFormat, width: Int, height: Int, plane: Plane) {
+    public init(format: ConfidenceFormat, width: Int, height: Int, plane: ImagePlane) {
         self.format = format
         self.width = width
         self.height = height
@@ -89,13 +89,13 @@ public struct DepthImage: Sendable {
     /// The height in pixels.
     public var height: Int
     /// The plane.
-    public var plane: Plane
+    public var plane: ImagePlane
     /// The confidence of the readings, if known.
     public var confidence: ConfidenceMap?
 
     /// Creates an image whose plane has any strides.
     public init(
-        format: DepthFormat, width: Int, height: Int, plane: Plane, confidence: ConfidenceMap? = nil
+        format: DepthFormat, width: Int, height: Int, plane: ImagePlane, confidence: ConfidenceMap? = nil
     ) {
         self.format = format
         self.width = width
@@ -106,7 +106,7 @@ public struct DepthImage: Sendable {
 
     /// Creates an image of one plane without gaps.
     public init(format: DepthFormat, width: Int, height: Int, bytes: Data) {
-        let plane = Plane(bytes: bytes, rowStride: format.pixelBytes * width, pixelStride: format.pixelBytes)
+        let plane = ImagePlane(bytes: bytes, rowStride: format.pixelBytes * width, pixelStride: format.pixelBytes)
         self.init(format: format, width: width, height: height, plane: plane)
     }
 }
@@ -128,9 +128,9 @@ extension Orientation {
 }
 
 /// A colour image and a depth image of the same moment.
-public struct Frame: Sendable {
+public struct CameraFrame: Sendable {
     /// The capture time in nanoseconds of any monotonic clock.
-    public var timestampNs: UInt64
+    public var timestampNs: Int64
     /// The colour image.
     public var colour: ColourImage
     /// The depth image.
@@ -142,7 +142,7 @@ public struct Frame: Sendable {
 
     /// Creates a frame of both images. By default they are upright and share a field of view.
     public init(
-        timestampNs: UInt64, colour: ColourImage, depth: DepthImage, orientation: Orientation = .upright,
+        timestampNs: Int64, colour: ColourImage, depth: DepthImage, orientation: Orientation = .upright,
         cameras: Cameras? = nil
     ) {
         self.timestampNs = timestampNs
@@ -153,16 +153,15 @@ public struct Frame: Sendable {
     }
 
     var info: FrameInfo {
-        func size(_ count: Int) -> UInt32 { UInt32(clamping: count) }
-        return FrameInfo(
+        FrameInfo(
             timestampNs: timestampNs,
             colour: ColourInfo(
-                format: colour.format, width: size(colour.width), height: size(colour.height),
+                format: colour.format, width: colour.width, height: colour.height,
                 planes: colour.planes.map(\.info), matrix: colour.matrix, videoRange: colour.videoRange),
             depth: DepthInfo(
-                format: depth.format, width: size(depth.width), height: size(depth.height), plane: depth.plane.info),
+                format: depth.format, width: depth.width, height: depth.height, plane: depth.plane.info),
             confidence: depth.confidence.map {
-                ConfidenceInfo(format: $0.format, width: size($0.width), height: size($0.height), plane: $0.plane.info)
+                ConfidenceInfo(format: $0.format, width: $0.width, height: $0.height, plane: $0.plane.info)
             },
             orientation: orientation,
             cameras: cameras)

@@ -1,7 +1,7 @@
 import Foundation
 
 /// A colour of a hologram.
-public enum Colour: UInt32, CaseIterable, Sendable {
+public enum Colour: Int, CaseIterable, Sendable {
     /// The red laser.
     case red
     /// The green laser.
@@ -20,15 +20,15 @@ public final class Hologram: Sendable {
     public let info: HologramInfo
     let raw: RawHologram
 
-    init(_ raw: RawHologram) throws {
+    init(_ raw: RawHologram) {
         self.raw = raw
-        info = try raw.info()
+        info = raw.info()
     }
 
     /// Reads the levels of `colour` in place: `info.width` × `info.height` bytes, row by row without gaps. The pointer
     /// is valid only in `body`.
     public func withPlane<R>(_ colour: Colour, _ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
-        let (address, count) = try (raw.planeAddress(colour: colour.rawValue), raw.planeLen())
+        let (address, count) = (try raw.planeAddress(colour: colour.rawValue), raw.planeLen())
         return try withExtendedLifetime(self) {
             try body(UnsafeRawBufferPointer(start: UnsafeRawPointer(bitPattern: UInt(address)), count: Int(count)))
         }
@@ -36,21 +36,20 @@ public final class Hologram: Sendable {
 
     /// Returns the z in mm of the scene point at (`x`, `y`) of the image, each 0 to 1 from the upper left corner. Use
     /// it to focus on a tapped point.
-    public func z(atX x: Double, y: Double) throws -> Double {
-        try raw.zAt(x: x, y: y)
+    public func z(atX x: Double, y: Double) -> Double {
+        raw.zAt(x: x, y: y)
     }
 
     /// Returns the displayed image for an eye focused at `zMm`: red, green, blue, alpha. It takes some milliseconds, so
     /// do not call it on the main thread.
     public func preview(zMm: Double, width: Int, height: Int) throws -> PixelImage {
-        try PixelImage(
-            raw.preview(zMm: zMm, width: UInt32(clamping: width), height: UInt32(clamping: height)))
+        try PixelImage(raw.preview(zMm: zMm, width: width, height: height))
     }
 
     /// Returns the displayed image of the whole hologram for an eye focused at `zMm`, as amplitudes; 1 is white. It
     /// transforms the whole hologram, so do not call it on the main thread.
     ///
-    /// - Throws: ``PhasefrontError/Setting(message:)`` if z is too far away.
+    /// - Throws: ``PhasefrontError/setting(message:)`` if z is too far away.
     public func refocus(zMm: Double) throws -> Planes {
         try Planes(raw.refocus(zMm: zMm))
     }
@@ -59,7 +58,7 @@ public final class Hologram: Sendable {
     /// the real and imaginary part of each pixel. It transforms the whole hologram, so do not call it on the main
     /// thread.
     ///
-    /// - Throws: ``PhasefrontError/Setting(message:)`` if z is too far away.
+    /// - Throws: ``PhasefrontError/setting(message:)`` if z is too far away.
     public func field(zMm: Double = 0) throws -> Planes {
         try Planes(raw.field(zMm: zMm))
     }
@@ -67,7 +66,7 @@ public final class Hologram: Sendable {
     /// Returns image `index` of the images for the modulator's driver, at the modulator's resolution, with unchanged
     /// levels. All layouts except grey have one image.
     public func output(_ placement: Placement = Placement(layout: .rgba), image index: Int = 0) throws -> PixelImage {
-        try PixelImage(raw.output(placement: placement, image: UInt32(clamping: index)))
+        try PixelImage(raw.output(placement: placement, image: index))
     }
 }
 
@@ -83,18 +82,16 @@ public final class Planes: Sendable {
     public let numbers: Int
     let raw: RawPlanes
 
-    init(_ raw: RawPlanes) throws {
+    init(_ raw: RawPlanes) {
         self.raw = raw
-        width = try Int(raw.width())
-        height = try Int(raw.height())
-        colours = try Int(raw.colours())
-        numbers = try Int(raw.pixelBytes()) / MemoryLayout<Float>.size
+        (width, height, colours) = (raw.width(), raw.height(), raw.colours())
+        numbers = raw.pixelBytes() / MemoryLayout<Float>.size
     }
 
     /// Reads the plane of `colour` in place: `height` rows of `width` pixels without gaps. The pointer is valid only in
     /// `body`.
     ///
-    /// - Throws: ``PhasefrontError/Setting(message:)`` if there is no plane of this colour.
+    /// - Throws: ``PhasefrontError/setting(message:)`` if there is no plane of this colour.
     public func withPlane<R>(_ colour: Colour, _ body: (UnsafeBufferPointer<Float>) throws -> R) throws -> R {
         let address = try raw.planeAddress(colour: colour.rawValue)
         return try withExtendedLifetime(self) {
@@ -114,16 +111,14 @@ public final class PixelImage: Sendable {
     public let pixelBytes: Int
     let raw: RawImage
 
-    init(_ raw: RawImage) throws {
+    init(_ raw: RawImage) {
         self.raw = raw
-        width = try Int(raw.width())
-        height = try Int(raw.height())
-        pixelBytes = try Int(raw.pixelBytes())
+        (width, height, pixelBytes) = (raw.width(), raw.height(), raw.pixelBytes())
     }
 
     /// Reads the image in place. The pointer is valid only in `body`.
-    public func withBytes<R>(_ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
-        let (address, count) = try (raw.address(), raw.byteLen())
+    public func withBytes<R>(_ body: (UnsafeRawBufferPointer) throws -> R) rethrows -> R {
+        let (address, count) = (raw.address(), raw.byteLen())
         return try withExtendedLifetime(self) {
             try body(UnsafeRawBufferPointer(start: UnsafeRawPointer(bitPattern: UInt(address)), count: Int(count)))
         }

@@ -1,7 +1,7 @@
 import Foundation
 
 /// The log messages of the library.
-public enum Log {
+public enum HologramLog {
     /// Sends messages of `level` and above to `handler`, which may be called on any thread. nil turns them off.
     public static func send(_ level: LogLevel, to handler: (@Sendable (LogLevel, String) -> Void)?) throws {
         try setLogListener(level: level, listener: handler.map(Handler.init))

@@ -4,11 +4,11 @@ import Foundation
 /// ``process(_:)``, ``warmUp()`` and ``close()`` wait for a frame, so do not call them on the main thread.
 ///
 /// ```swift
-/// let session = try Session(SessionOptions(), mode: .image)
+/// let session = try HologramSession(SessionOptions(), mode: .image)
 /// let hologram = try session.process(frame)
 /// try hologram.withPlane(.green) { levels in print(levels.count) }
 /// ```
-public final class Session: Sendable {
+public final class HologramSession: Sendable {
     /// The events of a live stream, for one reader. Empty if the session has a listener, and in the other running
     /// modes.
     public let events: SessionEvents
@@ -33,16 +33,13 @@ public final class Session: Sendable {
         }
     }
 
-    deinit {
-        // Nothing is left to report an error to.
-        try? close()
-    }
+    deinit { close() }
 
     /// Returns the hologram of `frame`, in an image or a video session. Blocks until it is done.
     ///
     /// - Throws: ``PhasefrontError`` if the frame is unusable or late, or if the session is a live stream, paused or
     ///   closed. Later frames are not affected.
-    public func process(_ frame: Frame) throws -> Hologram {
+    public func process(_ frame: CameraFrame) throws -> Hologram {
         try Hologram(
             raw.process(
                 lumaOrColour: frame.colourBytes(0), chroma: frame.colourBytes(1), chromaV: frame.colourBytes(2),
@@ -55,7 +52,7 @@ public final class Session: Sendable {
     /// - Throws: ``PhasefrontError`` if the frame is unusable or late, or if the session is not a live stream or is
     ///   closed. Later frames are not affected.
     @discardableResult
-    public func submit(_ frame: Frame) throws -> DropReason? {
+    public func submit(_ frame: CameraFrame) throws -> DropReason? {
         try raw.submit(
             lumaOrColour: frame.colourBytes(0), chroma: frame.colourBytes(1), chromaV: frame.colourBytes(2),
             depth: frame.depth.plane.bytes, confidence: frame.confidenceBytes, info: frame.info)
@@ -79,36 +76,36 @@ public final class Session: Sendable {
     /// Sets whether the session may change its quality level.
     public func setQuality(_ quality: Quality) throws { try raw.setQuality(quality: quality) }
 
-    /// Returns the session's statistics, also after it is closed. Never blocks on a frame.
-    public func statistics() throws -> Statistics { try raw.statistics() }
+    /// The session's statistics, also after it is closed. Never blocks on a frame.
+    public var statistics: Statistics { raw.statistics() }
 
     /// Stops accepting frames and frees the memory. Returned holograms stay valid. Waits until all events are
     /// delivered, unless a session's listener calls it; then it returns at once. ``events`` ends after the last event.
     /// Closing twice does nothing.
-    public func close() throws { try raw.shutDown() }
+    public func close() { raw.shutDown() }
 }
 
 extension SessionOptions {
     /// Creates the default options for `display`: holograms at its resolution by `method` and AA-DPM. Without a method,
     /// the built-in network is used, or the plane sweep if that network was not trained for the display.
     ///
-    /// - Throws: ``PhasefrontError/Display(message:)`` for an impossible display.
-    public init(display: Display = Display(), method: Method? = nil) throws {
-        try self.init(target: Target.ofDisplay(display: display), method: method)
+    /// - Throws: ``PhasefrontError/display(message:)`` for an impossible display.
+    public init(display: HologramDisplay = HologramDisplay(), method: HologramMethod? = nil) throws {
+        try self.init(target: HologramTarget.ofDisplay(display: display), method: method)
     }
 
     /// Creates the default options for `display` and `network`.
-    public init(display: Display = Display(), network: Network) throws {
+    public init(display: HologramDisplay = HologramDisplay(), network: HologramNetwork) throws {
         try self.init(display: display, method: .trained(network: network))
     }
 
     /// Creates the default options for `target`, a calibrated display.
-    public init(target: Target, method: Method? = nil) throws {
+    public init(target: HologramTarget, method: HologramMethod? = nil) throws {
         self = try sessionOptions(target: target, method: method)
     }
 
     /// Creates the default options for `target` and `network`.
-    public init(target: Target, network: Network) throws {
+    public init(target: HologramTarget, network: HologramNetwork) throws {
         try self.init(target: target, method: .trained(network: network))
     }
 }
@@ -117,8 +114,8 @@ extension PhasefrontError: LocalizedError, CustomStringConvertible {
     /// The error message: one line that names the problem and the remedy.
     public var message: String {
         switch self {
-        case .Display(let message), .Frame(let message), .Timestamp(let message), .Setting(let message),
-            .Network(let message), .File(let message), .Session(let message), .Internal(let message):
+        case .display(let message), .frame(let message), .timestamp(let message), .setting(let message),
+            .network(let message), .file(let message), .session(let message), .internal(let message):
             message
         }
     }

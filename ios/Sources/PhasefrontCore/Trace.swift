@@ -1,7 +1,7 @@
 import Foundation
 
 /// The begin and end of each stage of a frame.
-public enum Trace {
+public enum HologramTrace {
     /// Calls `handler` with each stage that begins (true) or ends (false), on the thread that computes it. Stages on a
     /// thread are nested. nil turns the calls off. The handler must not call the library.
     public static func send(to handler: (@Sendable (Stage, Bool) -> Void)?) throws {

@@ -7,12 +7,12 @@ import XCTest
 final class BenchmarkTests: XCTestCase {
     private let device = Device(model: "a test", system: "Linux", cores: 2)
 
-    private func benchmark(_ runs: [Run], _ display: Display) -> Benchmark {
+    private func benchmark(_ runs: [Run], _ display: HologramDisplay) -> Benchmark {
         Benchmark(
             runs: runs, displays: [display], frames: 3,
             scene: {
                 let bytes = { (count: Int) in Data((0..<count).map { UInt8($0 % 251) }) }
-                return Frame(
+                return CameraFrame(
                     timestampNs: 0,
                     colour: ColourImage(format: .rgba, width: 32, height: 24, bytes: bytes(4 * 32 * 24)),
                     depth: DepthImage(format: .normalizedU8, width: 32, height: 24, bytes: bytes(32 * 24)))
@@ -27,11 +27,11 @@ final class BenchmarkTests: XCTestCase {
     }
 
     func testARecordHasEveryRunWithItsStagesAndConditions() async throws {
-        let runs = try Run.all(deep: Network.builtIn(name: "rgbd-15"))
-        let outcomes = try await benchmark(runs, Display(width: 64, height: 48)).outcomes { line in
+        let runs = try Run.all(deep: HologramNetwork.builtIn(name: "rgbd-15"))
+        let outcomes = try await benchmark(runs, HologramDisplay(width: 64, height: 48)).outcomes { line in
             XCTAssert(line.hasPrefix("64×48 ") && line.contains(" ms ("), line)
         }
-        let record = Record(phasefront: try version(), device: device, begun: "now", runs: outcomes)
+        let record = Record(phasefront: version(), device: device, begun: "now", runs: outcomes)
         let read = try XCTUnwrap(JSONSerialization.jsonObject(with: record.json()) as? [String: Any])
         XCTAssertEqual(Set(read.keys), ["phasefront", "device", "begun", "runs"])
         let told = try XCTUnwrap(read["runs"] as? [[String: Any]])
@@ -53,8 +53,8 @@ final class BenchmarkTests: XCTestCase {
 
     func testWhatIsRefusedIsSaidAndTheOthersGoOn() async throws {
         // No network was trained for this display.
-        let display = Display(width: 64, height: 48, pitchUm: 3.74)
-        let network = try Network.builtIn(name: "rgbd-8")
+        let display = HologramDisplay(width: 64, height: 48, pitchUm: 3.74)
+        let network = try HologramNetwork.builtIn(name: "rgbd-8")
         let runs = [
             Run(name: "8 layers", stage: .method, method: .trained(network: network)),
             Run(name: "sweep", stage: .method, method: .sweep),

@@ -10,16 +10,16 @@ final class BorderTests: XCTestCase {
         let count = 5 + (ProcessInfo.processInfo.environment["PHASEFRONT_BORDER"].flatMap(Int.init) ?? 1)
         let luma = Data((0..<1920 * 1440).map { UInt8(truncatingIfNeeded: $0 * 7 / 5) })
         let metres = (0..<256 * 192).map { 0.5 + Float($0) * 4e-6 }.withUnsafeBytes { Data($0) }
-        let frame = Frame(
+        let frame = CameraFrame(
             timestampNs: 0,
             colour: ColourImage(
                 format: .nv12, width: 1920, height: 1440,
                 planes: [
-                    Plane(bytes: luma, rowStride: 1920, pixelStride: 1),
-                    Plane(bytes: luma.prefix(1920 * 720), rowStride: 1920, pixelStride: 2),
+                    ImagePlane(bytes: luma, rowStride: 1920, pixelStride: 1),
+                    ImagePlane(bytes: luma.prefix(1920 * 720), rowStride: 1920, pixelStride: 2),
                 ]),
             depth: DepthImage(format: .metresF32, width: 256, height: 192, bytes: metres))
-        let session = try Session(SessionOptions(network: try network.get()), mode: .image)
+        let session = try HologramSession(SessionOptions(network: try network.get()), mode: .image)
         var (added, inside): ([Double], [Double]) = ([], [])
         for i in 0..<count {
             let start = DispatchTime.now().uptimeNanoseconds

@@ -20,7 +20,7 @@ final class ConformanceTests: XCTestCase {
     }
 
     private struct Still: Decodable {
-        let timestamp_ns: UInt64
+        let timestamp_ns: Int64
         let colour: Colours
         let depth: Image
         let confidence: Image?
@@ -31,9 +31,9 @@ final class ConformanceTests: XCTestCase {
     private struct Memory: Decodable {
         let offset, length, row_stride, pixel_stride: Int
 
-        func plane(_ frames: Data) -> Plane {
+        func plane(_ frames: Data) -> ImagePlane {
             // A slice whose indices do not start at 0.
-            Plane(bytes: frames[offset..<offset + length], rowStride: row_stride, pixelStride: pixel_stride)
+            ImagePlane(bytes: frames[offset..<offset + length], rowStride: row_stride, pixelStride: pixel_stride)
         }
     }
 
@@ -63,7 +63,7 @@ final class ConformanceTests: XCTestCase {
     private static let rotations: [Int: Rotation] = [0: .upright, 90: .clockwise90, 180: .half, 270: .clockwise270]
     private static let modes: [String: RunningMode] = ["image": .image, "video": .video]
 
-    private func frame(_ still: Still, _ frames: Data) throws -> Frame {
+    private func frame(_ still: Still, _ frames: Data) throws -> CameraFrame {
         let confidence = try still.confidence.map {
             ConfidenceMap(
                 format: try XCTUnwrap(Self.confidences[$0.format]), width: $0.width, height: $0.height,
@@ -77,18 +77,18 @@ final class ConformanceTests: XCTestCase {
             format: try XCTUnwrap(Self.depths[still.depth.format]), width: still.depth.width,
             height: still.depth.height, plane: still.depth.plane.plane(frames), confidence: confidence)
         let rotation = try XCTUnwrap(Self.rotations[still.rotation])
-        return Frame(
+        return CameraFrame(
             timestampNs: still.timestamp_ns, colour: colour, depth: depth,
             orientation: Orientation(rotation: rotation, mirrored: still.mirrored))
     }
 
     private static let root = URL(fileURLWithPath: #filePath).appendingPathComponent("../../../..").standardized
 
-    private func model(_ file: String) throws -> Network {
-        try Network.fromFile(path: Self.root.appendingPathComponent("models/\(file)").path)
+    private func model(_ file: String) throws -> HologramNetwork {
+        try HologramNetwork.fromFile(path: Self.root.appendingPathComponent("models/\(file)").path)
     }
 
-    private func method(_ name: String) throws -> Method {
+    private func method(_ name: String) throws -> HologramMethod {
         switch name {
         case "network": .trained(network: try network.get())
         case "sweep": .sweep
@@ -106,13 +106,13 @@ final class ConformanceTests: XCTestCase {
         }
     }
 
-    private func target(_ one: Case) throws -> Target {
+    private func target(_ one: Case) throws -> HologramTarget {
         if let file = one.calibration {
-            return try Target.fromFile(path: Self.root.appendingPathComponent("tests/conformance/\(file)").path)
+            return try HologramTarget.fromFile(path: Self.root.appendingPathComponent("tests/conformance/\(file)").path)
         }
         let display = try displayFromToml(text: one.display)
-        guard let levels = one.lut else { return try Target.ofDisplay(display: display) }
-        return try Target.withLookUpTable(display: display, levels: Data(levels))
+        guard let levels = one.lut else { return try HologramTarget.ofDisplay(display: display) }
+        return try HologramTarget.withLookUpTable(display: display, levels: Data(levels))
     }
 
     /// Returns the levels of a case's frames and appends their displayed images to `seen`.
@@ -121,7 +121,7 @@ final class ConformanceTests: XCTestCase {
         options.encoding = try encoding(one.encoding)
         if let scale = one.brightness { options.brightness = .fixed(scale: scale) }
         if let range = one.range { options.depthRange = .fixed(nearM: range[0], farM: range[1]) }
-        let session = try Session(options, mode: try XCTUnwrap(Self.modes[one.mode]))
+        let session = try HologramSession(options, mode: try XCTUnwrap(Self.modes[one.mode]))
         var all = Data()
         for still in one.frames {
             let hologram = try session.process(try frame(still, frames))

@@ -2,8 +2,8 @@ import Foundation
 
 @testable import PhasefrontCore
 
-let network = Result { try Network.builtIn() }
-let smallDisplay = Display(width: 64, height: 48)
+let network = Result { try HologramNetwork.builtIn() }
+let smallDisplay = HologramDisplay(width: 64, height: 48)
 
 func options() throws -> SessionOptions { try SessionOptions(display: smallDisplay, network: network.get()) }
 
@@ -28,8 +28,8 @@ func depthBytes(metres: Float = 0.5) -> Data {
     return bytes
 }
 
-func still(timestampNs: UInt64 = 0, colour: Data = colourBytes(), depth: Data = depthBytes()) -> Frame {
-    Frame(
+func still(timestampNs: Int64 = 0, colour: Data = colourBytes(), depth: Data = depthBytes()) -> CameraFrame {
+    CameraFrame(
         timestampNs: timestampNs,
         colour: ColourImage(format: .rgba, width: 64, height: 48, bytes: colour),
         depth: DepthImage(format: .metresF32, width: 32, height: 24, bytes: depth))
@@ -38,7 +38,7 @@ func still(timestampNs: UInt64 = 0, colour: Data = colourBytes(), depth: Data = 
 extension Hologram {
     /// The levels of all colours.
     func levels() throws -> Data {
-        try Colour.allCases.prefix(Int(info.colours)).reduce(into: Data()) { all, colour in
+        try Colour.allCases.prefix(info.colours).reduce(into: Data()) { all, colour in
             try withPlane(colour) { all.append(contentsOf: $0) }
         }
     }

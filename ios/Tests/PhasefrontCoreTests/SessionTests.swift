@@ -26,58 +26,58 @@ final class SessionTests: XCTestCase {
     }
 
     func testLevelsAreReadInPlaceAndOutliveTheSession() throws {
-        let hologram = try Session(options(), mode: .image).process(still())
+        let hologram = try HologramSession(options(), mode: .image).process(still())
         let before = try hologram.levels()
         XCTAssertGreaterThan(Set(before).count, 100)
         try hologram.withPlane(.green) { XCTAssertEqual($0.count, 64 * 48) }
-        let other = try Session(options(), mode: .image).process(still(depth: depthBytes(metres: 2)))
+        let other = try HologramSession(options(), mode: .image).process(still(depth: depthBytes(metres: 2)))
         XCTAssertEqual(try hologram.levels(), before)
         XCTAssertEqual(other.info.width, 64)
     }
 
     func testSlicesAndForeignMemoryAreRespected() throws {
-        let session = try Session(options(), mode: .image)
+        let session = try HologramSession(options(), mode: .image)
         let want = try session.process(still()).levels()
         let padded = Data(repeating: 9, count: 60) + colourBytes() + Data(repeating: 9, count: 30)
         XCTAssertEqual(try session.process(still(colour: padded[60..<padded.count - 30])).levels(), want)
         try colourBytes().withUnsafeBytes { bytes in
             var frame = still()
             let address = try XCTUnwrap(bytes.baseAddress)
-            frame.colour.planes = [Plane(unsafeAddress: address, count: bytes.count, rowStride: 256, pixelStride: 4)]
+            frame.colour.planes = [ImagePlane(unsafeAddress: address, count: bytes.count, rowStride: 256, pixelStride: 4)]
             XCTAssertEqual(try session.process(frame).levels(), want)
         }
     }
 
     func testUnusableFramesAreNamed() throws {
-        let session = try Session(options(), mode: .image)
-        func colour(_ width: Int, _ height: Int, _ planes: [Plane]) -> Frame {
+        let session = try HologramSession(options(), mode: .image)
+        func colour(_ width: Int, _ height: Int, _ planes: [ImagePlane]) -> CameraFrame {
             var frame = still()
             frame.colour = ColourImage(format: .rgba, width: width, height: height, planes: planes)
             return frame
         }
-        func plane(_ rowStride: Int, _ pixelStride: Int) -> Plane {
-            Plane(bytes: colourBytes(), rowStride: rowStride, pixelStride: pixelStride)
+        func plane(_ rowStride: Int, _ pixelStride: Int) -> ImagePlane {
+            ImagePlane(bytes: colourBytes(), rowStride: rowStride, pixelStride: pixelStride)
         }
         assertRefused("too few") { try session.process(still(colour: Data())) }
         assertRefused("too few") { try session.process(still(depth: Data())) }
         assertRefused("64×0") { try session.process(colour(64, 0, [plane(256, 4)])) }
-        assertRefused("0×48") { try session.process(colour(-64, 48, [plane(256, 4)])) }
+        assertRefused("×48") { try session.process(colour(-64, 48, [plane(256, 4)])) }
         assertRefused("row stride") { try session.process(colour(64, 48, [plane(200, 4)])) }
         assertRefused("pixel stride") { try session.process(colour(64, 48, [plane(256, 1)])) }
         assertRefused("planes") { try session.process(colour(64, 48, [])) }
-        assertRefused("planes") { try session.process(colour(64, 48, [Plane](repeating: plane(256, 4), count: 4))) }
+        assertRefused("planes") { try session.process(colour(64, 48, [ImagePlane](repeating: plane(256, 4), count: 4))) }
         _ = try session.process(still())
     }
 
     func testAPreviewShowsThePictureAndATapGivesZ() throws {
-        let hologram = try Session(options(), mode: .image).process(still())
+        let hologram = try HologramSession(options(), mode: .image).process(still())
         let image = try hologram.preview(zMm: 0, width: 32, height: 24)
-        try image.withBytes { bytes in
+        image.withBytes { bytes in
             XCTAssertEqual(bytes.count, 4 * 32 * 24)
             XCTAssert(stride(from: 3, to: bytes.count, by: 4).allSatisfy { bytes[$0] == 255 })
             XCTAssertGreaterThan(Set(bytes).count, 20)
         }
-        XCTAssertGreaterThan(try hologram.z(atX: 0.5, y: 0.5), try hologram.z(atX: 0.02, y: 0.02))
+        XCTAssertGreaterThan(hologram.z(atX: 0.5, y: 0.5), hologram.z(atX: 0.02, y: 0.02))
         assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
     }
 
@@ -87,7 +87,7 @@ final class SessionTests: XCTestCase {
     }
 
     func testAWholeViewIsTheFieldWithoutItsPhases() throws {
-        let hologram = try Session(options(), mode: .image).process(still())
+        let hologram = try HologramSession(options(), mode: .image).process(still())
         let (seen, field) = try (hologram.refocus(zMm: 0), hologram.field())
         XCTAssertEqual([seen.width, seen.height, seen.colours, seen.numbers, field.numbers], [64, 48, 3, 1, 2])
         try seen.withPlane(.blue) { amplitudes in
@@ -104,20 +104,20 @@ final class SessionTests: XCTestCase {
     }
 
     func testOutputIsWhatTheModulatorTakes() throws {
-        let hologram = try Session(options(), mode: .image).process(still())
+        let hologram = try HologramSession(options(), mode: .image).process(still())
         let levels = [UInt8](try hologram.levels())
         try hologram.output().withBytes { rgba in
             XCTAssertEqual((0..<64 * 48).map { rgba[4 * $0] }, Array(levels[..<(64 * 48)]))
         }
         let blue = try hologram.output(Placement(layout: .grey, flipX: true), image: 2)
         XCTAssertEqual(blue.pixelBytes, 1)
-        XCTAssertEqual(try blue.withBytes { $0[0] }, levels[2 * 64 * 48 + 63])
+        XCTAssertEqual(blue.withBytes { $0[0] }, levels[2 * 64 * 48 + 63])
         assertRefused("no image 1") { try hologram.output(image: 1) }
     }
 
     func testALiveStreamAnswersEveryFrameOnItsOwnThread() throws {
-        let answered = Locked<(timestamps: [UInt64], threads: Set<Thread>)>(([], []))
-        let session = try Session(options(), mode: .live) { event in
+        let answered = Locked<(timestamps: [Int64], threads: Set<Thread>)>(([], []))
+        let session = try HologramSession(options(), mode: .live) { event in
             answered.withLock {
                 $0.threads.insert(Thread.current)
                 switch event {
@@ -127,23 +127,23 @@ final class SessionTests: XCTestCase {
                 }
             }
         }
-        for i in 1000..<1050 as Range<UInt64> { try session.submit(still(timestampNs: i)) }
-        try session.close()
+        for i in 1000..<1050 as Range<Int64> { try session.submit(still(timestampNs: i)) }
+        session.close()
         let (timestamps, threads) = answered.withLock { $0 }
         XCTAssertEqual(timestamps.sorted(), Array(1000..<1050))
         XCTAssertEqual(threads.count, 1)
         XCTAssertFalse(threads.contains(Thread.current))
-        let statistics = try session.statistics()
+        let statistics = session.statistics
         XCTAssertEqual(statistics.processed + statistics.dropped.total, 50)
     }
 
     func testAsyncEventsTellTheSame() async throws {
-        let session = try Session(options(), mode: .live)
+        let session = try HologramSession(options(), mode: .live)
         let submitting = Task.detached {
-            for i in 1...50 as ClosedRange<UInt64> { try session.submit(still(timestampNs: i)) }
-            try session.close()
+            for i in 1...50 as ClosedRange<Int64> { try session.submit(still(timestampNs: i)) }
+            session.close()
         }
-        var timestamps: [UInt64] = []
+        var timestamps: [Int64] = []
         for await event in session.events {
             switch event {
             case .processed(let hologram): timestamps.append(hologram.info.timestampNs)
@@ -156,12 +156,12 @@ final class SessionTests: XCTestCase {
     }
 
     func testUnreadEventsHoldTwoHologramsAtMost() async throws {
-        let session = try Session(options(), mode: .live)
-        for i in 1...8 as ClosedRange<UInt64> {
+        let session = try HologramSession(options(), mode: .live)
+        for i in 1...8 as ClosedRange<Int64> {
             try session.submit(still(timestampNs: i))
-            while try session.statistics().pending > 0 { usleep(1000) }
+            while session.statistics.pending > 0 { usleep(1000) }
         }
-        try session.close()
+        session.close()
         var (holograms, unread) = (0, 0)
         for await event in session.events {
             switch event {
@@ -174,17 +174,17 @@ final class SessionTests: XCTestCase {
     }
 
     func testACancelledReaderEnds() async throws {
-        let session = try Session(options(), mode: .live)
+        let session = try HologramSession(options(), mode: .live)
         let reading = Task { for await _ in session.events {} }
         try await Task.sleep(nanoseconds: 20_000_000)
         reading.cancel()
         await reading.value
-        try session.close()
+        session.close()
     }
 
     func testALateFrameInAStreamHarmsNothing() throws {
         let made = DispatchSemaphore(value: 0)
-        let session = try Session(options(), mode: .live) { if case .processed = $0 { made.signal() } }
+        let session = try HologramSession(options(), mode: .live) { if case .processed = $0 { made.signal() } }
         try session.submit(still(timestampNs: 5))
         XCTAssertEqual(made.wait(timeout: .now() + 60), .success)
         assertRefused("5 ns") { try session.submit(still(timestampNs: 5)) }
@@ -194,22 +194,22 @@ final class SessionTests: XCTestCase {
 
     func testAListenerMayCloseItsSession() throws {
         let closed = DispatchSemaphore(value: 0)
-        let box = Locked<Session?>(nil)
-        let session = try Session(options(), mode: .live) { _ in
+        let box = Locked<HologramSession?>(nil)
+        let session = try HologramSession(options(), mode: .live) { _ in
             let own = box.withLock { $0 }
-            do { try own?.close() } catch { XCTFail("\(error)") }
+            own?.close()
             closed.signal()
         }
         box.withLock { $0 = session }
         try session.submit(still(timestampNs: 1))
         XCTAssertEqual(closed.wait(timeout: .now() + 60), .success)
         assertRefused("closed") { try session.submit(still(timestampNs: 2)) }
-        try session.close()
+        session.close()
         box.withLock { $0 = nil }
     }
 
     func testThreadsShareASession() throws {
-        let session = try Session(options(), mode: .image)
+        let session = try HologramSession(options(), mode: .image)
         let want = try session.process(still()).levels()
         let wrong = Locked(0)
         DispatchQueue.concurrentPerform(iterations: 40) { _ in
@@ -219,19 +219,19 @@ final class SessionTests: XCTestCase {
     }
 
     func testAClosedSessionSaysSo() throws {
-        let session = try Session(options(), mode: .image)
+        let session = try HologramSession(options(), mode: .image)
         _ = try session.process(still())
-        try session.close()
-        try session.close()
+        session.close()
+        session.close()
         for call in [session.warmUp, session.reset, session.pause, session.resume] {
             assertRefused("closed; make a new one") { try call() }
         }
         assertRefused("closed; make a new one") { try session.process(still()) }
-        XCTAssertEqual(try session.statistics().processed, 1)
+        XCTAssertEqual(session.statistics.processed, 1)
     }
 
     func testAPausedSessionRefusesAndAResetLetsTimeBeginAnew() throws {
-        let session = try Session(options(), mode: .video)
+        let session = try HologramSession(options(), mode: .video)
         try session.warmUp()
         _ = try session.process(still(timestampNs: 100))
         assertRefused("99 ns") { try session.process(still(timestampNs: 99)) }
@@ -244,109 +244,109 @@ final class SessionTests: XCTestCase {
     }
 
     func testModesAreNotMixed() async throws {
-        let image = try Session(options(), mode: .image)
+        let image = try HologramSession(options(), mode: .image)
         assertRefused("not live") { try image.submit(still()) }
         for await event in image.events { XCTFail("\(event)") }
-        let live = try Session(options(), mode: .live)
+        let live = try HologramSession(options(), mode: .live)
         assertRefused("submitted") { try live.process(still()) }
-        assertRefused("listener") { try Session(options(), mode: .video) { _ in } }
+        assertRefused("listener") { try HologramSession(options(), mode: .video) { _ in } }
     }
 
     func testNetworksThatAreNoneAreNamed() throws {
-        assertRefused("nowhere.onnx") { try Network.fromFile(path: "/nowhere.onnx") }
-        assertRefused("network") { try Network.fromBytes(onnx: Data()) }
-        assertRefused("network") { try Network.fromBytes(onnx: Data("not a network".utf8)) }
+        assertRefused("nowhere.onnx") { try HologramNetwork.fromFile(path: "/nowhere.onnx") }
+        assertRefused("network") { try HologramNetwork.fromBytes(onnx: Data()) }
+        assertRefused("network") { try HologramNetwork.fromBytes(onnx: Data("not a network".utf8)) }
         let info = try network.get().info()
         XCTAssertEqual(info.layers, 8)
         XCTAssertEqual(info.pitchUm, 8)
     }
 
     func testSettingsThatCannotBeMeantAreNamed() throws {
-        func make(_ change: @escaping (inout SessionOptions) -> Void) -> () throws -> Session {
+        func make(_ change: @escaping (inout SessionOptions) -> Void) -> () throws -> HologramSession {
             {
                 var changed = try options()
                 change(&changed)
-                return try Session(changed, mode: .image)
+                return try HologramSession(changed, mode: .image)
             }
         }
         assertRefused("no quality levels", make { $0.qualityLevels = [] })
         assertRefused("0 threads", make { $0.threads = 0 })
         assertRefused("target rate", make { $0.targetRateHz = .nan })
         assertRefused("no quality level 3", make { $0.quality = .fixed(qualityLevel: 3) })
-        let fine = try Target.ofDisplay(display: Display(width: 64, height: 48, pitchUm: 3.74))
-        assertRefused("pitch") { try Session(SessionOptions(target: fine, network: network.get()), mode: .image) }
-        let tiny = try Target.ofDisplay(display: Display(width: 32, height: 24))
+        let fine = try HologramTarget.ofDisplay(display: HologramDisplay(width: 64, height: 48, pitchUm: 3.74))
+        assertRefused("pitch") { try HologramSession(SessionOptions(target: fine, network: network.get()), mode: .image) }
+        let tiny = try HologramTarget.ofDisplay(display: HologramDisplay(width: 32, height: 24))
         assertRefused("the modulator's 32×24", make { $0.target = tiny })
         assertRefused("line 1") { try displayFromToml(text: "width = ") }
     }
 
     func testTargetsThatCannotBeAreNamed() throws {
-        assertRefused("pitch_um") { try SessionOptions(display: Display(pitchUm: -1)) }
-        assertRefused("3 levels") { try Target.withLookUpTable(display: smallDisplay, levels: Data([1, 2, 3])) }
-        assertRefused("nowhere.pfc") { try Target.fromFile(path: "/nowhere.pfc") }
-        assertRefused("calibration") { try Target.fromBytes(file: Data("not a calibration".utf8)) }
+        assertRefused("pitch_um") { try SessionOptions(display: HologramDisplay(pitchUm: -1)) }
+        assertRefused("3 levels") { try HologramTarget.withLookUpTable(display: smallDisplay, levels: Data([1, 2, 3])) }
+        assertRefused("nowhere.pfc") { try HologramTarget.fromFile(path: "/nowhere.pfc") }
+        assertRefused("calibration") { try HologramTarget.fromBytes(file: Data("not a calibration".utf8)) }
     }
 
     func testATargetIsTakenAsItsDisplayIs() throws {
-        let target = try Target.withLookUpTable(display: smallDisplay, levels: Data(0...255))
+        let target = try HologramTarget.withLookUpTable(display: smallDisplay, levels: Data(0...255))
         let options = try SessionOptions(target: target)
-        XCTAssertEqual(try options.target.display(), smallDisplay)
-        let levels = try Session(options, mode: .image).process(still()).levels()
+        XCTAssertEqual(options.target.display(), smallDisplay)
+        let levels = try HologramSession(options, mode: .image).process(still()).levels()
         // This table has equal steps.
-        XCTAssertEqual(try Session(SessionOptions(display: smallDisplay), mode: .image).process(still()).levels(), levels)
+        XCTAssertEqual(try HologramSession(SessionOptions(display: smallDisplay), mode: .image).process(still()).levels(), levels)
     }
 
     func testTheNetworkThatIsBuiltInIsTheDefault() throws {
         for offset in [0.0, 3, 12] {
-            let defaults = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: offset))
+            let defaults = try SessionOptions(display: HologramDisplay(width: 64, height: 48, offsetMm: offset))
             guard case .trained = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
             guard case .antiAlias = defaults.encoding else { return XCTFail("\(defaults.encoding)") }
-            _ = try Session(defaults, mode: .image).process(still())
+            _ = try HologramSession(defaults, mode: .image).process(still())
         }
     }
 
     func testThePairThatIsBuiltInCanBeTaken() throws {
         let pair = try builtInPair(offsetMm: 6)
-        let display = Display(width: 64, height: 48, offsetMm: 6)
+        let display = HologramDisplay(width: 64, height: 48, offsetMm: 6)
         var options = try SessionOptions(display: display, network: pair.hologram)
         options.encoding = .deep(prefilter: pair.prefilter)
-        _ = try Session(options, mode: .image).process(still())
+        _ = try HologramSession(options, mode: .image).process(still())
     }
 
     func testStepsAndDarkCanBeSet() throws {
         let defaults = try SessionOptions(display: smallDisplay)
-        let levels = try Session(defaults, mode: .image).process(still()).levels()
+        let levels = try HologramSession(defaults, mode: .image).process(still()).levels()
         var options = defaults
         (options.darkThreshold, options.localSteps) = (0.4, 1)
-        XCTAssertEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        XCTAssertEqual(try HologramSession(options, mode: .image).process(still()).levels(), levels)
         options.localSteps = 0
-        XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        XCTAssertNotEqual(try HologramSession(options, mode: .image).process(still()).levels(), levels)
         options = defaults
         options.midpointSteps = 1
-        XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        XCTAssertNotEqual(try HologramSession(options, mode: .image).process(still()).levels(), levels)
         options.midpointSteps = 0
         options.qualityLevels[0].midpointSteps = 1
-        XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        XCTAssertNotEqual(try HologramSession(options, mode: .image).process(still()).levels(), levels)
         options = defaults
         options.localSteps = 9
-        assertRefused("at most 8") { try Session(options, mode: .image) }
+        assertRefused("at most 8") { try HologramSession(options, mode: .image) }
         (options.darkThreshold, options.localSteps) = (2, nil)
-        assertRefused("from 0 to 1") { try Session(options, mode: .image) }
+        assertRefused("from 0 to 1") { try HologramSession(options, mode: .image) }
     }
 
     func testWithoutANetworkTheSweepIsTheDefault() throws {
-        let defaults = try SessionOptions(display: Display(width: 64, height: 48, pitchUm: 3.74))
+        let defaults = try SessionOptions(display: HologramDisplay(width: 64, height: 48, pitchUm: 3.74))
         guard case .sweep = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
-        _ = try Session(defaults, mode: .image).process(still())
+        _ = try HologramSession(defaults, mode: .image).process(still())
         assertRefused("pairs for 0, 6, 12 mm") { try builtInPair(offsetMm: 3) }
     }
 
     func testMessagesReachTheLog() throws {
         let messages = Locked<[(LogLevel, String)]>([])
-        try Log.send(.info) { level, message in messages.withLock { $0.append((level, message)) } }
-        _ = try Session(options(), mode: .image)
-        try Log.send(.info, to: nil)
-        _ = try Session(options(), mode: .image)
+        try HologramLog.send(.info) { level, message in messages.withLock { $0.append((level, message)) } }
+        _ = try HologramSession(options(), mode: .image)
+        try HologramLog.send(.info, to: nil)
+        _ = try HologramSession(options(), mode: .image)
         let heard = messages.withLock { $0 }
         XCTAssertEqual(heard.map(\.0), [.info])
         XCTAssert(heard[0].1.contains("Image"))
@@ -354,10 +354,10 @@ final class SessionTests: XCTestCase {
 
     func testStagesBeginAndEnd() throws {
         let stages = Locked<[(Stage, Bool)]>([])
-        let session = try Session(options(), mode: .image)
-        try Trace.send { stage, begins in stages.withLock { $0.append((stage, begins)) } }
+        let session = try HologramSession(options(), mode: .image)
+        try HologramTrace.send { stage, begins in stages.withLock { $0.append((stage, begins)) } }
         _ = try session.process(still())
-        try Trace.send(to: nil)
+        try HologramTrace.send(to: nil)
         _ = try session.process(still())
         let heard = stages.withLock { $0 }
         XCTAssertEqual(heard.first?.0, .frame)
@@ -374,7 +374,7 @@ final class SessionTests: XCTestCase {
             }
             var small = try options()
             small.threads = 1
-            let session = try Session(small, mode: .image)
+            let session = try HologramSession(small, mode: .image)
             let frame = still()
             var sum = 0
             func frames(_ count: Int) throws {

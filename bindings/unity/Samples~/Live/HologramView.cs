@@ -5,21 +5,21 @@ using Phasefront;
 using UnityEngine;
 using UnityEngine.UI;
 
-public sealed class HologramView : MonoBehaviour, IListener
+public sealed class HologramView : MonoBehaviour, ISessionListener
 {
     [SerializeField] private RawImage modulator;
     [SerializeField] private int width = 1920;
     [SerializeField] private int height = 1080;
 
     private readonly ConcurrentQueue<Hologram> made = new ConcurrentQueue<Hologram>();
-    private Session session;
+    private HologramSession session;
     private Texture2D texture;
 
     private void OnEnable()
     {
-        using (var target = Target.FromToml($"width = {width}\nheight = {height}"))
+        using (var target = HologramTarget.FromToml($"width = {width}\nheight = {height}"))
         using (var options = SessionOptions.For(target))
-            session = Session.Open(options, RunningMode.Live, this);
+            session = HologramSession.Open(options, RunningMode.Live, this);
         texture = new Texture2D(width, height, TextureFormat.RGBA32, false, true);
         modulator.texture = texture;
     }
@@ -31,7 +31,7 @@ public sealed class HologramView : MonoBehaviour, IListener
         Destroy(texture);
     }
 
-    public DropReason Submit(Frame frame) => session.Submit(frame);
+    public DropReason Submit(CameraFrame frame) => session.Submit(frame);
 
     private void Update()
     {
@@ -39,7 +39,7 @@ public sealed class HologramView : MonoBehaviour, IListener
             using (hologram)
             {
                 // The first row of a Unity texture is the lowest.
-                texture.LoadRawTextureData(hologram.Output(Layout.Rgba, flipY: true).Bytes);
+                texture.LoadRawTextureData(hologram.Output(ModulatorLayout.Rgba, flipY: true).Bytes);
                 texture.Apply();
             }
     }

@@ -40,22 +40,22 @@ struct Spread: Codable, Equatable, Sendable {
 struct Run: Sendable {
     let name: String
     let stage: Stage
-    var method: Method?
-    var localSteps: UInt32? = 0
+    var method: HologramMethod?
+    var localSteps: Int? = 0
 
     /// Returns the options of the run for `display`.
-    func options(_ display: Display) throws -> SessionOptions {
+    func options(_ display: HologramDisplay) throws -> SessionOptions {
         var options = try SessionOptions(display: display, method: method)
         if let localSteps { (options.darkThreshold, options.localSteps) = (0, localSteps) }
         return options
     }
 
     /// Returns the runs: networks of 8, 15 and `deep`'s layers, the plane sweep, one correction step, and the default.
-    static func all(deep: Network) throws -> [Run] {
-        let shallow = try Method.trained(network: Network.builtIn(name: "rgbd-8"))
+    static func all(deep: HologramNetwork) throws -> [Run] {
+        let shallow = try HologramMethod.trained(network: HologramNetwork.builtIn(name: "rgbd-8"))
         return try [
             Run(name: "8 layers", stage: .method, method: shallow),
-            Run(name: "15 layers", stage: .method, method: .trained(network: Network.builtIn(name: "rgbd-15"))),
+            Run(name: "15 layers", stage: .method, method: .trained(network: HologramNetwork.builtIn(name: "rgbd-15"))),
             Run(name: "\(deep.info().layers) layers", stage: .method, method: .trained(network: deep)),
             Run(name: "plane sweep", stage: .method, method: .sweep),
             Run(name: "encoder with one step", stage: .encode, method: shallow, localSteps: 1),
@@ -77,7 +77,7 @@ struct Conditions: Codable, Equatable, Sendable {
 struct Outcome: Codable, Sendable {
     let name: String
     let stage: Stage
-    let width, height: UInt32
+    let width, height: Int
     let before: Conditions
     var behind: Conditions?
     var frames: Int?
@@ -123,10 +123,10 @@ struct Record: Codable, Sendable {
 struct Benchmark: Sendable {
     let runs: [Run]
     /// The modulator of the documentation, and the size of the example app's holograms.
-    var displays = [Display(), Display(width: 960, height: 540)]
+    var displays = [HologramDisplay(), HologramDisplay(width: 960, height: 540)]
     /// With this count, each quartile is the time of one frame.
     var frames = 9
-    let scene: @Sendable () throws -> Frame
+    let scene: @Sendable () throws -> CameraFrame
     let conditions: @Sendable () async -> Conditions
 
     /// Returns the results of all runs and passes the line of each to `told`. A refused run records the reason, and the
@@ -151,14 +151,14 @@ struct Benchmark: Sendable {
         return outcomes
     }
 
-    private func time(_ run: Run, _ display: Display, _ outcome: inout Outcome) throws {
-        let session = try Session(run.options(display), mode: .image)
+    private func time(_ run: Run, _ display: HologramDisplay, _ outcome: inout Outcome) throws {
+        let session = try HologramSession(run.options(display), mode: .image)
         for _ in 0..<2 { _ = try session.process(scene()) }
         var times: [FrameTimes] = []
         let took = try ContinuousClock().measure {
             for _ in 0..<frames { times.append(try session.process(scene()).info.times) }
         }
-        let statistics = try session.statistics()
+        let statistics = session.statistics
         (outcome.frames, outcome.seconds) = (frames, took / .seconds(1))
         (outcome.backend, outcome.why) = (statistics.backend, statistics.backendWhy)
         outcome.stagesMs = Dictionary(

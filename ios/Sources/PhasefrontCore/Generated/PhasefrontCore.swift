@@ -471,22 +471,6 @@ private let UNIFFI_CALLBACK_UNEXPECTED_ERROR: Int32 = 2
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterUInt32: FfiConverterPrimitive {
-    typealias FfiType = UInt32
-    typealias SwiftType = UInt32
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> UInt32 {
-        return try lift(readInt(&buf))
-    }
-
-    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
-        writeInt(&buf, lower(value))
-    }
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
 fileprivate struct FfiConverterInt32: FfiConverterPrimitive {
     typealias FfiType = Int32
     typealias SwiftType = Int32
@@ -512,6 +496,22 @@ fileprivate struct FfiConverterUInt64: FfiConverterPrimitive {
     }
 
     public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterInt64: FfiConverterPrimitive {
+    typealias FfiType = Int64
+    typealias SwiftType = Int64
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Int64 {
+        return try lift(readInt(&buf))
+    }
+
+    public static func write(_ value: Int64, into buf: inout [UInt8]) {
         writeInt(&buf, lower(value))
     }
 }
@@ -635,6 +635,378 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
         writeBytes(&buf, value)
     }
 }
+
+
+
+
+/**
+ * A hologram network. It is immutable and can be used by several sessions.
+ */
+public protocol HologramNetworkProtocol: AnyObject, Sendable {
+    
+    /**
+     * Returns the properties of the network.
+     */
+    func info()  -> NetworkInfo
+    
+}
+/**
+ * A hologram network. It is immutable and can be used by several sessions.
+ */
+open class HologramNetwork: HologramNetworkProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_hologramnetwork(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_hologramnetwork(handle, $0) }
+    }
+
+    
+    /**
+     * Returns the bundled int8 network called `name`, by default the one with 8 layers. It is for the default
+     * display's pitch, colours and volume.
+     *
+     * # Errors
+     * Returns an error if there is no such network, and if the library was built without networks.
+     */
+public static func builtIn(name: String = "rgbd-8")throws  -> HologramNetwork  {
+    return try  FfiConverterTypeHologramNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_hologramnetwork_built_in(
+        FfiConverterString.lower(name),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Reads a network from the bytes of an ONNX file.
+     *
+     * # Errors
+     * Returns an error that says what is wrong and what would be right if the bytes are not a hologram network.
+     */
+public static func fromBytes(onnx: Data)throws  -> HologramNetwork  {
+    return try  FfiConverterTypeHologramNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(onnx) { onnxFb in
+    uniffi_phasefront_ffi_fn_constructor_hologramnetwork_from_bytes(
+        onnxFb,uniffiCallStatus
+    )
+        }
+})
+}
+    
+    /**
+     * Reads a network from an ONNX file.
+     *
+     * # Errors
+     * Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
+     */
+public static func fromFile(path: String)throws  -> HologramNetwork  {
+    return try  FfiConverterTypeHologramNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_hologramnetwork_from_file(
+        FfiConverterString.lower(path),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+    /**
+     * Returns the properties of the network.
+     */
+open func info() -> NetworkInfo  {
+    return try!  FfiConverterTypeNetworkInfo_lift(try! rustCall() {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_hologramnetwork_info(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeHologramNetwork: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = HologramNetwork
+
+    public static func lift(_ handle: UInt64) throws -> HologramNetwork {
+        return HologramNetwork(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: HologramNetwork) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> HologramNetwork {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: HologramNetwork, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeHologramNetwork_lift(_ handle: UInt64) throws -> HologramNetwork {
+    return try FfiConverterTypeHologramNetwork.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeHologramNetwork_lower(_ value: HologramNetwork) -> UInt64 {
+    return FfiConverterTypeHologramNetwork.lower(value)
+}
+
+
+
+
+
+
+/**
+ * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+ * light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
+ */
+public protocol HologramTargetProtocol: AnyObject, Sendable {
+    
+    /**
+     * Returns the display.
+     */
+    func display()  -> HologramDisplay
+    
+}
+/**
+ * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
+ * light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
+ */
+open class HologramTarget: HologramTargetProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_hologramtarget(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_hologramtarget(handle, $0) }
+    }
+
+    
+    /**
+     * Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
+     *
+     * # Errors
+     * Returns an error that says what is wrong if the bytes are not such a file.
+     */
+public static func fromBytes(file: Data)throws  -> HologramTarget  {
+    return try  FfiConverterTypeHologramTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(file) { fileFb in
+    uniffi_phasefront_ffi_fn_constructor_hologramtarget_from_bytes(
+        fileFb,uniffiCallStatus
+    )
+        }
+})
+}
+    
+    /**
+     * Reads a target from a calibration file.
+     *
+     * # Errors
+     * Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
+     */
+public static func fromFile(path: String)throws  -> HologramTarget  {
+    return try  FfiConverterTypeHologramTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_hologramtarget_from_file(
+        FfiConverterString.lower(path),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Creates a target whose levels are equal steps of phase, with as many levels as the display's bits allow.
+     *
+     * # Errors
+     * Returns an error if the display is impossible.
+     */
+public static func ofDisplay(display: HologramDisplay)throws  -> HologramTarget  {
+    return try  FfiConverterTypeHologramTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_hologramtarget_of_display(
+        FfiConverterTypeHologramDisplay_lower(display),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Creates a target whose modulator was calibrated as a whole. `levels` has 256 entries; the level at i displays
+     * the phase 2πi/256.
+     *
+     * # Errors
+     * Returns an error if the display is impossible or there are not 256 levels.
+     */
+public static func withLookUpTable(display: HologramDisplay, levels: Data)throws  -> HologramTarget  {
+    return try  FfiConverterTypeHologramTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_hologramtarget_with_look_up_table(
+        FfiConverterTypeHologramDisplay_lower(display),
+        FfiConverterData.lower(levels),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+    /**
+     * Returns the display.
+     */
+open func display() -> HologramDisplay  {
+    return try!  FfiConverterTypeHologramDisplay_lift(try! rustCall() {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_hologramtarget_display(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeHologramTarget: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = HologramTarget
+
+    public static func lift(_ handle: UInt64) throws -> HologramTarget {
+        return HologramTarget(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: HologramTarget) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> HologramTarget {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: HologramTarget, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeHologramTarget_lift(_ handle: UInt64) throws -> HologramTarget {
+    return try FfiConverterTypeHologramTarget.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeHologramTarget_lower(_ value: HologramTarget) -> UInt64 {
+    return FfiConverterTypeHologramTarget.lower(value)
+}
+
+
 
 
 
@@ -858,183 +1230,6 @@ public func FfiConverterTypeLogListener_lower(_ value: LogListener) -> UInt64 {
 
 
 /**
- * A hologram network. It is immutable and can be used by several sessions.
- */
-public protocol NetworkProtocol: AnyObject, Sendable {
-    
-    /**
-     * Returns the properties of the network.
-     */
-    func info() throws  -> NetworkInfo
-    
-}
-/**
- * A hologram network. It is immutable and can be used by several sessions.
- */
-open class Network: NetworkProtocol, @unchecked Sendable {
-    fileprivate let handle: UInt64
-
-    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public struct NoHandle {
-        public init() {}
-    }
-
-    // TODO: We'd like this to be `private` but for Swifty reasons,
-    // we can't implement `FfiConverter` without making this `required` and we can't
-    // make it `required` without making it `public`.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    required public init(unsafeFromHandle handle: UInt64) {
-        self.handle = handle
-    }
-
-    // This constructor can be used to instantiate a fake object.
-    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
-    //
-    // - Warning:
-    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public init(noHandle: NoHandle) {
-        self.handle = 0
-    }
-
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public func uniffiCloneHandle() -> UInt64 {
-        return try! rustCall { uniffi_phasefront_ffi_fn_clone_network(self.handle, $0) }
-    }
-    // No primary constructor declared for this class.
-
-    deinit {
-        if handle == 0 {
-            // Mock objects have handle=0 don't try to free them
-            return
-        }
-
-        try! rustCall { uniffi_phasefront_ffi_fn_free_network(handle, $0) }
-    }
-
-    
-    /**
-     * Returns the bundled int8 network called `name`, by default the one with 8 layers. It is for the default
-     * display's pitch, colours and volume.
-     *
-     * # Errors
-     * Returns an error if there is no such network, and if the library was built without networks.
-     */
-public static func builtIn(name: String = "rgbd-8")throws  -> Network  {
-    return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_network_built_in(
-        FfiConverterString.lower(name),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Reads a network from the bytes of an ONNX file.
-     *
-     * # Errors
-     * Returns an error that says what is wrong and what would be right if the bytes are not a hologram network.
-     */
-public static func fromBytes(onnx: Data)throws  -> Network  {
-    return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-        FfiConverterByRefBytes.lower(onnx) { onnxFb in
-    uniffi_phasefront_ffi_fn_constructor_network_from_bytes(
-        onnxFb,uniffiCallStatus
-    )
-        }
-})
-}
-    
-    /**
-     * Reads a network from an ONNX file.
-     *
-     * # Errors
-     * Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
-     */
-public static func fromFile(path: String)throws  -> Network  {
-    return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_network_from_file(
-        FfiConverterString.lower(path),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-    /**
-     * Returns the properties of the network.
-     */
-open func info()throws  -> NetworkInfo  {
-    return try  FfiConverterTypeNetworkInfo_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_network_info(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public struct FfiConverterTypeNetwork: FfiConverter {
-    typealias FfiType = UInt64
-    typealias SwiftType = Network
-
-    public static func lift(_ handle: UInt64) throws -> Network {
-        return Network(unsafeFromHandle: handle)
-    }
-
-    public static func lower(_ value: Network) -> UInt64 {
-        return value.uniffiCloneHandle()
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Network {
-        let handle: UInt64 = try readInt(&buf)
-        return try lift(handle)
-    }
-
-    public static func write(_ value: Network, into buf: inout [UInt8]) {
-        writeInt(&buf, lower(value))
-    }
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeNetwork_lift(_ handle: UInt64) throws -> Network {
-    return try FfiConverterTypeNetwork.lift(handle)
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeNetwork_lower(_ value: Network) -> UInt64 {
-    return FfiConverterTypeNetwork.lower(value)
-}
-
-
-
-
-
-
-/**
  * The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
  * planes are read.
  */
@@ -1052,7 +1247,7 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     /**
      * Returns the properties of the hologram.
      */
-    func info() throws  -> HologramInfo
+    func info()  -> HologramInfo
     
     /**
      * Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
@@ -1061,7 +1256,7 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
      * # Errors
      * Returns an error if the layout does not have this image.
      */
-    func output(placement: Placement, image: UInt32) throws  -> RawImage
+    func output(placement: Placement, image: Int) throws  -> RawImage
     
     /**
      * Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
@@ -1070,12 +1265,12 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
      * # Errors
      * Returns an error for other colours.
      */
-    func planeAddress(colour: UInt32) throws  -> UInt64
+    func planeAddress(colour: Int) throws  -> UInt64
     
     /**
      * Returns the number of bytes of a plane.
      */
-    func planeLen() throws  -> UInt64
+    func planeLen()  -> UInt64
     
     /**
      * Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
@@ -1083,7 +1278,7 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
      * # Errors
      * Returns an error if the image is empty or z is too far away.
      */
-    func preview(zMm: Double, width: UInt32, height: UInt32) throws  -> RawImage
+    func preview(zMm: Double, width: Int, height: Int) throws  -> RawImage
     
     /**
      * Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
@@ -1096,13 +1291,13 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     /**
      * Returns another handle to the same hologram. Each reader of its memory holds one.
      */
-    func share() throws  -> RawHologram
+    func share()  -> RawHologram
     
     /**
      * Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
      * Coordinates run from 0 to 1 from the upper left corner.
      */
-    func zAt(x: Double, y: Double) throws  -> Double
+    func zAt(x: Double, y: Double)  -> Double
     
 }
 /**
@@ -1169,16 +1364,16 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
      * A field of another size, one that is larger than the modulator, dark or not finite; a z too far away; options
      * out of their range.
      */
-public static func ofField(field: Data, width: UInt32, height: UInt32, zMm: Double, target: Target, options: EncoderOptions)throws  -> RawHologram  {
+public static func ofField(field: Data, width: Int, height: Int, zMm: Double, target: HologramTarget, options: EncoderOptions)throws  -> RawHologram  {
     return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
         FfiConverterByRefBytes.lower(field) { fieldFb in
     uniffi_phasefront_ffi_fn_constructor_rawhologram_of_field(
         fieldFb,
-        FfiConverterUInt32.lower(width),
-        FfiConverterUInt32.lower(height),
+        FfiConverterTypeInt_lower(width),
+        FfiConverterTypeInt_lower(height),
         FfiConverterDouble.lower(zMm),
-        FfiConverterTypeTarget_lower(target),
+        FfiConverterTypeHologramTarget_lower(target),
         FfiConverterTypeEncoderOptions_lower(options),uniffiCallStatus
     )
         }
@@ -1207,8 +1402,8 @@ open func field(zMm: Double)throws  -> RawPlanes  {
     /**
      * Returns the properties of the hologram.
      */
-open func info()throws  -> HologramInfo  {
-    return try  FfiConverterTypeHologramInfo_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func info() -> HologramInfo  {
+    return try!  FfiConverterTypeHologramInfo_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_info(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1223,13 +1418,13 @@ open func info()throws  -> HologramInfo  {
      * # Errors
      * Returns an error if the layout does not have this image.
      */
-open func output(placement: Placement, image: UInt32)throws  -> RawImage  {
+open func output(placement: Placement, image: Int)throws  -> RawImage  {
     return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_output(
             self.uniffiCloneHandle(),
         FfiConverterTypePlacement_lower(placement),
-        FfiConverterUInt32.lower(image),uniffiCallStatus
+        FfiConverterTypeInt_lower(image),uniffiCallStatus
     )
 })
 }
@@ -1241,12 +1436,12 @@ open func output(placement: Placement, image: UInt32)throws  -> RawImage  {
      * # Errors
      * Returns an error for other colours.
      */
-open func planeAddress(colour: UInt32)throws  -> UInt64  {
+open func planeAddress(colour: Int)throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_plane_address(
             self.uniffiCloneHandle(),
-        FfiConverterUInt32.lower(colour),uniffiCallStatus
+        FfiConverterTypeInt_lower(colour),uniffiCallStatus
     )
 })
 }
@@ -1254,8 +1449,8 @@ open func planeAddress(colour: UInt32)throws  -> UInt64  {
     /**
      * Returns the number of bytes of a plane.
      */
-open func planeLen()throws  -> UInt64  {
-    return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func planeLen() -> UInt64  {
+    return try!  FfiConverterUInt64.lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_plane_len(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1269,14 +1464,14 @@ open func planeLen()throws  -> UInt64  {
      * # Errors
      * Returns an error if the image is empty or z is too far away.
      */
-open func preview(zMm: Double, width: UInt32, height: UInt32)throws  -> RawImage  {
+open func preview(zMm: Double, width: Int, height: Int)throws  -> RawImage  {
     return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_preview(
             self.uniffiCloneHandle(),
         FfiConverterDouble.lower(zMm),
-        FfiConverterUInt32.lower(width),
-        FfiConverterUInt32.lower(height),uniffiCallStatus
+        FfiConverterTypeInt_lower(width),
+        FfiConverterTypeInt_lower(height),uniffiCallStatus
     )
 })
 }
@@ -1300,8 +1495,8 @@ open func refocus(zMm: Double)throws  -> RawPlanes  {
     /**
      * Returns another handle to the same hologram. Each reader of its memory holds one.
      */
-open func share()throws  -> RawHologram  {
-    return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func share() -> RawHologram  {
+    return try!  FfiConverterTypeRawHologram_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_share(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1313,8 +1508,8 @@ open func share()throws  -> RawHologram  {
      * Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
      * Coordinates run from 0 to 1 from the upper left corner.
      */
-open func zAt(x: Double, y: Double)throws  -> Double  {
-    return try  FfiConverterDouble.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func zAt(x: Double, y: Double) -> Double  {
+    return try!  FfiConverterDouble.lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawhologram_z_at(
             self.uniffiCloneHandle(),
@@ -1382,32 +1577,32 @@ public protocol RawImageProtocol: AnyObject, Sendable {
     /**
      * Returns the address of the bytes. It is valid as long as this object.
      */
-    func address() throws  -> UInt64
+    func address()  -> UInt64
     
     /**
      * Returns the number of bytes.
      */
-    func byteLen() throws  -> UInt64
+    func byteLen()  -> UInt64
     
     /**
      * Returns the height in pixels.
      */
-    func height() throws  -> UInt32
+    func height()  -> Int
     
     /**
      * Returns the number of bytes of a pixel.
      */
-    func pixelBytes() throws  -> UInt32
+    func pixelBytes()  -> Int
     
     /**
      * Returns another handle to the same image. Each reader of its memory holds one.
      */
-    func share() throws  -> RawImage
+    func share()  -> RawImage
     
     /**
      * Returns the width in pixels.
      */
-    func width() throws  -> UInt32
+    func width()  -> Int
     
 }
 /**
@@ -1469,8 +1664,8 @@ open class RawImage: RawImageProtocol, @unchecked Sendable {
     /**
      * Returns the address of the bytes. It is valid as long as this object.
      */
-open func address()throws  -> UInt64  {
-    return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func address() -> UInt64  {
+    return try!  FfiConverterUInt64.lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawimage_address(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1481,8 +1676,8 @@ open func address()throws  -> UInt64  {
     /**
      * Returns the number of bytes.
      */
-open func byteLen()throws  -> UInt64  {
-    return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func byteLen() -> UInt64  {
+    return try!  FfiConverterUInt64.lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawimage_byte_len(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1493,8 +1688,8 @@ open func byteLen()throws  -> UInt64  {
     /**
      * Returns the height in pixels.
      */
-open func height()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func height() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawimage_height(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1505,8 +1700,8 @@ open func height()throws  -> UInt32  {
     /**
      * Returns the number of bytes of a pixel.
      */
-open func pixelBytes()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func pixelBytes() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawimage_pixel_bytes(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1517,8 +1712,8 @@ open func pixelBytes()throws  -> UInt32  {
     /**
      * Returns another handle to the same image. Each reader of its memory holds one.
      */
-open func share()throws  -> RawImage  {
-    return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func share() -> RawImage  {
+    return try!  FfiConverterTypeRawImage_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawimage_share(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1529,8 +1724,8 @@ open func share()throws  -> RawImage  {
     /**
      * Returns the width in pixels.
      */
-open func width()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func width() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawimage_width(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1608,7 +1803,7 @@ public protocol RawModulatorProtocol: AnyObject, Sendable {
      * # Errors
      * Levels of more than 8 bits that are not evenly spaced.
      */
-    func target() throws  -> Target
+    func target() throws  -> HologramTarget
     
     /**
      * Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
@@ -1617,7 +1812,7 @@ public protocol RawModulatorProtocol: AnyObject, Sendable {
      * # Errors
      * Another number of bytes, or cells that are those of no level.
      */
-    func unpack(images: Data, width: UInt32, height: UInt32) throws  -> RawImage
+    func unpack(images: Data, width: Int, height: Int) throws  -> RawImage
     
 }
 /**
@@ -1729,8 +1924,8 @@ open func pack(hologram: RawHologram)throws  -> [RawImage]  {
      * # Errors
      * Levels of more than 8 bits that are not evenly spaced.
      */
-open func target()throws  -> Target  {
-    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func target()throws  -> HologramTarget  {
+    return try  FfiConverterTypeHologramTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawmodulator_target(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1745,15 +1940,15 @@ open func target()throws  -> Target  {
      * # Errors
      * Another number of bytes, or cells that are those of no level.
      */
-open func unpack(images: Data, width: UInt32, height: UInt32)throws  -> RawImage  {
+open func unpack(images: Data, width: Int, height: Int)throws  -> RawImage  {
     return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
         FfiConverterByRefBytes.lower(images) { imagesFb in
     uniffi_phasefront_ffi_fn_method_rawmodulator_unpack(
             self.uniffiCloneHandle(),
         imagesFb,
-        FfiConverterUInt32.lower(width),
-        FfiConverterUInt32.lower(height),uniffiCallStatus
+        FfiConverterTypeInt_lower(width),
+        FfiConverterTypeInt_lower(height),uniffiCallStatus
     )
         }
 })
@@ -1818,17 +2013,17 @@ public protocol RawPlanesProtocol: AnyObject, Sendable {
     /**
      * Returns the number of planes: 3, or 1 for a display with one laser.
      */
-    func colours() throws  -> UInt32
+    func colours()  -> Int
     
     /**
      * Returns the height in pixels.
      */
-    func height() throws  -> UInt32
+    func height()  -> Int
     
     /**
      * Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part.
      */
-    func pixelBytes() throws  -> UInt32
+    func pixelBytes()  -> Int
     
     /**
      * Returns the address of the plane of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. The address is valid
@@ -1837,17 +2032,17 @@ public protocol RawPlanesProtocol: AnyObject, Sendable {
      * # Errors
      * Returns an error for other colours.
      */
-    func planeAddress(colour: UInt32) throws  -> UInt64
+    func planeAddress(colour: Int) throws  -> UInt64
     
     /**
      * Returns another handle to the same planes. Each reader of their memory holds one.
      */
-    func share() throws  -> RawPlanes
+    func share()  -> RawPlanes
     
     /**
      * Returns the width in pixels.
      */
-    func width() throws  -> UInt32
+    func width()  -> Int
     
 }
 /**
@@ -1910,8 +2105,8 @@ open class RawPlanes: RawPlanesProtocol, @unchecked Sendable {
     /**
      * Returns the number of planes: 3, or 1 for a display with one laser.
      */
-open func colours()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func colours() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawplanes_colours(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1922,8 +2117,8 @@ open func colours()throws  -> UInt32  {
     /**
      * Returns the height in pixels.
      */
-open func height()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func height() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawplanes_height(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1934,8 +2129,8 @@ open func height()throws  -> UInt32  {
     /**
      * Returns the number of bytes of a pixel: 4 for an amplitude, 8 for a real and an imaginary part.
      */
-open func pixelBytes()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func pixelBytes() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawplanes_pixel_bytes(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1950,12 +2145,12 @@ open func pixelBytes()throws  -> UInt32  {
      * # Errors
      * Returns an error for other colours.
      */
-open func planeAddress(colour: UInt32)throws  -> UInt64  {
+open func planeAddress(colour: Int)throws  -> UInt64  {
     return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawplanes_plane_address(
             self.uniffiCloneHandle(),
-        FfiConverterUInt32.lower(colour),uniffiCallStatus
+        FfiConverterTypeInt_lower(colour),uniffiCallStatus
     )
 })
 }
@@ -1963,8 +2158,8 @@ open func planeAddress(colour: UInt32)throws  -> UInt64  {
     /**
      * Returns another handle to the same planes. Each reader of their memory holds one.
      */
-open func share()throws  -> RawPlanes  {
-    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func share() -> RawPlanes  {
+    return try!  FfiConverterTypeRawPlanes_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawplanes_share(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1975,8 +2170,8 @@ open func share()throws  -> RawPlanes  {
     /**
      * Returns the width in pixels.
      */
-open func width()throws  -> UInt32  {
-    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func width() -> Int  {
+    return try!  FfiConverterTypeInt_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawplanes_width(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -2082,12 +2277,12 @@ public protocol RawSessionProtocol: AnyObject, Sendable {
      * all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
      * listener while a session computes, does not wait for that. Closing twice does nothing.
      */
-    func shutDown() throws 
+    func shutDown() 
     
     /**
      * Returns the statistics of the session, also after it was closed. Never waits for a frame.
      */
-    func statistics() throws  -> Statistics
+    func statistics()  -> Statistics
     
     /**
      * Submits a frame to a live session, which copies it, without waiting for its hologram. Returns the reason if the
@@ -2277,7 +2472,7 @@ open func setThermal(thermal: Thermal)throws   {try rustCallWithError(FfiConvert
      * all events, `on_closed` last, and is not called again. A call from a listener of any session, or from a log
      * listener while a session computes, does not wait for that. Closing twice does nothing.
      */
-open func shutDown()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func shutDown()  {try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawsession_shut_down(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -2288,8 +2483,8 @@ open func shutDown()throws   {try rustCallWithError(FfiConverterTypePhasefrontEr
     /**
      * Returns the statistics of the session, also after it was closed. Never waits for a frame.
      */
-open func statistics()throws  -> Statistics  {
-    return try  FfiConverterTypeStatistics_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func statistics() -> Statistics  {
+    return try!  FfiConverterTypeStatistics_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawsession_statistics(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -2405,17 +2600,17 @@ public protocol SessionListener: AnyObject, Sendable {
     /**
      * Reports that a frame was dropped.
      */
-    func onDropped(timestampNs: UInt64, reason: DropReason) throws 
+    func onDropped(timestampNs: Int64, reason: DropReason) throws 
     
     /**
      * Reports that a frame could not be processed. The session continues.
      */
-    func onFailed(timestampNs: UInt64, message: String) throws 
+    func onFailed(timestampNs: Int64, message: String) throws 
     
     /**
      * Reports that the session uses another quality level after the frame of `timestamp_ns`.
      */
-    func onQualityChanged(timestampNs: UInt64, change: QualityChange) throws 
+    func onQualityChanged(timestampNs: Int64, change: QualityChange) throws 
     
     /**
      * Reports that the session is closed and its memory is freed. This is the last call. It is made exactly once, even
@@ -2496,11 +2691,11 @@ open func onProcessed(hologram: RawHologram)throws   {try rustCallWithError(FfiC
     /**
      * Reports that a frame was dropped.
      */
-open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+open func onDropped(timestampNs: Int64, reason: DropReason)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_dropped(
             self.uniffiCloneHandle(),
-        FfiConverterUInt64.lower(timestampNs),
+        FfiConverterInt64.lower(timestampNs),
         FfiConverterTypeDropReason_lower(reason),uniffiCallStatus
     )
 }
@@ -2509,11 +2704,11 @@ open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCa
     /**
      * Reports that a frame could not be processed. The session continues.
      */
-open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+open func onFailed(timestampNs: Int64, message: String)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_failed(
             self.uniffiCloneHandle(),
-        FfiConverterUInt64.lower(timestampNs),
+        FfiConverterInt64.lower(timestampNs),
         FfiConverterString.lower(message),uniffiCallStatus
     )
 }
@@ -2522,11 +2717,11 @@ open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWi
     /**
      * Reports that the session uses another quality level after the frame of `timestamp_ns`.
      */
-open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+open func onQualityChanged(timestampNs: Int64, change: QualityChange)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_quality_changed(
             self.uniffiCloneHandle(),
-        FfiConverterUInt64.lower(timestampNs),
+        FfiConverterInt64.lower(timestampNs),
         FfiConverterTypeQualityChange_lower(change),uniffiCallStatus
     )
 }
@@ -2599,7 +2794,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
         },
         onDropped: { (
             uniffiHandle: UInt64,
-            timestampNs: UInt64,
+            timestampNs: Int64,
             reason: RustBuffer,
             uniffiOutReturn: UnsafeMutableRawPointer,
             uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
@@ -2610,7 +2805,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                     throw UniffiInternalError.unexpectedStaleHandle
                 }
                 return try uniffiObj.onDropped(
-                     timestampNs: try FfiConverterUInt64.lift(timestampNs),
+                     timestampNs: try FfiConverterInt64.lift(timestampNs),
                      reason: try FfiConverterTypeDropReason_lift(reason)
                 )
             }
@@ -2626,7 +2821,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
         },
         onFailed: { (
             uniffiHandle: UInt64,
-            timestampNs: UInt64,
+            timestampNs: Int64,
             message: RustBuffer,
             uniffiOutReturn: UnsafeMutableRawPointer,
             uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
@@ -2637,7 +2832,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                     throw UniffiInternalError.unexpectedStaleHandle
                 }
                 return try uniffiObj.onFailed(
-                     timestampNs: try FfiConverterUInt64.lift(timestampNs),
+                     timestampNs: try FfiConverterInt64.lift(timestampNs),
                      message: try FfiConverterString.lift(message)
                 )
             }
@@ -2653,7 +2848,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
         },
         onQualityChanged: { (
             uniffiHandle: UInt64,
-            timestampNs: UInt64,
+            timestampNs: Int64,
             change: RustBuffer,
             uniffiOutReturn: UnsafeMutableRawPointer,
             uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
@@ -2664,7 +2859,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                     throw UniffiInternalError.unexpectedStaleHandle
                 }
                 return try uniffiObj.onQualityChanged(
-                     timestampNs: try FfiConverterUInt64.lift(timestampNs),
+                     timestampNs: try FfiConverterInt64.lift(timestampNs),
                      change: try FfiConverterTypeQualityChange_lift(change)
                 )
             }
@@ -3033,180 +3228,57 @@ public func FfiConverterTypeStageListener_lower(_ value: StageListener) -> UInt6
 
 
 
-
-
 /**
- * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
- * light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
+ * The pose of the depth camera. A point p of the depth camera (x right, y down, z forward) is at R·p + t of the colour
+ * camera.
  */
-public protocol TargetProtocol: AnyObject, Sendable {
-    
+public struct CameraPose: Equatable, Hashable {
     /**
-     * Returns the display.
+     * R: 9 numbers, row by row.
      */
-    func display() throws  -> Display
+    public var rotation: [Double]
+    /**
+     * t: 3 numbers, in metres.
+     */
+    public var translationM: [Double]
+
+    // Default memberwise initializers are never public by default, so we
+    // declare one manually.
+    public init(
+        /**
+         * R: 9 numbers, row by row.
+         */rotation: [Double], 
+        /**
+         * t: 3 numbers, in metres.
+         */translationM: [Double]) {
+        self.rotation = rotation
+        self.translationM = translationM
+    }
+
+    
+
     
 }
-/**
- * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
- * light of the lasers, and the correction of the optics. It is immutable and can be used by several sessions.
- */
-open class Target: TargetProtocol, @unchecked Sendable {
-    fileprivate let handle: UInt64
 
-    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
+#if compiler(>=6)
+extension CameraPose: Sendable {}
 #endif
-    public struct NoHandle {
-        public init() {}
-    }
-
-    // TODO: We'd like this to be `private` but for Swifty reasons,
-    // we can't implement `FfiConverter` without making this `required` and we can't
-    // make it `required` without making it `public`.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    required public init(unsafeFromHandle handle: UInt64) {
-        self.handle = handle
-    }
-
-    // This constructor can be used to instantiate a fake object.
-    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
-    //
-    // - Warning:
-    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public init(noHandle: NoHandle) {
-        self.handle = 0
-    }
-
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public func uniffiCloneHandle() -> UInt64 {
-        return try! rustCall { uniffi_phasefront_ffi_fn_clone_target(self.handle, $0) }
-    }
-    // No primary constructor declared for this class.
-
-    deinit {
-        if handle == 0 {
-            // Mock objects have handle=0 don't try to free them
-            return
-        }
-
-        try! rustCall { uniffi_phasefront_ffi_fn_free_target(handle, $0) }
-    }
-
-    
-    /**
-     * Reads a target from the bytes of a calibration file, as `phasefront calibrate pack` writes it.
-     *
-     * # Errors
-     * Returns an error that says what is wrong if the bytes are not such a file.
-     */
-public static func fromBytes(file: Data)throws  -> Target  {
-    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-        FfiConverterByRefBytes.lower(file) { fileFb in
-    uniffi_phasefront_ffi_fn_constructor_target_from_bytes(
-        fileFb,uniffiCallStatus
-    )
-        }
-})
-}
-    
-    /**
-     * Reads a target from a calibration file.
-     *
-     * # Errors
-     * Returns an error if the file cannot be read, and the errors of [`Self::from_bytes`].
-     */
-public static func fromFile(path: String)throws  -> Target  {
-    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_target_from_file(
-        FfiConverterString.lower(path),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Creates a target whose levels are equal steps of phase, with as many levels as the display's bits allow.
-     *
-     * # Errors
-     * Returns an error if the display is impossible.
-     */
-public static func ofDisplay(display: Display)throws  -> Target  {
-    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_target_of_display(
-        FfiConverterTypeDisplay_lower(display),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Creates a target whose modulator was calibrated as a whole. `levels` has 256 entries; the level at i displays
-     * the phase 2πi/256.
-     *
-     * # Errors
-     * Returns an error if the display is impossible or there are not 256 levels.
-     */
-public static func withLookUpTable(display: Display, levels: Data)throws  -> Target  {
-    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_target_with_look_up_table(
-        FfiConverterTypeDisplay_lower(display),
-        FfiConverterData.lower(levels),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-    /**
-     * Returns the display.
-     */
-open func display()throws  -> Display  {
-    return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_target_display(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-}
-
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public struct FfiConverterTypeTarget: FfiConverter {
-    typealias FfiType = UInt64
-    typealias SwiftType = Target
-
-    public static func lift(_ handle: UInt64) throws -> Target {
-        return Target(unsafeFromHandle: handle)
+public struct FfiConverterTypeCameraPose: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> CameraPose {
+        return
+            try CameraPose(
+                rotation: FfiConverterSequenceDouble.read(from: &buf), 
+                translationM: FfiConverterSequenceDouble.read(from: &buf)
+        )
     }
 
-    public static func lower(_ value: Target) -> UInt64 {
-        return value.uniffiCloneHandle()
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Target {
-        let handle: UInt64 = try readInt(&buf)
-        return try lift(handle)
-    }
-
-    public static func write(_ value: Target, into buf: inout [UInt8]) {
-        writeInt(&buf, lower(value))
+    public static func write(_ value: CameraPose, into buf: inout [UInt8]) {
+        FfiConverterSequenceDouble.write(value.rotation, into: &buf)
+        FfiConverterSequenceDouble.write(value.translationM, into: &buf)
     }
 }
 
@@ -3214,18 +3286,16 @@ public struct FfiConverterTypeTarget: FfiConverter {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeTarget_lift(_ handle: UInt64) throws -> Target {
-    return try FfiConverterTypeTarget.lift(handle)
+public func FfiConverterTypeCameraPose_lift(_ buf: RustBuffer) throws -> CameraPose {
+    return try FfiConverterTypeCameraPose.lift(buf)
 }
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeTarget_lower(_ value: Target) -> UInt64 {
-    return FfiConverterTypeTarget.lower(value)
+public func FfiConverterTypeCameraPose_lower(_ value: CameraPose) -> RustBuffer {
+    return FfiConverterTypeCameraPose.lower(value)
 }
-
-
 
 
 /**
@@ -3243,7 +3313,7 @@ public struct Cameras: Equatable, Hashable {
     /**
      * The pose from the depth camera to the colour camera; none for cameras with the same position and orientation.
      */
-    public var pose: Pose?
+    public var pose: CameraPose?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -3256,7 +3326,7 @@ public struct Cameras: Equatable, Hashable {
          */depth: Intrinsics, 
         /**
          * The pose from the depth camera to the colour camera; none for cameras with the same position and orientation.
-         */pose: Pose? = nil) {
+         */pose: CameraPose? = nil) {
         self.colour = colour
         self.depth = depth
         self.pose = pose
@@ -3280,14 +3350,14 @@ public struct FfiConverterTypeCameras: FfiConverterRustBuffer {
             try Cameras(
                 colour: FfiConverterTypeIntrinsics.read(from: &buf), 
                 depth: FfiConverterTypeIntrinsics.read(from: &buf), 
-                pose: FfiConverterOptionTypePose.read(from: &buf)
+                pose: FfiConverterOptionTypeCameraPose.read(from: &buf)
         )
     }
 
     public static func write(_ value: Cameras, into buf: inout [UInt8]) {
         FfiConverterTypeIntrinsics.write(value.colour, into: &buf)
         FfiConverterTypeIntrinsics.write(value.depth, into: &buf)
-        FfiConverterOptionTypePose.write(value.pose, into: &buf)
+        FfiConverterOptionTypeCameraPose.write(value.pose, into: &buf)
     }
 }
 
@@ -3318,11 +3388,11 @@ public struct ColourInfo: Equatable, Hashable {
     /**
      * The width of the sensor's image, in pixels.
      */
-    public var width: UInt32
+    public var width: Int
     /**
      * The height of the sensor's image, in pixels.
      */
-    public var height: UInt32
+    public var height: Int
     /**
      * The planes, in the format's order.
      */
@@ -3344,10 +3414,10 @@ public struct ColourInfo: Equatable, Hashable {
          */format: ColourFormat, 
         /**
          * The width of the sensor's image, in pixels.
-         */width: UInt32, 
+         */width: Int, 
         /**
          * The height of the sensor's image, in pixels.
-         */height: UInt32, 
+         */height: Int, 
         /**
          * The planes, in the format's order.
          */planes: [PlaneInfo], 
@@ -3382,8 +3452,8 @@ public struct FfiConverterTypeColourInfo: FfiConverterRustBuffer {
         return
             try ColourInfo(
                 format: FfiConverterTypeColourFormat.read(from: &buf), 
-                width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf), 
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
                 planes: FfiConverterSequenceTypePlaneInfo.read(from: &buf), 
                 matrix: FfiConverterTypeYuvMatrix.read(from: &buf), 
                 videoRange: FfiConverterBool.read(from: &buf)
@@ -3392,8 +3462,8 @@ public struct FfiConverterTypeColourInfo: FfiConverterRustBuffer {
 
     public static func write(_ value: ColourInfo, into buf: inout [UInt8]) {
         FfiConverterTypeColourFormat.write(value.format, into: &buf)
-        FfiConverterUInt32.write(value.width, into: &buf)
-        FfiConverterUInt32.write(value.height, into: &buf)
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
         FfiConverterSequenceTypePlaneInfo.write(value.planes, into: &buf)
         FfiConverterTypeYuvMatrix.write(value.matrix, into: &buf)
         FfiConverterBool.write(value.videoRange, into: &buf)
@@ -3427,11 +3497,11 @@ public struct ConfidenceInfo: Equatable, Hashable {
     /**
      * The width in pixels, equal to the depth image's.
      */
-    public var width: UInt32
+    public var width: Int
     /**
      * The height in pixels, equal to the depth image's.
      */
-    public var height: UInt32
+    public var height: Int
     /**
      * The plane.
      */
@@ -3445,10 +3515,10 @@ public struct ConfidenceInfo: Equatable, Hashable {
          */format: ConfidenceFormat, 
         /**
          * The width in pixels, equal to the depth image's.
-         */width: UInt32, 
+         */width: Int, 
         /**
          * The height in pixels, equal to the depth image's.
-         */height: UInt32, 
+         */height: Int, 
         /**
          * The plane.
          */plane: PlaneInfo) {
@@ -3475,16 +3545,16 @@ public struct FfiConverterTypeConfidenceInfo: FfiConverterRustBuffer {
         return
             try ConfidenceInfo(
                 format: FfiConverterTypeConfidenceFormat.read(from: &buf), 
-                width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf), 
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
                 plane: FfiConverterTypePlaneInfo.read(from: &buf)
         )
     }
 
     public static func write(_ value: ConfidenceInfo, into buf: inout [UInt8]) {
         FfiConverterTypeConfidenceFormat.write(value.format, into: &buf)
-        FfiConverterUInt32.write(value.width, into: &buf)
-        FfiConverterUInt32.write(value.height, into: &buf)
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
         FfiConverterTypePlaneInfo.write(value.plane, into: &buf)
     }
 }
@@ -3512,21 +3582,21 @@ public struct DeepPair {
     /**
      * The hologram network.
      */
-    public var hologram: Network
+    public var hologram: HologramNetwork
     /**
      * The pre-filter.
      */
-    public var prefilter: Network
+    public var prefilter: HologramNetwork
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
     public init(
         /**
          * The hologram network.
-         */hologram: Network, 
+         */hologram: HologramNetwork, 
         /**
          * The pre-filter.
-         */prefilter: Network) {
+         */prefilter: HologramNetwork) {
         self.hologram = hologram
         self.prefilter = prefilter
     }
@@ -3547,14 +3617,14 @@ public struct FfiConverterTypeDeepPair: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> DeepPair {
         return
             try DeepPair(
-                hologram: FfiConverterTypeNetwork.read(from: &buf), 
-                prefilter: FfiConverterTypeNetwork.read(from: &buf)
+                hologram: FfiConverterTypeHologramNetwork.read(from: &buf), 
+                prefilter: FfiConverterTypeHologramNetwork.read(from: &buf)
         )
     }
 
     public static func write(_ value: DeepPair, into buf: inout [UInt8]) {
-        FfiConverterTypeNetwork.write(value.hologram, into: &buf)
-        FfiConverterTypeNetwork.write(value.prefilter, into: &buf)
+        FfiConverterTypeHologramNetwork.write(value.hologram, into: &buf)
+        FfiConverterTypeHologramNetwork.write(value.prefilter, into: &buf)
     }
 }
 
@@ -3585,11 +3655,11 @@ public struct DepthInfo: Equatable, Hashable {
     /**
      * The width of the sensor's image, in pixels.
      */
-    public var width: UInt32
+    public var width: Int
     /**
      * The height of the sensor's image, in pixels.
      */
-    public var height: UInt32
+    public var height: Int
     /**
      * The plane.
      */
@@ -3603,10 +3673,10 @@ public struct DepthInfo: Equatable, Hashable {
          */format: DepthFormat, 
         /**
          * The width of the sensor's image, in pixels.
-         */width: UInt32, 
+         */width: Int, 
         /**
          * The height of the sensor's image, in pixels.
-         */height: UInt32, 
+         */height: Int, 
         /**
          * The plane.
          */plane: PlaneInfo) {
@@ -3633,16 +3703,16 @@ public struct FfiConverterTypeDepthInfo: FfiConverterRustBuffer {
         return
             try DepthInfo(
                 format: FfiConverterTypeDepthFormat.read(from: &buf), 
-                width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf), 
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
                 plane: FfiConverterTypePlaneInfo.read(from: &buf)
         )
     }
 
     public static func write(_ value: DepthInfo, into buf: inout [UInt8]) {
         FfiConverterTypeDepthFormat.write(value.format, into: &buf)
-        FfiConverterUInt32.write(value.width, into: &buf)
-        FfiConverterUInt32.write(value.height, into: &buf)
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
         FfiConverterTypePlaneInfo.write(value.plane, into: &buf)
     }
 }
@@ -3664,216 +3734,55 @@ public func FfiConverterTypeDepthInfo_lower(_ value: DepthInfo) -> RustBuffer {
 
 
 /**
- * A modulator, its lasers, and the display volume. It is checked when it is used.
- */
-public struct Display: Equatable, Hashable {
-    /**
-     * The number of pixels along x.
-     */
-    public var width: UInt32
-    /**
-     * The number of pixels along y.
-     */
-    public var height: UInt32
-    /**
-     * The distance between neighbouring pixels, in µm.
-     */
-    public var pitchUm: Double
-    /**
-     * The wavelength of the red laser, in nm.
-     */
-    public var redNm: Double
-    /**
-     * The wavelength of the green laser, in nm.
-     */
-    public var greenNm: Double
-    /**
-     * The wavelength of the blue laser, in nm.
-     */
-    public var blueNm: Double
-    /**
-     * The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
-     * wavelengths; none for a display with three lasers.
-     */
-    public var laserNm: Double?
-    /**
-     * The depth of the volume, in mm.
-     */
-    public var volumeDepthMm: Double
-    /**
-     * The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
-     */
-    public var offsetMm: Double
-    /**
-     * The number of bits of a modulator level.
-     */
-    public var bits: UInt32
-    /**
-     * The radius of the aperture in the Fourier plane; 1 is the whole first order.
-     */
-    public var apertureRadius: Double
-
-    // Default memberwise initializers are never public by default, so we
-    // declare one manually.
-    public init(
-        /**
-         * The number of pixels along x.
-         */width: UInt32 = UInt32(1920), 
-        /**
-         * The number of pixels along y.
-         */height: UInt32 = UInt32(1080), 
-        /**
-         * The distance between neighbouring pixels, in µm.
-         */pitchUm: Double = Double(8.0), 
-        /**
-         * The wavelength of the red laser, in nm.
-         */redNm: Double = Double(638.0), 
-        /**
-         * The wavelength of the green laser, in nm.
-         */greenNm: Double = Double(520.0), 
-        /**
-         * The wavelength of the blue laser, in nm.
-         */blueNm: Double = Double(450.0), 
-        /**
-         * The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
-         * wavelengths; none for a display with three lasers.
-         */laserNm: Double? = nil, 
-        /**
-         * The depth of the volume, in mm.
-         */volumeDepthMm: Double = Double(6.0), 
-        /**
-         * The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
-         */offsetMm: Double = Double(0.0), 
-        /**
-         * The number of bits of a modulator level.
-         */bits: UInt32 = UInt32(8), 
-        /**
-         * The radius of the aperture in the Fourier plane; 1 is the whole first order.
-         */apertureRadius: Double = Double(1.0)) {
-        self.width = width
-        self.height = height
-        self.pitchUm = pitchUm
-        self.redNm = redNm
-        self.greenNm = greenNm
-        self.blueNm = blueNm
-        self.laserNm = laserNm
-        self.volumeDepthMm = volumeDepthMm
-        self.offsetMm = offsetMm
-        self.bits = bits
-        self.apertureRadius = apertureRadius
-    }
-
-    
-
-    
-}
-
-#if compiler(>=6)
-extension Display: Sendable {}
-#endif
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public struct FfiConverterTypeDisplay: FfiConverterRustBuffer {
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Display {
-        return
-            try Display(
-                width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf), 
-                pitchUm: FfiConverterDouble.read(from: &buf), 
-                redNm: FfiConverterDouble.read(from: &buf), 
-                greenNm: FfiConverterDouble.read(from: &buf), 
-                blueNm: FfiConverterDouble.read(from: &buf), 
-                laserNm: FfiConverterOptionDouble.read(from: &buf), 
-                volumeDepthMm: FfiConverterDouble.read(from: &buf), 
-                offsetMm: FfiConverterDouble.read(from: &buf), 
-                bits: FfiConverterUInt32.read(from: &buf), 
-                apertureRadius: FfiConverterDouble.read(from: &buf)
-        )
-    }
-
-    public static func write(_ value: Display, into buf: inout [UInt8]) {
-        FfiConverterUInt32.write(value.width, into: &buf)
-        FfiConverterUInt32.write(value.height, into: &buf)
-        FfiConverterDouble.write(value.pitchUm, into: &buf)
-        FfiConverterDouble.write(value.redNm, into: &buf)
-        FfiConverterDouble.write(value.greenNm, into: &buf)
-        FfiConverterDouble.write(value.blueNm, into: &buf)
-        FfiConverterOptionDouble.write(value.laserNm, into: &buf)
-        FfiConverterDouble.write(value.volumeDepthMm, into: &buf)
-        FfiConverterDouble.write(value.offsetMm, into: &buf)
-        FfiConverterUInt32.write(value.bits, into: &buf)
-        FfiConverterDouble.write(value.apertureRadius, into: &buf)
-    }
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeDisplay_lift(_ buf: RustBuffer) throws -> Display {
-    return try FfiConverterTypeDisplay.lift(buf)
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeDisplay_lower(_ value: Display) -> RustBuffer {
-    return FfiConverterTypeDisplay.lower(value)
-}
-
-
-/**
  * The number of dropped frames for each reason.
  */
 public struct Drops: Equatable, Hashable {
     /**
      * Frames that waited when a newer frame arrived.
      */
-    public var superseded: UInt64
+    public var superseded: Int64
     /**
      * Frames that arrived sooner than the target rate allows.
      */
-    public var aboveTargetRate: UInt64
+    public var aboveTargetRate: Int64
     /**
      * Frames that arrived while the session was paused.
      */
-    public var paused: UInt64
+    public var paused: Int64
     /**
      * Frames that were not finished when the session was reset.
      */
-    public var reset: UInt64
+    public var reset: Int64
     /**
      * Frames that were not finished when the session was closed.
      */
-    public var closed: UInt64
+    public var closed: Int64
     /**
      * The sum of all reasons.
      */
-    public var total: UInt64
+    public var total: Int64
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
     public init(
         /**
          * Frames that waited when a newer frame arrived.
-         */superseded: UInt64, 
+         */superseded: Int64, 
         /**
          * Frames that arrived sooner than the target rate allows.
-         */aboveTargetRate: UInt64, 
+         */aboveTargetRate: Int64, 
         /**
          * Frames that arrived while the session was paused.
-         */paused: UInt64, 
+         */paused: Int64, 
         /**
          * Frames that were not finished when the session was reset.
-         */reset: UInt64, 
+         */reset: Int64, 
         /**
          * Frames that were not finished when the session was closed.
-         */closed: UInt64, 
+         */closed: Int64, 
         /**
          * The sum of all reasons.
-         */total: UInt64) {
+         */total: Int64) {
         self.superseded = superseded
         self.aboveTargetRate = aboveTargetRate
         self.paused = paused
@@ -3898,22 +3807,22 @@ public struct FfiConverterTypeDrops: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Drops {
         return
             try Drops(
-                superseded: FfiConverterUInt64.read(from: &buf), 
-                aboveTargetRate: FfiConverterUInt64.read(from: &buf), 
-                paused: FfiConverterUInt64.read(from: &buf), 
-                reset: FfiConverterUInt64.read(from: &buf), 
-                closed: FfiConverterUInt64.read(from: &buf), 
-                total: FfiConverterUInt64.read(from: &buf)
+                superseded: FfiConverterInt64.read(from: &buf), 
+                aboveTargetRate: FfiConverterInt64.read(from: &buf), 
+                paused: FfiConverterInt64.read(from: &buf), 
+                reset: FfiConverterInt64.read(from: &buf), 
+                closed: FfiConverterInt64.read(from: &buf), 
+                total: FfiConverterInt64.read(from: &buf)
         )
     }
 
     public static func write(_ value: Drops, into buf: inout [UInt8]) {
-        FfiConverterUInt64.write(value.superseded, into: &buf)
-        FfiConverterUInt64.write(value.aboveTargetRate, into: &buf)
-        FfiConverterUInt64.write(value.paused, into: &buf)
-        FfiConverterUInt64.write(value.reset, into: &buf)
-        FfiConverterUInt64.write(value.closed, into: &buf)
-        FfiConverterUInt64.write(value.total, into: &buf)
+        FfiConverterInt64.write(value.superseded, into: &buf)
+        FfiConverterInt64.write(value.aboveTargetRate, into: &buf)
+        FfiConverterInt64.write(value.paused, into: &buf)
+        FfiConverterInt64.write(value.reset, into: &buf)
+        FfiConverterInt64.write(value.closed, into: &buf)
+        FfiConverterInt64.write(value.total, into: &buf)
     }
 }
 
@@ -3954,11 +3863,11 @@ public struct EncoderOptions {
      * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
      * what suits the encoding: 1, and 0 with a pre-filter.
      */
-    public var localSteps: UInt32?
+    public var localSteps: Int?
     /**
      * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
      */
-    public var midpointSteps: UInt32
+    public var midpointSteps: Int
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -3976,10 +3885,10 @@ public struct EncoderOptions {
         /**
          * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
          * what suits the encoding: 1, and 0 with a pre-filter.
-         */localSteps: UInt32? = nil, 
+         */localSteps: Int? = nil, 
         /**
          * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour.
-         */midpointSteps: UInt32 = UInt32(0)) {
+         */midpointSteps: Int = 0) {
         self.encoding = encoding
         self.brightness = brightness
         self.darkThreshold = darkThreshold
@@ -4006,8 +3915,8 @@ public struct FfiConverterTypeEncoderOptions: FfiConverterRustBuffer {
                 encoding: FfiConverterTypeEncoding.read(from: &buf), 
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
                 darkThreshold: FfiConverterOptionFloat.read(from: &buf), 
-                localSteps: FfiConverterOptionUInt32.read(from: &buf), 
-                midpointSteps: FfiConverterUInt32.read(from: &buf)
+                localSteps: FfiConverterOptionTypeInt.read(from: &buf), 
+                midpointSteps: FfiConverterTypeInt.read(from: &buf)
         )
     }
 
@@ -4015,8 +3924,8 @@ public struct FfiConverterTypeEncoderOptions: FfiConverterRustBuffer {
         FfiConverterTypeEncoding.write(value.encoding, into: &buf)
         FfiConverterTypeBrightness.write(value.brightness, into: &buf)
         FfiConverterOptionFloat.write(value.darkThreshold, into: &buf)
-        FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
-        FfiConverterUInt32.write(value.midpointSteps, into: &buf)
+        FfiConverterOptionTypeInt.write(value.localSteps, into: &buf)
+        FfiConverterTypeInt.write(value.midpointSteps, into: &buf)
     }
 }
 
@@ -4043,7 +3952,7 @@ public struct FrameInfo: Equatable, Hashable {
     /**
      * The time at which the frame was taken, in nanoseconds of any clock that runs forward.
      */
-    public var timestampNs: UInt64
+    public var timestampNs: Int64
     /**
      * The colour image.
      */
@@ -4070,7 +3979,7 @@ public struct FrameInfo: Equatable, Hashable {
     public init(
         /**
          * The time at which the frame was taken, in nanoseconds of any clock that runs forward.
-         */timestampNs: UInt64, 
+         */timestampNs: Int64, 
         /**
          * The colour image.
          */colour: ColourInfo, 
@@ -4110,7 +4019,7 @@ public struct FfiConverterTypeFrameInfo: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> FrameInfo {
         return
             try FrameInfo(
-                timestampNs: FfiConverterUInt64.read(from: &buf), 
+                timestampNs: FfiConverterInt64.read(from: &buf), 
                 colour: FfiConverterTypeColourInfo.read(from: &buf), 
                 depth: FfiConverterTypeDepthInfo.read(from: &buf), 
                 confidence: FfiConverterOptionTypeConfidenceInfo.read(from: &buf), 
@@ -4120,7 +4029,7 @@ public struct FfiConverterTypeFrameInfo: FfiConverterRustBuffer {
     }
 
     public static func write(_ value: FrameInfo, into buf: inout [UInt8]) {
-        FfiConverterUInt64.write(value.timestampNs, into: &buf)
+        FfiConverterInt64.write(value.timestampNs, into: &buf)
         FfiConverterTypeColourInfo.write(value.colour, into: &buf)
         FfiConverterTypeDepthInfo.write(value.depth, into: &buf)
         FfiConverterOptionTypeConfidenceInfo.write(value.confidence, into: &buf)
@@ -4255,25 +4164,186 @@ public func FfiConverterTypeFrameTimes_lower(_ value: FrameTimes) -> RustBuffer 
 
 
 /**
+ * A modulator, its lasers, and the display volume. It is checked when it is used.
+ */
+public struct HologramDisplay: Equatable, Hashable {
+    /**
+     * The number of pixels along x.
+     */
+    public var width: Int
+    /**
+     * The number of pixels along y.
+     */
+    public var height: Int
+    /**
+     * The distance between neighbouring pixels, in µm.
+     */
+    public var pitchUm: Double
+    /**
+     * The wavelength of the red laser, in nm.
+     */
+    public var redNm: Double
+    /**
+     * The wavelength of the green laser, in nm.
+     */
+    public var greenNm: Double
+    /**
+     * The wavelength of the blue laser, in nm.
+     */
+    public var blueNm: Double
+    /**
+     * The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
+     * wavelengths; none for a display with three lasers.
+     */
+    public var laserNm: Double?
+    /**
+     * The depth of the volume, in mm.
+     */
+    public var volumeDepthMm: Double
+    /**
+     * The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
+     */
+    public var offsetMm: Double
+    /**
+     * The number of bits of a modulator level.
+     */
+    public var bits: Int
+    /**
+     * The radius of the aperture in the Fourier plane; 1 is the whole first order.
+     */
+    public var apertureRadius: Double
+
+    // Default memberwise initializers are never public by default, so we
+    // declare one manually.
+    public init(
+        /**
+         * The number of pixels along x.
+         */width: Int = 1920, 
+        /**
+         * The number of pixels along y.
+         */height: Int = 1080, 
+        /**
+         * The distance between neighbouring pixels, in µm.
+         */pitchUm: Double = Double(8.0), 
+        /**
+         * The wavelength of the red laser, in nm.
+         */redNm: Double = Double(638.0), 
+        /**
+         * The wavelength of the green laser, in nm.
+         */greenNm: Double = Double(520.0), 
+        /**
+         * The wavelength of the blue laser, in nm.
+         */blueNm: Double = Double(450.0), 
+        /**
+         * The wavelength, in nm, of the only laser of a display with one laser, which replaces the other three
+         * wavelengths; none for a display with three lasers.
+         */laserNm: Double? = nil, 
+        /**
+         * The depth of the volume, in mm.
+         */volumeDepthMm: Double = Double(6.0), 
+        /**
+         * The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
+         */offsetMm: Double = Double(0.0), 
+        /**
+         * The number of bits of a modulator level.
+         */bits: Int = 8, 
+        /**
+         * The radius of the aperture in the Fourier plane; 1 is the whole first order.
+         */apertureRadius: Double = Double(1.0)) {
+        self.width = width
+        self.height = height
+        self.pitchUm = pitchUm
+        self.redNm = redNm
+        self.greenNm = greenNm
+        self.blueNm = blueNm
+        self.laserNm = laserNm
+        self.volumeDepthMm = volumeDepthMm
+        self.offsetMm = offsetMm
+        self.bits = bits
+        self.apertureRadius = apertureRadius
+    }
+
+    
+
+    
+}
+
+#if compiler(>=6)
+extension HologramDisplay: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeHologramDisplay: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> HologramDisplay {
+        return
+            try HologramDisplay(
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
+                pitchUm: FfiConverterDouble.read(from: &buf), 
+                redNm: FfiConverterDouble.read(from: &buf), 
+                greenNm: FfiConverterDouble.read(from: &buf), 
+                blueNm: FfiConverterDouble.read(from: &buf), 
+                laserNm: FfiConverterOptionDouble.read(from: &buf), 
+                volumeDepthMm: FfiConverterDouble.read(from: &buf), 
+                offsetMm: FfiConverterDouble.read(from: &buf), 
+                bits: FfiConverterTypeInt.read(from: &buf), 
+                apertureRadius: FfiConverterDouble.read(from: &buf)
+        )
+    }
+
+    public static func write(_ value: HologramDisplay, into buf: inout [UInt8]) {
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
+        FfiConverterDouble.write(value.pitchUm, into: &buf)
+        FfiConverterDouble.write(value.redNm, into: &buf)
+        FfiConverterDouble.write(value.greenNm, into: &buf)
+        FfiConverterDouble.write(value.blueNm, into: &buf)
+        FfiConverterOptionDouble.write(value.laserNm, into: &buf)
+        FfiConverterDouble.write(value.volumeDepthMm, into: &buf)
+        FfiConverterDouble.write(value.offsetMm, into: &buf)
+        FfiConverterTypeInt.write(value.bits, into: &buf)
+        FfiConverterDouble.write(value.apertureRadius, into: &buf)
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeHologramDisplay_lift(_ buf: RustBuffer) throws -> HologramDisplay {
+    return try FfiConverterTypeHologramDisplay.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeHologramDisplay_lower(_ value: HologramDisplay) -> RustBuffer {
+    return FfiConverterTypeHologramDisplay.lower(value)
+}
+
+
+/**
  * The properties of a hologram.
  */
 public struct HologramInfo: Equatable, Hashable {
     /**
      * The timestamp of the frame.
      */
-    public var timestampNs: UInt64
+    public var timestampNs: Int64
     /**
      * The width in pixels.
      */
-    public var width: UInt32
+    public var width: Int
     /**
      * The height in pixels.
      */
-    public var height: UInt32
+    public var height: Int
     /**
      * The number of colours of the levels: 3, or 1 for a display with one laser.
      */
-    public var colours: UInt32
+    public var colours: Int
     /**
      * The amplitude that maps to full light.
      */
@@ -4293,7 +4363,7 @@ public struct HologramInfo: Equatable, Hashable {
     /**
      * The quality level of the hologram; 0 is the best.
      */
-    public var qualityLevel: UInt32
+    public var qualityLevel: Int
     /**
      * The time that each stage took.
      */
@@ -4304,16 +4374,16 @@ public struct HologramInfo: Equatable, Hashable {
     public init(
         /**
          * The timestamp of the frame.
-         */timestampNs: UInt64, 
+         */timestampNs: Int64, 
         /**
          * The width in pixels.
-         */width: UInt32, 
+         */width: Int, 
         /**
          * The height in pixels.
-         */height: UInt32, 
+         */height: Int, 
         /**
          * The number of colours of the levels: 3, or 1 for a display with one laser.
-         */colours: UInt32, 
+         */colours: Int, 
         /**
          * The amplitude that maps to full light.
          */scale: Float, 
@@ -4328,7 +4398,7 @@ public struct HologramInfo: Equatable, Hashable {
          */validDepth: Float, 
         /**
          * The quality level of the hologram; 0 is the best.
-         */qualityLevel: UInt32, 
+         */qualityLevel: Int, 
         /**
          * The time that each stage took.
          */times: FrameTimes) {
@@ -4360,29 +4430,29 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> HologramInfo {
         return
             try HologramInfo(
-                timestampNs: FfiConverterUInt64.read(from: &buf), 
-                width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf), 
-                colours: FfiConverterUInt32.read(from: &buf), 
+                timestampNs: FfiConverterInt64.read(from: &buf), 
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
+                colours: FfiConverterTypeInt.read(from: &buf), 
                 scale: FfiConverterFloat.read(from: &buf), 
                 nearM: FfiConverterOptionFloat.read(from: &buf), 
                 farM: FfiConverterOptionFloat.read(from: &buf), 
                 validDepth: FfiConverterFloat.read(from: &buf), 
-                qualityLevel: FfiConverterUInt32.read(from: &buf), 
+                qualityLevel: FfiConverterTypeInt.read(from: &buf), 
                 times: FfiConverterTypeFrameTimes.read(from: &buf)
         )
     }
 
     public static func write(_ value: HologramInfo, into buf: inout [UInt8]) {
-        FfiConverterUInt64.write(value.timestampNs, into: &buf)
-        FfiConverterUInt32.write(value.width, into: &buf)
-        FfiConverterUInt32.write(value.height, into: &buf)
-        FfiConverterUInt32.write(value.colours, into: &buf)
+        FfiConverterInt64.write(value.timestampNs, into: &buf)
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
+        FfiConverterTypeInt.write(value.colours, into: &buf)
         FfiConverterFloat.write(value.scale, into: &buf)
         FfiConverterOptionFloat.write(value.nearM, into: &buf)
         FfiConverterOptionFloat.write(value.farM, into: &buf)
         FfiConverterFloat.write(value.validDepth, into: &buf)
-        FfiConverterUInt32.write(value.qualityLevel, into: &buf)
+        FfiConverterTypeInt.write(value.qualityLevel, into: &buf)
         FfiConverterTypeFrameTimes.write(value.times, into: &buf)
     }
 }
@@ -4500,11 +4570,11 @@ public struct NetworkInfo: Equatable, Hashable {
     /**
      * The number of convolutions.
      */
-    public var layers: UInt32
+    public var layers: Int
     /**
      * The number of filters of each hidden layer.
      */
-    public var filters: UInt32
+    public var filters: Int
     /**
      * The number format of the layers.
      */
@@ -4523,10 +4593,10 @@ public struct NetworkInfo: Equatable, Hashable {
     public init(
         /**
          * The number of convolutions.
-         */layers: UInt32, 
+         */layers: Int, 
         /**
          * The number of filters of each hidden layer.
-         */filters: UInt32, 
+         */filters: Int, 
         /**
          * The number format of the layers.
          */precision: String, 
@@ -4559,8 +4629,8 @@ public struct FfiConverterTypeNetworkInfo: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> NetworkInfo {
         return
             try NetworkInfo(
-                layers: FfiConverterUInt32.read(from: &buf), 
-                filters: FfiConverterUInt32.read(from: &buf), 
+                layers: FfiConverterTypeInt.read(from: &buf), 
+                filters: FfiConverterTypeInt.read(from: &buf), 
                 precision: FfiConverterString.read(from: &buf), 
                 pitchUm: FfiConverterDouble.read(from: &buf), 
                 volumeDepthMm: FfiConverterDouble.read(from: &buf)
@@ -4568,8 +4638,8 @@ public struct FfiConverterTypeNetworkInfo: FfiConverterRustBuffer {
     }
 
     public static func write(_ value: NetworkInfo, into buf: inout [UInt8]) {
-        FfiConverterUInt32.write(value.layers, into: &buf)
-        FfiConverterUInt32.write(value.filters, into: &buf)
+        FfiConverterTypeInt.write(value.layers, into: &buf)
+        FfiConverterTypeInt.write(value.filters, into: &buf)
         FfiConverterString.write(value.precision, into: &buf)
         FfiConverterDouble.write(value.pitchUm, into: &buf)
         FfiConverterDouble.write(value.volumeDepthMm, into: &buf)
@@ -4668,7 +4738,7 @@ public struct Placement: Equatable, Hashable {
     /**
      * The arrangement of colours in images.
      */
-    public var layout: Layout
+    public var layout: ModulatorLayout
     /**
      * Whether the whole image is flipped left to right.
      */
@@ -4691,7 +4761,7 @@ public struct Placement: Equatable, Hashable {
     public init(
         /**
          * The arrangement of colours in images.
-         */layout: Layout, 
+         */layout: ModulatorLayout, 
         /**
          * Whether the whole image is flipped left to right.
          */flipX: Bool = false, 
@@ -4727,7 +4797,7 @@ public struct FfiConverterTypePlacement: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Placement {
         return
             try Placement(
-                layout: FfiConverterTypeLayout.read(from: &buf), 
+                layout: FfiConverterTypeModulatorLayout.read(from: &buf), 
                 flipX: FfiConverterBool.read(from: &buf), 
                 flipY: FfiConverterBool.read(from: &buf), 
                 shiftX: FfiConverterInt32.read(from: &buf), 
@@ -4736,7 +4806,7 @@ public struct FfiConverterTypePlacement: FfiConverterRustBuffer {
     }
 
     public static func write(_ value: Placement, into buf: inout [UInt8]) {
-        FfiConverterTypeLayout.write(value.layout, into: &buf)
+        FfiConverterTypeModulatorLayout.write(value.layout, into: &buf)
         FfiConverterBool.write(value.flipX, into: &buf)
         FfiConverterBool.write(value.flipY, into: &buf)
         FfiConverterInt32.write(value.shiftX, into: &buf)
@@ -4767,21 +4837,21 @@ public struct PlaneInfo: Equatable, Hashable {
     /**
      * The number of bytes from one row to the next.
      */
-    public var rowStride: UInt32
+    public var rowStride: Int
     /**
      * The number of bytes from one pixel to the next in a row.
      */
-    public var pixelStride: UInt32
+    public var pixelStride: Int
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
     public init(
         /**
          * The number of bytes from one row to the next.
-         */rowStride: UInt32, 
+         */rowStride: Int, 
         /**
          * The number of bytes from one pixel to the next in a row.
-         */pixelStride: UInt32) {
+         */pixelStride: Int) {
         self.rowStride = rowStride
         self.pixelStride = pixelStride
     }
@@ -4802,14 +4872,14 @@ public struct FfiConverterTypePlaneInfo: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> PlaneInfo {
         return
             try PlaneInfo(
-                rowStride: FfiConverterUInt32.read(from: &buf), 
-                pixelStride: FfiConverterUInt32.read(from: &buf)
+                rowStride: FfiConverterTypeInt.read(from: &buf), 
+                pixelStride: FfiConverterTypeInt.read(from: &buf)
         )
     }
 
     public static func write(_ value: PlaneInfo, into buf: inout [UInt8]) {
-        FfiConverterUInt32.write(value.rowStride, into: &buf)
-        FfiConverterUInt32.write(value.pixelStride, into: &buf)
+        FfiConverterTypeInt.write(value.rowStride, into: &buf)
+        FfiConverterTypeInt.write(value.pixelStride, into: &buf)
     }
 }
 
@@ -4830,87 +4900,17 @@ public func FfiConverterTypePlaneInfo_lower(_ value: PlaneInfo) -> RustBuffer {
 
 
 /**
- * The pose of the depth camera. A point p of the depth camera (x right, y down, z forward) is at R·p + t of the colour
- * camera.
- */
-public struct Pose: Equatable, Hashable {
-    /**
-     * R: 9 numbers, row by row.
-     */
-    public var rotation: [Double]
-    /**
-     * t: 3 numbers, in metres.
-     */
-    public var translationM: [Double]
-
-    // Default memberwise initializers are never public by default, so we
-    // declare one manually.
-    public init(
-        /**
-         * R: 9 numbers, row by row.
-         */rotation: [Double], 
-        /**
-         * t: 3 numbers, in metres.
-         */translationM: [Double]) {
-        self.rotation = rotation
-        self.translationM = translationM
-    }
-
-    
-
-    
-}
-
-#if compiler(>=6)
-extension Pose: Sendable {}
-#endif
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public struct FfiConverterTypePose: FfiConverterRustBuffer {
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Pose {
-        return
-            try Pose(
-                rotation: FfiConverterSequenceDouble.read(from: &buf), 
-                translationM: FfiConverterSequenceDouble.read(from: &buf)
-        )
-    }
-
-    public static func write(_ value: Pose, into buf: inout [UInt8]) {
-        FfiConverterSequenceDouble.write(value.rotation, into: &buf)
-        FfiConverterSequenceDouble.write(value.translationM, into: &buf)
-    }
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypePose_lift(_ buf: RustBuffer) throws -> Pose {
-    return try FfiConverterTypePose.lift(buf)
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypePose_lower(_ value: Pose) -> RustBuffer {
-    return FfiConverterTypePose.lower(value)
-}
-
-
-/**
  * A change of the quality level.
  */
 public struct QualityChange: Equatable, Hashable {
     /**
      * The previous quality level.
      */
-    public var fromQualityLevel: UInt32
+    public var fromQualityLevel: Int
     /**
      * The new quality level; the previous one if the reason is `Refused`.
      */
-    public var toQualityLevel: UInt32
+    public var toQualityLevel: Int
     /**
      * The reason.
      */
@@ -4921,10 +4921,10 @@ public struct QualityChange: Equatable, Hashable {
     public init(
         /**
          * The previous quality level.
-         */fromQualityLevel: UInt32, 
+         */fromQualityLevel: Int, 
         /**
          * The new quality level; the previous one if the reason is `Refused`.
-         */toQualityLevel: UInt32, 
+         */toQualityLevel: Int, 
         /**
          * The reason.
          */reason: QualityReason) {
@@ -4949,15 +4949,15 @@ public struct FfiConverterTypeQualityChange: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> QualityChange {
         return
             try QualityChange(
-                fromQualityLevel: FfiConverterUInt32.read(from: &buf), 
-                toQualityLevel: FfiConverterUInt32.read(from: &buf), 
+                fromQualityLevel: FfiConverterTypeInt.read(from: &buf), 
+                toQualityLevel: FfiConverterTypeInt.read(from: &buf), 
                 reason: FfiConverterTypeQualityReason.read(from: &buf)
         )
     }
 
     public static func write(_ value: QualityChange, into buf: inout [UInt8]) {
-        FfiConverterUInt32.write(value.fromQualityLevel, into: &buf)
-        FfiConverterUInt32.write(value.toQualityLevel, into: &buf)
+        FfiConverterTypeInt.write(value.fromQualityLevel, into: &buf)
+        FfiConverterTypeInt.write(value.toQualityLevel, into: &buf)
         FfiConverterTypeQualityReason.write(value.reason, into: &buf)
     }
 }
@@ -4986,42 +4986,42 @@ public struct QualityLevel {
     /**
      * The method that computes the hologram.
      */
-    public var method: Method
+    public var method: HologramMethod
     /**
      * The width of the hologram in pixels.
      */
-    public var width: UInt32
+    public var width: Int
     /**
      * The height of the hologram in pixels.
      */
-    public var height: UInt32
+    public var height: Int
     /**
      * The number of local steps; none for the session's number.
      */
-    public var localSteps: UInt32?
+    public var localSteps: Int?
     /**
      * The number of steps at the midpoint; none for the session's number.
      */
-    public var midpointSteps: UInt32?
+    public var midpointSteps: Int?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
     public init(
         /**
          * The method that computes the hologram.
-         */method: Method, 
+         */method: HologramMethod, 
         /**
          * The width of the hologram in pixels.
-         */width: UInt32, 
+         */width: Int, 
         /**
          * The height of the hologram in pixels.
-         */height: UInt32, 
+         */height: Int, 
         /**
          * The number of local steps; none for the session's number.
-         */localSteps: UInt32? = nil, 
+         */localSteps: Int? = nil, 
         /**
          * The number of steps at the midpoint; none for the session's number.
-         */midpointSteps: UInt32? = nil) {
+         */midpointSteps: Int? = nil) {
         self.method = method
         self.width = width
         self.height = height
@@ -5045,20 +5045,20 @@ public struct FfiConverterTypeQualityLevel: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> QualityLevel {
         return
             try QualityLevel(
-                method: FfiConverterTypeMethod.read(from: &buf), 
-                width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf), 
-                localSteps: FfiConverterOptionUInt32.read(from: &buf), 
-                midpointSteps: FfiConverterOptionUInt32.read(from: &buf)
+                method: FfiConverterTypeHologramMethod.read(from: &buf), 
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
+                localSteps: FfiConverterOptionTypeInt.read(from: &buf), 
+                midpointSteps: FfiConverterOptionTypeInt.read(from: &buf)
         )
     }
 
     public static func write(_ value: QualityLevel, into buf: inout [UInt8]) {
-        FfiConverterTypeMethod.write(value.method, into: &buf)
-        FfiConverterUInt32.write(value.width, into: &buf)
-        FfiConverterUInt32.write(value.height, into: &buf)
-        FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
-        FfiConverterOptionUInt32.write(value.midpointSteps, into: &buf)
+        FfiConverterTypeHologramMethod.write(value.method, into: &buf)
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
+        FfiConverterOptionTypeInt.write(value.localSteps, into: &buf)
+        FfiConverterOptionTypeInt.write(value.midpointSteps, into: &buf)
     }
 }
 
@@ -5085,7 +5085,7 @@ public struct SessionOptions {
     /**
      * The target of the holograms.
      */
-    public var target: Target
+    public var target: HologramTarget
     /**
      * The quality levels, best first: 1 to 16.
      */
@@ -5116,12 +5116,12 @@ public struct SessionOptions {
      * The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for
      * the encoding's default: 1, and 0 with a pre-filter.
      */
-    public var localSteps: UInt32?
+    public var localSteps: Int?
     /**
      * The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
      * stills; 1 suits video, where each frame continues from the previous one.
      */
-    public var midpointSteps: UInt32
+    public var midpointSteps: Int
     /**
      * The distances that map to the ends of the volume.
      */
@@ -5133,12 +5133,12 @@ public struct SessionOptions {
     /**
      * The number of threads to compute with, at most 256; none for as many as the device has.
      */
-    public var threads: UInt32?
+    public var threads: Int?
     /**
      * The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
      * session is a multiple of it.
      */
-    public var mostPixels: UInt64
+    public var mostPixels: Int
     /**
      * The backend that computes frames.
      */
@@ -5149,7 +5149,7 @@ public struct SessionOptions {
     public init(
         /**
          * The target of the holograms.
-         */target: Target, 
+         */target: HologramTarget, 
         /**
          * The quality levels, best first: 1 to 16.
          */qualityLevels: [QualityLevel], 
@@ -5173,11 +5173,11 @@ public struct SessionOptions {
         /**
          * The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for
          * the encoding's default: 1, and 0 with a pre-filter.
-         */localSteps: UInt32? = nil, 
+         */localSteps: Int? = nil, 
         /**
          * The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
          * stills; 1 suits video, where each frame continues from the previous one.
-         */midpointSteps: UInt32 = UInt32(0), 
+         */midpointSteps: Int = 0, 
         /**
          * The distances that map to the ends of the volume.
          */depthRange: DepthRange, 
@@ -5186,11 +5186,11 @@ public struct SessionOptions {
          */leastConfidence: Float, 
         /**
          * The number of threads to compute with, at most 256; none for as many as the device has.
-         */threads: UInt32?, 
+         */threads: Int?, 
         /**
          * The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
          * session is a multiple of it.
-         */mostPixels: UInt64 = UInt64(33554432), 
+         */mostPixels: Int = 33554432, 
         /**
          * The backend that computes frames.
          */backend: Backend) {
@@ -5226,37 +5226,37 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SessionOptions {
         return
             try SessionOptions(
-                target: FfiConverterTypeTarget.read(from: &buf), 
+                target: FfiConverterTypeHologramTarget.read(from: &buf), 
                 qualityLevels: FfiConverterSequenceTypeQualityLevel.read(from: &buf), 
                 quality: FfiConverterTypeQuality.read(from: &buf), 
                 targetRateHz: FfiConverterOptionDouble.read(from: &buf), 
                 encoding: FfiConverterTypeEncoding.read(from: &buf), 
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
                 darkThreshold: FfiConverterOptionFloat.read(from: &buf), 
-                localSteps: FfiConverterOptionUInt32.read(from: &buf), 
-                midpointSteps: FfiConverterUInt32.read(from: &buf), 
+                localSteps: FfiConverterOptionTypeInt.read(from: &buf), 
+                midpointSteps: FfiConverterTypeInt.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
-                threads: FfiConverterOptionUInt32.read(from: &buf), 
-                mostPixels: FfiConverterUInt64.read(from: &buf), 
+                threads: FfiConverterOptionTypeInt.read(from: &buf), 
+                mostPixels: FfiConverterTypeInt.read(from: &buf), 
                 backend: FfiConverterTypeBackend.read(from: &buf)
         )
     }
 
     public static func write(_ value: SessionOptions, into buf: inout [UInt8]) {
-        FfiConverterTypeTarget.write(value.target, into: &buf)
+        FfiConverterTypeHologramTarget.write(value.target, into: &buf)
         FfiConverterSequenceTypeQualityLevel.write(value.qualityLevels, into: &buf)
         FfiConverterTypeQuality.write(value.quality, into: &buf)
         FfiConverterOptionDouble.write(value.targetRateHz, into: &buf)
         FfiConverterTypeEncoding.write(value.encoding, into: &buf)
         FfiConverterTypeBrightness.write(value.brightness, into: &buf)
         FfiConverterOptionFloat.write(value.darkThreshold, into: &buf)
-        FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
-        FfiConverterUInt32.write(value.midpointSteps, into: &buf)
+        FfiConverterOptionTypeInt.write(value.localSteps, into: &buf)
+        FfiConverterTypeInt.write(value.midpointSteps, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
-        FfiConverterOptionUInt32.write(value.threads, into: &buf)
-        FfiConverterUInt64.write(value.mostPixels, into: &buf)
+        FfiConverterOptionTypeInt.write(value.threads, into: &buf)
+        FfiConverterTypeInt.write(value.mostPixels, into: &buf)
         FfiConverterTypeBackend.write(value.backend, into: &buf)
     }
 }
@@ -5285,19 +5285,19 @@ public struct Statistics: Equatable, Hashable {
     /**
      * Frames that were submitted.
      */
-    public var submitted: UInt64
+    public var submitted: Int64
     /**
      * Frames that became holograms.
      */
-    public var processed: UInt64
+    public var processed: Int64
     /**
      * Frames that could not be processed.
      */
-    public var failed: UInt64
+    public var failed: Int64
     /**
      * Frames that were refused because they were late or the session was closed.
      */
-    public var refused: UInt64
+    public var refused: Int64
     /**
      * Frames that were dropped.
      */
@@ -5305,7 +5305,7 @@ public struct Statistics: Equatable, Hashable {
     /**
      * Frames that wait or are being processed.
      */
-    public var pending: UInt64
+    public var pending: Int64
     /**
      * Holograms per second over the last 30.
      */
@@ -5325,33 +5325,33 @@ public struct Statistics: Equatable, Hashable {
     /**
      * The quality level; 0 is the best.
      */
-    public var qualityLevel: UInt32
+    public var qualityLevel: Int
     /**
      * The number of errors that the listener threw.
      */
-    public var listenerFailures: UInt64
+    public var listenerFailures: Int64
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
     public init(
         /**
          * Frames that were submitted.
-         */submitted: UInt64, 
+         */submitted: Int64, 
         /**
          * Frames that became holograms.
-         */processed: UInt64, 
+         */processed: Int64, 
         /**
          * Frames that could not be processed.
-         */failed: UInt64, 
+         */failed: Int64, 
         /**
          * Frames that were refused because they were late or the session was closed.
-         */refused: UInt64, 
+         */refused: Int64, 
         /**
          * Frames that were dropped.
          */dropped: Drops, 
         /**
          * Frames that wait or are being processed.
-         */pending: UInt64, 
+         */pending: Int64, 
         /**
          * Holograms per second over the last 30.
          */rateHz: Double, 
@@ -5366,10 +5366,10 @@ public struct Statistics: Equatable, Hashable {
          */backendWhy: String, 
         /**
          * The quality level; 0 is the best.
-         */qualityLevel: UInt32, 
+         */qualityLevel: Int, 
         /**
          * The number of errors that the listener threw.
-         */listenerFailures: UInt64) {
+         */listenerFailures: Int64) {
         self.submitted = submitted
         self.processed = processed
         self.failed = failed
@@ -5400,34 +5400,34 @@ public struct FfiConverterTypeStatistics: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Statistics {
         return
             try Statistics(
-                submitted: FfiConverterUInt64.read(from: &buf), 
-                processed: FfiConverterUInt64.read(from: &buf), 
-                failed: FfiConverterUInt64.read(from: &buf), 
-                refused: FfiConverterUInt64.read(from: &buf), 
+                submitted: FfiConverterInt64.read(from: &buf), 
+                processed: FfiConverterInt64.read(from: &buf), 
+                failed: FfiConverterInt64.read(from: &buf), 
+                refused: FfiConverterInt64.read(from: &buf), 
                 dropped: FfiConverterTypeDrops.read(from: &buf), 
-                pending: FfiConverterUInt64.read(from: &buf), 
+                pending: FfiConverterInt64.read(from: &buf), 
                 rateHz: FfiConverterDouble.read(from: &buf), 
                 times: FfiConverterTypeFrameTimes.read(from: &buf), 
                 backend: FfiConverterString.read(from: &buf), 
                 backendWhy: FfiConverterString.read(from: &buf), 
-                qualityLevel: FfiConverterUInt32.read(from: &buf), 
-                listenerFailures: FfiConverterUInt64.read(from: &buf)
+                qualityLevel: FfiConverterTypeInt.read(from: &buf), 
+                listenerFailures: FfiConverterInt64.read(from: &buf)
         )
     }
 
     public static func write(_ value: Statistics, into buf: inout [UInt8]) {
-        FfiConverterUInt64.write(value.submitted, into: &buf)
-        FfiConverterUInt64.write(value.processed, into: &buf)
-        FfiConverterUInt64.write(value.failed, into: &buf)
-        FfiConverterUInt64.write(value.refused, into: &buf)
+        FfiConverterInt64.write(value.submitted, into: &buf)
+        FfiConverterInt64.write(value.processed, into: &buf)
+        FfiConverterInt64.write(value.failed, into: &buf)
+        FfiConverterInt64.write(value.refused, into: &buf)
         FfiConverterTypeDrops.write(value.dropped, into: &buf)
-        FfiConverterUInt64.write(value.pending, into: &buf)
+        FfiConverterInt64.write(value.pending, into: &buf)
         FfiConverterDouble.write(value.rateHz, into: &buf)
         FfiConverterTypeFrameTimes.write(value.times, into: &buf)
         FfiConverterString.write(value.backend, into: &buf)
         FfiConverterString.write(value.backendWhy, into: &buf)
-        FfiConverterUInt32.write(value.qualityLevel, into: &buf)
-        FfiConverterUInt64.write(value.listenerFailures, into: &buf)
+        FfiConverterTypeInt.write(value.qualityLevel, into: &buf)
+        FfiConverterInt64.write(value.listenerFailures, into: &buf)
     }
 }
 
@@ -6162,7 +6162,7 @@ public enum Encoding {
          */sigma: Float, 
         /**
          * The number of taps, an odd number; 3 in the paper.
-         */width: UInt32
+         */width: Int
     )
     /**
      * Double phase after a filter that removes high diagonal frequencies (BL-DPM).
@@ -6179,7 +6179,7 @@ public enum Encoding {
     case deep(
         /**
          * The pre-filter.
-         */prefilter: Network
+         */prefilter: HologramNetwork
     )
 
 
@@ -6204,13 +6204,13 @@ public struct FfiConverterTypeEncoding: FfiConverterRustBuffer {
         
         case 1: return .doublePhase
         
-        case 2: return .antiAlias(sigma: try FfiConverterFloat.read(from: &buf), width: try FfiConverterUInt32.read(from: &buf)
+        case 2: return .antiAlias(sigma: try FfiConverterFloat.read(from: &buf), width: try FfiConverterTypeInt.read(from: &buf)
         )
         
         case 3: return .bandLimit(k: try FfiConverterFloat.read(from: &buf)
         )
         
-        case 4: return .deep(prefilter: try FfiConverterTypeNetwork.read(from: &buf)
+        case 4: return .deep(prefilter: try FfiConverterTypeHologramNetwork.read(from: &buf)
         )
         
         default: throw UniffiInternalError.unexpectedEnumCase
@@ -6228,7 +6228,7 @@ public struct FfiConverterTypeEncoding: FfiConverterRustBuffer {
         case let .antiAlias(sigma,width):
             writeInt(&buf, Int32(2))
             FfiConverterFloat.write(sigma, into: &buf)
-            FfiConverterUInt32.write(width, into: &buf)
+            FfiConverterTypeInt.write(width, into: &buf)
             
         
         case let .bandLimit(k):
@@ -6238,7 +6238,7 @@ public struct FfiConverterTypeEncoding: FfiConverterRustBuffer {
         
         case let .deep(prefilter):
             writeInt(&buf, Int32(4))
-            FfiConverterTypeNetwork.write(prefilter, into: &buf)
+            FfiConverterTypeHologramNetwork.write(prefilter, into: &buf)
             
         }
     }
@@ -6262,27 +6262,32 @@ public func FfiConverterTypeEncoding_lower(_ value: Encoding) -> RustBuffer {
 
 
 /**
- * The arrangement of the colours' levels in images for a modulator's driver.
+ * The method that computes holograms.
  */
 
-public enum Layout: Equatable, Hashable {
+public enum HologramMethod {
     
     /**
-     * One image with bytes red, green, blue.
+     * A trained network.
      */
-    case rgb
+    case trained(
+        /**
+         * The network, which must suit the session's display.
+         */network: HologramNetwork
+    )
     /**
-     * One image with bytes red, green, blue, alpha 255.
+     * The plane sweep, which suits any display. It is slower and needs no training.
      */
-    case rgba
+    case sweep
     /**
-     * One image with bytes blue, green, red, alpha 255.
+     * The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
+     * noisy or incomplete depth, such as depth from sensors.
      */
-    case bgra
-    /**
-     * One image for each colour in the order red, green, blue, with one byte for each pixel.
-     */
-    case grey
+    case auto(
+        /**
+         * The network, which must suit the session's display.
+         */network: HologramNetwork
+    )
 
 
 
@@ -6291,50 +6296,48 @@ public enum Layout: Equatable, Hashable {
 }
 
 #if compiler(>=6)
-extension Layout: Sendable {}
+extension HologramMethod: Sendable {}
 #endif
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public struct FfiConverterTypeLayout: FfiConverterRustBuffer {
-    typealias SwiftType = Layout
+public struct FfiConverterTypeHologramMethod: FfiConverterRustBuffer {
+    typealias SwiftType = HologramMethod
 
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Layout {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> HologramMethod {
         let variant: Int32 = try readInt(&buf)
         switch variant {
         
-        case 1: return .rgb
+        case 1: return .trained(network: try FfiConverterTypeHologramNetwork.read(from: &buf)
+        )
         
-        case 2: return .rgba
+        case 2: return .sweep
         
-        case 3: return .bgra
-        
-        case 4: return .grey
+        case 3: return .auto(network: try FfiConverterTypeHologramNetwork.read(from: &buf)
+        )
         
         default: throw UniffiInternalError.unexpectedEnumCase
         }
     }
 
-    public static func write(_ value: Layout, into buf: inout [UInt8]) {
+    public static func write(_ value: HologramMethod, into buf: inout [UInt8]) {
         switch value {
         
         
-        case .rgb:
+        case let .trained(network):
             writeInt(&buf, Int32(1))
+            FfiConverterTypeHologramNetwork.write(network, into: &buf)
+            
         
-        
-        case .rgba:
+        case .sweep:
             writeInt(&buf, Int32(2))
         
         
-        case .bgra:
+        case let .auto(network):
             writeInt(&buf, Int32(3))
-        
-        
-        case .grey:
-            writeInt(&buf, Int32(4))
-        
+            FfiConverterTypeHologramNetwork.write(network, into: &buf)
+            
         }
     }
 }
@@ -6343,15 +6346,15 @@ public struct FfiConverterTypeLayout: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeLayout_lift(_ buf: RustBuffer) throws -> Layout {
-    return try FfiConverterTypeLayout.lift(buf)
+public func FfiConverterTypeHologramMethod_lift(_ buf: RustBuffer) throws -> HologramMethod {
+    return try FfiConverterTypeHologramMethod.lift(buf)
 }
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeLayout_lower(_ value: Layout) -> RustBuffer {
-    return FfiConverterTypeLayout.lower(value)
+public func FfiConverterTypeHologramMethod_lower(_ value: HologramMethod) -> RustBuffer {
+    return FfiConverterTypeHologramMethod.lower(value)
 }
 
 
@@ -6368,7 +6371,7 @@ enum ListenerError: Swift.Error, Equatable, Hashable {
     /**
      * The listener threw an error or an exception.
      */
-    case Threw(
+    case threw(
         /**
          * The message.
          */reason: String
@@ -6398,7 +6401,7 @@ public struct FfiConverterTypeListenerError: FfiConverterRustBuffer {
         
 
         
-        case 1: return .Threw(
+        case 1: return .threw(
             reason: try FfiConverterString.read(from: &buf)
             )
 
@@ -6413,7 +6416,7 @@ public struct FfiConverterTypeListenerError: FfiConverterRustBuffer {
 
         
         
-        case let .Threw(reason):
+        case let .threw(reason):
             writeInt(&buf, Int32(1))
             FfiConverterString.write(reason, into: &buf)
             
@@ -6533,32 +6536,27 @@ public func FfiConverterTypeLogLevel_lower(_ value: LogLevel) -> RustBuffer {
 
 
 /**
- * The method that computes holograms.
+ * The arrangement of the colours' levels in images for a modulator's driver.
  */
 
-public enum Method {
+public enum ModulatorLayout: Equatable, Hashable {
     
     /**
-     * A trained network.
+     * One image with bytes red, green, blue.
      */
-    case trained(
-        /**
-         * The network, which must suit the session's display.
-         */network: Network
-    )
+    case rgb
     /**
-     * The plane sweep, which suits any display. It is slower and needs no training.
+     * One image with bytes red, green, blue, alpha 255.
      */
-    case sweep
+    case rgba
     /**
-     * The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
-     * noisy or incomplete depth, such as depth from sensors.
+     * One image with bytes blue, green, red, alpha 255.
      */
-    case auto(
-        /**
-         * The network, which must suit the session's display.
-         */network: Network
-    )
+    case bgra
+    /**
+     * One image for each colour in the order red, green, blue, with one byte for each pixel.
+     */
+    case grey
 
 
 
@@ -6567,48 +6565,50 @@ public enum Method {
 }
 
 #if compiler(>=6)
-extension Method: Sendable {}
+extension ModulatorLayout: Sendable {}
 #endif
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public struct FfiConverterTypeMethod: FfiConverterRustBuffer {
-    typealias SwiftType = Method
+public struct FfiConverterTypeModulatorLayout: FfiConverterRustBuffer {
+    typealias SwiftType = ModulatorLayout
 
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Method {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> ModulatorLayout {
         let variant: Int32 = try readInt(&buf)
         switch variant {
         
-        case 1: return .trained(network: try FfiConverterTypeNetwork.read(from: &buf)
-        )
+        case 1: return .rgb
         
-        case 2: return .sweep
+        case 2: return .rgba
         
-        case 3: return .auto(network: try FfiConverterTypeNetwork.read(from: &buf)
-        )
+        case 3: return .bgra
+        
+        case 4: return .grey
         
         default: throw UniffiInternalError.unexpectedEnumCase
         }
     }
 
-    public static func write(_ value: Method, into buf: inout [UInt8]) {
+    public static func write(_ value: ModulatorLayout, into buf: inout [UInt8]) {
         switch value {
         
         
-        case let .trained(network):
+        case .rgb:
             writeInt(&buf, Int32(1))
-            FfiConverterTypeNetwork.write(network, into: &buf)
-            
         
-        case .sweep:
+        
+        case .rgba:
             writeInt(&buf, Int32(2))
         
         
-        case let .auto(network):
+        case .bgra:
             writeInt(&buf, Int32(3))
-            FfiConverterTypeNetwork.write(network, into: &buf)
-            
+        
+        
+        case .grey:
+            writeInt(&buf, Int32(4))
+        
         }
     }
 }
@@ -6617,15 +6617,15 @@ public struct FfiConverterTypeMethod: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeMethod_lift(_ buf: RustBuffer) throws -> Method {
-    return try FfiConverterTypeMethod.lift(buf)
+public func FfiConverterTypeModulatorLayout_lift(_ buf: RustBuffer) throws -> ModulatorLayout {
+    return try FfiConverterTypeModulatorLayout.lift(buf)
 }
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeMethod_lower(_ value: Method) -> RustBuffer {
-    return FfiConverterTypeMethod.lower(value)
+public func FfiConverterTypeModulatorLayout_lower(_ value: ModulatorLayout) -> RustBuffer {
+    return FfiConverterTypeModulatorLayout.lower(value)
 }
 
 
@@ -6641,42 +6641,42 @@ enum PhasefrontError: Swift.Error, Equatable, Hashable {
     /**
      * The physics of a display is impossible or out of range.
      */
-    case Display(message: String)
+    case display(message: String)
     
     /**
      * A frame, plane or image has the wrong shape or unusable values.
      */
-    case Frame(message: String)
+    case frame(message: String)
     
     /**
      * A frame is not later than the previous one. It is refused; later frames are not affected.
      */
-    case Timestamp(message: String)
+    case timestamp(message: String)
     
     /**
      * A setting or an argument is invalid or cannot be planned.
      */
-    case Setting(message: String)
+    case setting(message: String)
     
     /**
      * A file is not a hologram network, or the network is for another display.
      */
-    case Network(message: String)
+    case network(message: String)
     
     /**
      * A file cannot be read.
      */
-    case File(message: String)
+    case file(message: String)
     
     /**
      * A session cannot answer the call in its mode or state.
      */
-    case Session(message: String)
+    case session(message: String)
     
     /**
      * Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
      */
-    case Internal(message: String)
+    case `internal`(message: String)
     
 
     
@@ -6703,35 +6703,35 @@ public struct FfiConverterTypePhasefrontError: FfiConverterRustBuffer {
         
 
         
-        case 1: return .Display(
+        case 1: return .display(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 2: return .Frame(
+        case 2: return .frame(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 3: return .Timestamp(
+        case 3: return .timestamp(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 4: return .Setting(
+        case 4: return .setting(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 5: return .Network(
+        case 5: return .network(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 6: return .File(
+        case 6: return .file(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 7: return .Session(
+        case 7: return .session(
             message: try FfiConverterString.read(from: &buf)
         )
         
-        case 8: return .Internal(
+        case 8: return .internal(
             message: try FfiConverterString.read(from: &buf)
         )
         
@@ -6746,21 +6746,21 @@ public struct FfiConverterTypePhasefrontError: FfiConverterRustBuffer {
         
 
         
-        case .Display(_ /* message is ignored*/):
+        case .display(_ /* message is ignored*/):
             writeInt(&buf, Int32(1))
-        case .Frame(_ /* message is ignored*/):
+        case .frame(_ /* message is ignored*/):
             writeInt(&buf, Int32(2))
-        case .Timestamp(_ /* message is ignored*/):
+        case .timestamp(_ /* message is ignored*/):
             writeInt(&buf, Int32(3))
-        case .Setting(_ /* message is ignored*/):
+        case .setting(_ /* message is ignored*/):
             writeInt(&buf, Int32(4))
-        case .Network(_ /* message is ignored*/):
+        case .network(_ /* message is ignored*/):
             writeInt(&buf, Int32(5))
-        case .File(_ /* message is ignored*/):
+        case .file(_ /* message is ignored*/):
             writeInt(&buf, Int32(6))
-        case .Session(_ /* message is ignored*/):
+        case .session(_ /* message is ignored*/):
             writeInt(&buf, Int32(7))
-        case .Internal(_ /* message is ignored*/):
+        case .internal(_ /* message is ignored*/):
             writeInt(&buf, Int32(8))
 
         
@@ -6801,7 +6801,7 @@ public enum Quality: Equatable, Hashable {
     case fixed(
         /**
          * The quality level; 0 is the best.
-         */qualityLevel: UInt32
+         */qualityLevel: Int
     )
 
 
@@ -6826,7 +6826,7 @@ public struct FfiConverterTypeQuality: FfiConverterRustBuffer {
         
         case 1: return .adaptive
         
-        case 2: return .fixed(qualityLevel: try FfiConverterUInt32.read(from: &buf)
+        case 2: return .fixed(qualityLevel: try FfiConverterTypeInt.read(from: &buf)
         )
         
         default: throw UniffiInternalError.unexpectedEnumCase
@@ -6843,7 +6843,7 @@ public struct FfiConverterTypeQuality: FfiConverterRustBuffer {
         
         case let .fixed(qualityLevel):
             writeInt(&buf, Int32(2))
-            FfiConverterUInt32.write(qualityLevel, into: &buf)
+            FfiConverterTypeInt.write(qualityLevel, into: &buf)
             
         }
     }
@@ -7489,30 +7489,6 @@ public func FfiConverterTypeYuvMatrix_lower(_ value: YuvMatrix) -> RustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterOptionUInt32: FfiConverterRustBuffer {
-    typealias SwiftType = UInt32?
-
-    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
-        guard let value = value else {
-            writeInt(&buf, Int8(0))
-            return
-        }
-        writeInt(&buf, Int8(1))
-        FfiConverterUInt32.write(value, into: &buf)
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
-        switch try readInt(&buf) as Int8 {
-        case 0: return nil
-        case 1: return try FfiConverterUInt32.read(from: &buf)
-        default: throw UniffiInternalError.unexpectedOptionalTag
-        }
-    }
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
 fileprivate struct FfiConverterOptionFloat: FfiConverterRustBuffer {
     typealias SwiftType = Float?
 
@@ -7633,6 +7609,30 @@ fileprivate struct FfiConverterOptionTypeStageListener: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionTypeCameraPose: FfiConverterRustBuffer {
+    typealias SwiftType = CameraPose?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeCameraPose.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeCameraPose.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeCameras: FfiConverterRustBuffer {
     typealias SwiftType = Cameras?
 
@@ -7681,30 +7681,6 @@ fileprivate struct FfiConverterOptionTypeConfidenceInfo: FfiConverterRustBuffer 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterOptionTypePose: FfiConverterRustBuffer {
-    typealias SwiftType = Pose?
-
-    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
-        guard let value = value else {
-            writeInt(&buf, Int8(0))
-            return
-        }
-        writeInt(&buf, Int8(1))
-        FfiConverterTypePose.write(value, into: &buf)
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
-        switch try readInt(&buf) as Int8 {
-        case 0: return nil
-        case 1: return try FfiConverterTypePose.read(from: &buf)
-        default: throw UniffiInternalError.unexpectedOptionalTag
-        }
-    }
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
 fileprivate struct FfiConverterOptionTypeDropReason: FfiConverterRustBuffer {
     typealias SwiftType = DropReason?
 
@@ -7729,8 +7705,8 @@ fileprivate struct FfiConverterOptionTypeDropReason: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterOptionTypeMethod: FfiConverterRustBuffer {
-    typealias SwiftType = Method?
+fileprivate struct FfiConverterOptionTypeHologramMethod: FfiConverterRustBuffer {
+    typealias SwiftType = HologramMethod?
 
     public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
         guard let value = value else {
@@ -7738,13 +7714,37 @@ fileprivate struct FfiConverterOptionTypeMethod: FfiConverterRustBuffer {
             return
         }
         writeInt(&buf, Int8(1))
-        FfiConverterTypeMethod.write(value, into: &buf)
+        FfiConverterTypeHologramMethod.write(value, into: &buf)
     }
 
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
         switch try readInt(&buf) as Int8 {
         case 0: return nil
-        case 1: return try FfiConverterTypeMethod.read(from: &buf)
+        case 1: return try FfiConverterTypeHologramMethod.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterOptionTypeInt: FfiConverterRustBuffer {
+    typealias SwiftType = Int?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeInt.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeInt.read(from: &buf)
         default: throw UniffiInternalError.unexpectedOptionalTag
         }
     }
@@ -7849,11 +7849,57 @@ fileprivate struct FfiConverterSequenceTypeQualityLevel: FfiConverterRustBuffer 
         return seq
     }
 }
+
+
+
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeInt: FfiConverter {
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Int {
+        let builtinValue = try FfiConverterInt32.read(from: &buf)
+        return Int(builtinValue)
+    }
+
+    public static func write(_ value: Int, into buf: inout [UInt8]) {
+        let builtinValue = Int32(clamping: value)
+        return FfiConverterInt32.write(builtinValue, into: &buf)
+    }
+
+    public static func lift(_ value: Int32) throws -> Int {
+        let builtinValue = try FfiConverterInt32.lift(value)
+        return Int(builtinValue)
+    }
+
+    public static func lower(_ value: Int) -> Int32 {
+        let builtinValue = Int32(clamping: value)
+        return FfiConverterInt32.lower(builtinValue)
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeInt_lift(_ value: Int32) throws -> Int {
+    return try FfiConverterTypeInt.lift(value)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeInt_lower(_ value: Int) -> Int32 {
+    return FfiConverterTypeInt.lower(value)
+}
+
 /**
  * Returns the version of the library.
  */
-public func version()throws  -> String  {
-    return try  FfiConverterString.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+public func version() -> String  {
+    return try!  FfiConverterString.lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_func_version(uniffiCallStatus
     )
@@ -7865,8 +7911,8 @@ public func version()throws  -> String  {
  * # Errors
  * Returns an error if the text is not TOML, a key is unknown, or a value is out of its range.
  */
-public func displayFromToml(text: String)throws  -> Display  {
-    return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+public func displayFromToml(text: String)throws  -> HologramDisplay  {
+    return try  FfiConverterTypeHologramDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_func_display_from_toml(
         FfiConverterString.lower(text),uniffiCallStatus
@@ -7907,12 +7953,12 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
  * correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
  * built-in network, or the plane sweep if that network was not trained for the display.
  */
-public func sessionOptions(target: Target, method: Method? = nil)throws  -> SessionOptions  {
+public func sessionOptions(target: HologramTarget, method: HologramMethod? = nil)throws  -> SessionOptions  {
     return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_func_session_options(
-        FfiConverterTypeTarget_lower(target),
-        FfiConverterOptionTypeMethod.lower(method),uniffiCallStatus
+        FfiConverterTypeHologramTarget_lower(target),
+        FfiConverterOptionTypeHologramMethod.lower(method),uniffiCallStatus
     )
 })
 }
@@ -7946,7 +7992,7 @@ private let initializationResult: InitializationResult = {
     if bindings_contract_version != scaffolding_contract_version {
         return InitializationResult.contractVersionMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_version() != 13103) {
+    if (uniffi_phasefront_ffi_checksum_func_version() != 10081) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_display_from_toml() != 13134) {
@@ -7958,7 +8004,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 22076) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_session_options() != 39077) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 44888) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 4710) {
@@ -7967,64 +8013,64 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_field() != 60806) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 20279) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 15062) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_output() != 54920) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_output() != 41211) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 35825) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 49260) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len() != 19262) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len() != 39135) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 61711) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 64900) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_refocus() != 61631) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 23440) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 9110) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_z_at() != 61239) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_z_at() != 53543) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_address() != 56412) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_address() != 51676) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_byte_len() != 11697) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_byte_len() != 21355) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_height() != 9220) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_height() != 42953) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_pixel_bytes() != 32474) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_pixel_bytes() != 7485) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_share() != 53876) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_share() != 42777) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 13523) {
+    if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 12776) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 57768) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 3309) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_height() != 6101) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_height() != 7087) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes() != 53355) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes() != 10166) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address() != 3110) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address() != 56245) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_share() != 2176) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_share() != 43043) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawplanes_width() != 10297) {
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_width() != 65362) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 36303) {
@@ -8033,13 +8079,13 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawmodulator_pack() != 23) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_target() != 23176) {
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_target() != 52954) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_unpack() != 17997) {
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_unpack() != 55891) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_network_info() != 43693) {
+    if (uniffi_phasefront_ffi_checksum_method_hologramnetwork_info() != 60467) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawsession_pause() != 858) {
@@ -8060,10 +8106,10 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_set_thermal() != 45198) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 26363) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 31301) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_statistics() != 51750) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_statistics() != 48485) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawsession_submit() != 52858) {
@@ -8075,19 +8121,19 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_processed() != 62587) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 46500) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 19014) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 39004) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 63951) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 20376) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 38114) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_closed() != 26264) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_target_display() != 58091) {
+    if (uniffi_phasefront_ffi_checksum_method_hologramtarget_display() != 62232) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin() != 26666) {
@@ -8096,7 +8142,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 39953) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field() != 44076) {
+    if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field() != 1349) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_from_toml() != 51094) {
@@ -8105,28 +8151,28 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named() != 21491) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 54161) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramnetwork_built_in() != 26010) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_from_bytes() != 56712) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramnetwork_from_bytes() != 48027) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_from_file() != 63750) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramnetwork_from_file() != 53004) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_rawsession_new() != 22536) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_from_bytes() != 27479) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramtarget_from_bytes() != 7656) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_from_file() != 30189) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramtarget_from_file() != 15931) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_of_display() != 14418) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramtarget_of_display() != 37189) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_target_with_look_up_table() != 56450) {
+    if (uniffi_phasefront_ffi_checksum_constructor_hologramtarget_with_look_up_table() != 46890) {
         return InitializationResult.apiChecksumMismatch
     }
 

@@ -7,15 +7,15 @@ import kotlin.math.sqrt
 import kotlin.test.Test
 import kotlin.test.assertContains
 import kotlin.test.assertTrue
+import org.phasefront.CameraFrame
 import org.phasefront.ColourFormat
 import org.phasefront.ColourImage
 import org.phasefront.DepthFormat
 import org.phasefront.DepthImage
-import org.phasefront.Display
-import org.phasefront.Frame
-import org.phasefront.Plane
+import org.phasefront.HologramDisplay
+import org.phasefront.HologramSession
+import org.phasefront.ImagePlane
 import org.phasefront.RunningMode
-import org.phasefront.Session
 import org.phasefront.sessionOptions
 import org.phasefront.thirdPartyNotices
 
@@ -39,15 +39,15 @@ class SampleTest {
         val (colour, depth) = image("scene_rgb.jpg") to image("scene_depth.png")
         val rgb = direct(colour, 3 * colour.width * colour.height) { put(it.toByte()) }
         val d = direct(depth, 2 * depth.width * depth.height) { putShort(it.toShort()) }
-        val frame = Frame(
+        val frame = CameraFrame(
             0,
             ColourImage(ColourFormat.RGB, colour.width, colour.height, rgb),
-            DepthImage(DepthFormat.NORMALIZED_U16, depth.width, depth.height, Plane(d, 2 * depth.width, 2)),
+            DepthImage(DepthFormat.NORMALIZED_U16, depth.width, depth.height, ImagePlane(d, 2 * depth.width, 2)),
         )
         // The sides of the image are twelve times those of the view.
         val (width, height) = 160 to 90
-        val options = sessionOptions(Display(width = 480u, height = 270u))
-        Session(options, RunningMode.IMAGE).use { session ->
+        val options = sessionOptions(HologramDisplay(width = 480, height = 270))
+        HologramSession(options, RunningMode.IMAGE).use { session ->
             session.process(frame).use { hologram ->
                 hologram.preview(hologram.zAt(0.5, 0.5), width, height).use { view ->
                     val shown = view.useBytes { seen ->

@@ -7,7 +7,7 @@ import java.nio.ByteBuffer
  *
  * @throws PhasefrontException.Network if it is not a hologram network. The message names the problem and the remedy.
  */
-public fun Network.Companion.fromBytes(onnx: ByteBuffer): Network = fromMemory(
+public fun HologramNetwork.Companion.fromBytes(onnx: ByteBuffer): HologramNetwork = fromMemory(
     onnx.direct { PhasefrontException.Network("network: it is $it; a direct one is needed, from ByteBuffer.allocateDirect") },
 )
 
@@ -17,11 +17,11 @@ public fun Network.Companion.fromBytes(onnx: ByteBuffer): Network = fromMemory(
  *
  * @throws PhasefrontException.Setting if it is not such a file. The message names the problem.
  */
-public fun Target.Companion.fromBytes(file: ByteBuffer): Target = fromMemory(
+public fun HologramTarget.Companion.fromBytes(file: ByteBuffer): HologramTarget = fromMemory(
     file.direct { PhasefrontException.Setting("calibration file: it is $it; a direct one is needed, from ByteBuffer.allocateDirect") },
 )
 
 /** Returns the third-party notices of the library as Markdown. An app must show them with its own notices. */
-public fun thirdPartyNotices(): String = checkNotNull(Session::class.java.getResourceAsStream("THIRD-PARTY.md")) {
+public fun thirdPartyNotices(): String = checkNotNull(HologramSession::class.java.getResourceAsStream("THIRD-PARTY.md")) {
     "the notices are not in this package; take it as it is published"
 }.use { it.readBytes().decodeToString() }

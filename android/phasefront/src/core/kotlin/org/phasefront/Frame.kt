@@ -6,7 +6,7 @@ import java.nio.ByteBuffer
  * One plane of an image in memory that the platform owns: the bytes of [buffer] from its position to its limit. It must
  * be a direct buffer, as the platform's buffers are. A session reads it only during the call that takes the frame.
  */
-public class Plane(
+public class ImagePlane(
     public val buffer: ByteBuffer,
     /** The bytes from one row to the next. */
     public val rowStride: Int,
@@ -17,7 +17,7 @@ public class Plane(
         if (rowStride < 0 || pixelStride < 0) {
             throw PhasefrontException.Frame("frame: $what: strides of $rowStride and $pixelStride bytes; they must not be negative")
         }
-        return PlaneInfo(rowStride.toUInt(), pixelStride.toUInt())
+        return PlaneInfo(rowStride, pixelStride)
     }
 
     /** Returns the bytes in a buffer that begins with them. */
@@ -41,7 +41,7 @@ public class ColourImage(
     /** The height in pixels. */
     public val height: Int,
     /** The planes, in the order of the format. */
-    public val planes: List<Plane>,
+    public val planes: List<ImagePlane>,
     /** The matrix of luma and chroma. RGB formats ignore it. */
     public val matrix: YuvMatrix = YuvMatrix.BT601,
     /** Whether luma spans 16..235 and chroma 16..240. RGB formats ignore it. */
@@ -52,7 +52,7 @@ public class ColourImage(
         format,
         width,
         height,
-        if (format == ColourFormat.RGB) listOf(Plane(bytes, 3 * width, 3)) else listOf(Plane(bytes, 4 * width, 4)),
+        if (format == ColourFormat.RGB) listOf(ImagePlane(bytes, 3 * width, 3)) else listOf(ImagePlane(bytes, 4 * width, 4)),
     )
 }
 
@@ -63,7 +63,7 @@ public class ConfidenceMap(
     public val width: Int,
     /** The height in pixels, equal to that of the depth image. */
     public val height: Int,
-    public val plane: Plane,
+    public val plane: ImagePlane,
 )
 
 /** A depth image from a sensor. */
@@ -73,7 +73,7 @@ public class DepthImage(
     public val width: Int,
     /** The height in pixels. */
     public val height: Int,
-    public val plane: Plane,
+    public val plane: ImagePlane,
     /** The confidence of the readings, if known. */
     public val confidence: ConfidenceMap? = null,
 ) {
@@ -82,7 +82,7 @@ public class DepthImage(
         format,
         width,
         height,
-        Plane(bytes, format.pixelBytes * width, format.pixelBytes),
+        ImagePlane(bytes, format.pixelBytes * width, format.pixelBytes),
     )
 }
 
@@ -95,7 +95,7 @@ public val DepthFormat.pixelBytes: Int
     }
 
 /** A colour image and a depth image of the same moment. */
-public class Frame(
+public class CameraFrame(
     /** The capture time in nanoseconds of any monotonic clock. */
     public val timestampNs: Long,
     public val colour: ColourImage,
@@ -106,7 +106,7 @@ public class Frame(
     public val cameras: Cameras? = null,
 ) {
     internal fun info(): FrameInfo = FrameInfo(
-        timestampNs = timestampNs.toULong(),
+        timestampNs = timestampNs,
         colour = ColourInfo(
             format = colour.format,
             width = size("colour", colour.width),
@@ -134,9 +134,9 @@ public class Frame(
 
     internal fun confidenceBytes(): ByteBuffer = depth.confidence?.plane?.bytes("confidence") ?: empty
 
-    private fun size(what: String, pixels: Int): UInt {
+    private fun size(what: String, pixels: Int): Int {
         if (pixels < 0) throw PhasefrontException.Frame("frame: $what has a side of $pixels pixels; it must be at least 1")
-        return pixels.toUInt()
+        return pixels
     }
 }
 

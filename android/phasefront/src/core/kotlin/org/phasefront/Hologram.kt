@@ -37,7 +37,7 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
      */
     public fun <R> usePlane(colour: Colour, body: (ByteBuffer) -> R): R = open {
         it.share().use { shared ->
-            body(memory(shared.planeAddress(colour.ordinal.toUInt()), shared.planeLen()))
+            body(memory(shared.planeAddress(colour.ordinal), shared.planeLen()))
         }
     }
 
@@ -55,7 +55,7 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
         if (width < 1 || height < 1) {
             throw PhasefrontException.Setting("a preview of $width×$height is empty; each side must be at least 1")
         }
-        return PixelImage(open { it.preview(zMm, width.toUInt(), height.toUInt()) })
+        return PixelImage(open { it.preview(zMm, width, height) })
     }
 
     /**
@@ -79,9 +79,9 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
      * Returns image [index] of the images for the modulator's driver, at the modulator's resolution, with unchanged
      * levels. All layouts except grey have one image.
      */
-    public fun output(placement: Placement = Placement(Layout.RGBA), index: Int = 0): PixelImage {
+    public fun output(placement: Placement = Placement(ModulatorLayout.RGBA), index: Int = 0): PixelImage {
         if (index < 0) throw PhasefrontException.Setting("there is no image $index; the first is 0")
-        return PixelImage(open { it.output(placement, index.toUInt()) })
+        return PixelImage(open { it.output(placement, index) })
     }
 
     /** Frees the memory. Closing twice does nothing. */
@@ -96,16 +96,16 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
 /** The amplitudes or the complex field of a hologram, for each pixel and colour. Close it as you close a hologram. */
 public class Planes internal constructor(private val raw: RawPlanes) : AutoCloseable {
     /** The width in pixels. */
-    public val width: Int = raw.width().toInt()
+    public val width: Int = raw.width()
 
     /** The height in pixels. */
-    public val height: Int = raw.height().toInt()
+    public val height: Int = raw.height()
 
     /** The number of planes: 3, or 1 for a display with a single laser. */
-    public val colours: Int = raw.colours().toInt()
+    public val colours: Int = raw.colours()
 
     /** The numbers per pixel: 1 for an amplitude, 2 for a real and an imaginary part. */
-    public val numbers: Int = raw.pixelBytes().toInt() / Float.SIZE_BYTES
+    public val numbers: Int = raw.pixelBytes() / Float.SIZE_BYTES
 
     /**
      * Reads the plane of [colour] in place: [height] rows of [width] pixels without gaps. The buffer is valid only in
@@ -119,7 +119,7 @@ public class Planes internal constructor(private val raw: RawPlanes) : AutoClose
         }
         return raw.share().use {
             val len = Float.SIZE_BYTES.toULong() * (numbers.toLong() * width * height).toULong()
-            val bytes = memory(it.planeAddress(colour.ordinal.toUInt()), len)
+            val bytes = memory(it.planeAddress(colour.ordinal), len)
             body(bytes.order(ByteOrder.nativeOrder()).asFloatBuffer())
         }
     }
@@ -130,11 +130,11 @@ public class Planes internal constructor(private val raw: RawPlanes) : AutoClose
 
 /** An image whose rows have no gaps. */
 public class PixelImage internal constructor(private val raw: RawImage) : AutoCloseable {
-    public val width: Int = raw.width().toInt()
-    public val height: Int = raw.height().toInt()
+    public val width: Int = raw.width()
+    public val height: Int = raw.height()
 
     /** The number of bytes per pixel. */
-    public val pixelBytes: Int = raw.pixelBytes().toInt()
+    public val pixelBytes: Int = raw.pixelBytes()
 
     /**
      * Reads the image in place. The buffer is valid only in [body], even if another thread closes the image meanwhile.

@@ -1,7 +1,7 @@
 package org.phasefront
 
 /** The log messages of the library. */
-public object Log {
+public object HologramLog {
     /** Sends messages of [level] and above to [handler], which may be called on any thread. null turns them off. */
     public fun send(level: LogLevel, handler: ((LogLevel, String) -> Unit)?) {
         setLogListener(level, handler?.let { Handler(it) })

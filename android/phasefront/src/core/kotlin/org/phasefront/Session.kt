@@ -11,7 +11,7 @@ import kotlinx.coroutines.flow.flow
  * [warmUp] and [close] wait for a frame, so do not call them on the main thread.
  *
  * ```kotlin
- * Session(sessionOptions(), RunningMode.IMAGE).use { session ->
+ * HologramSession(sessionOptions(), RunningMode.IMAGE).use { session ->
  *     session.process(frame).use { hologram -> hologram.usePlane(Colour.GREEN) { println(it.remaining()) } }
  * }
  * ```
@@ -21,7 +21,7 @@ import kotlinx.coroutines.flow.flow
  *
  * @throws PhasefrontException if the options are invalid or cannot be planned for.
  */
-public class Session(
+public class HologramSession(
     options: SessionOptions,
     mode: RunningMode,
     listener: ((SessionEvent) -> Unit)? = null,
@@ -52,7 +52,7 @@ public class Session(
      * @throws PhasefrontException if the frame is unusable or late, or if the session is a live stream, paused or
      * closed. Later frames are not affected.
      */
-    public fun process(frame: Frame): Hologram = Hologram(
+    public fun process(frame: CameraFrame): Hologram = Hologram(
         raw.process(
             frame.colourBytes(0),
             frame.colourBytes(1),
@@ -70,7 +70,7 @@ public class Session(
      * @throws PhasefrontException if the frame is unusable or late, or if the session is not a live stream or is
      * closed. Later frames are not affected.
      */
-    public fun submit(frame: Frame): DropReason? = raw.submit(
+    public fun submit(frame: CameraFrame): DropReason? = raw.submit(
         frame.colourBytes(0),
         frame.colourBytes(1),
         frame.colourBytes(2),
@@ -97,8 +97,8 @@ public class Session(
     /** Sets whether the session may change its quality level. */
     public fun setQuality(quality: Quality): Unit = raw.setQuality(quality)
 
-    /** Returns the session's statistics, also after it is closed. Never blocks on a frame. */
-    public fun statistics(): Statistics = raw.statistics()
+    /** The session's statistics, also after it is closed. Never blocks on a frame. */
+    public val statistics: Statistics get() = raw.statistics()
 
     /**
      * Stops accepting frames and frees the memory. Returned holograms stay valid. Waits until all events are delivered,
@@ -130,15 +130,15 @@ public sealed interface SessionEvent {
  *
  * @throws PhasefrontException.Display for an impossible display.
  */
-public fun sessionOptions(display: Display = Display(), method: Method? = null): SessionOptions =
-    Target.ofDisplay(display).use { sessionOptions(it, method) }
+public fun sessionOptions(display: HologramDisplay = HologramDisplay(), method: HologramMethod? = null): SessionOptions =
+    HologramTarget.ofDisplay(display).use { sessionOptions(it, method) }
 
 /** Returns the default options for [display] and [network]. */
-public fun sessionOptions(display: Display = Display(), network: Network): SessionOptions =
-    sessionOptions(display, Method.Trained(network))
+public fun sessionOptions(display: HologramDisplay = HologramDisplay(), network: HologramNetwork): SessionOptions =
+    sessionOptions(display, HologramMethod.Trained(network))
 
 /** Returns the default options for [target], a calibrated display, and [network]. */
-public fun sessionOptions(target: Target, network: Network): SessionOptions = sessionOptions(target, Method.Trained(network))
+public fun sessionOptions(target: HologramTarget, network: HologramNetwork): SessionOptions = sessionOptions(target, HologramMethod.Trained(network))
 
 /** Forwards the library's callbacks. */
 private class Listener(
@@ -147,16 +147,16 @@ private class Listener(
 ) : SessionListener {
     override fun onProcessed(hologram: RawHologram) = attached { tell(SessionEvent.Processed(Hologram(hologram))) }
 
-    override fun onDropped(timestampNs: ULong, reason: DropReason) = attached {
-        tell(SessionEvent.Dropped(timestampNs.toLong(), reason))
+    override fun onDropped(timestampNs: Long, reason: DropReason) = attached {
+        tell(SessionEvent.Dropped(timestampNs, reason))
     }
 
-    override fun onFailed(timestampNs: ULong, message: String) = attached {
-        tell(SessionEvent.Failed(timestampNs.toLong(), message))
+    override fun onFailed(timestampNs: Long, message: String) = attached {
+        tell(SessionEvent.Failed(timestampNs, message))
     }
 
-    override fun onQualityChanged(timestampNs: ULong, change: QualityChange) = attached {
-        tell(SessionEvent.QualityChanged(timestampNs.toLong(), change))
+    override fun onQualityChanged(timestampNs: Long, change: QualityChange) = attached {
+        tell(SessionEvent.QualityChanged(timestampNs, change))
     }
 
     override fun onClosed() = attached(end)
@@ -184,7 +184,7 @@ internal class EventQueue {
             if (event !is SessionEvent.Processed || ++holograms <= MOST_HOLOGRAMS) return@synchronized null
             holograms--
             val oldest = waiting.first { it is SessionEvent.Processed } as SessionEvent.Processed
-            val dropped = SessionEvent.Dropped(oldest.hologram.info.timestampNs.toLong(), DropReason.UNREAD)
+            val dropped = SessionEvent.Dropped(oldest.hologram.info.timestampNs, DropReason.UNREAD)
             val kept = waiting.map { if (it === oldest) dropped else it }
             waiting.clear()
             waiting.addAll(kept)

@@ -1,7 +1,7 @@
 package org.phasefront
 
 /** The begin and end of each stage of a frame. */
-public object Trace {
+public object HologramTrace {
     /**
      * Calls [handler] with each stage that begins (true) or ends (false), on the thread that computes it. Stages on a
      * thread are nested. null turns the calls off. The handler must not call the library.

@@ -54,7 +54,7 @@ public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: B
     return Orientation(rotation, isFront)
 }
 
-private fun Image.Plane.toPlane(): Plane = Plane(buffer, rowStride, pixelStride)
+private fun Image.Plane.toPlane(): ImagePlane = ImagePlane(buffer, rowStride, pixelStride)
 
 /**
  * Copies the image into a bitmap: into [to] if it is mutable and has the same size and the configuration ARGB_8888,

@@ -3,7 +3,7 @@ package org.phasefront
 import android.os.PowerManager
 
 /** Sends messages of [level] and above to logcat, under the tag "phasefront". */
-public fun Log.sendToLogcat(level: LogLevel = LogLevel.INFO) {
+public fun HologramLog.sendToLogcat(level: LogLevel = LogLevel.INFO) {
     send(level) { of, message ->
         val priority = when (of) {
             LogLevel.ERROR -> android.util.Log.ERROR
@@ -16,7 +16,7 @@ public fun Log.sendToLogcat(level: LogLevel = LogLevel.INFO) {
 }
 
 /** Sends the stages to Perfetto and Android Studio's profiler as sections of the app's trace. */
-public fun Trace.sendToSystem() {
+public fun HologramTrace.sendToSystem() {
     send { stage, begins ->
         when {
             begins -> android.os.Trace.beginSection("phasefront ${stage.name.lowercase()}")

@@ -13,9 +13,9 @@ class BorderTest {
         for (i in 0 until colour.capacity()) colour.put((i * 7 / 5).toByte())
         colour.flip()
         val chroma = colour.duplicate().position(1920 * 1440).slice()
-        val frame = Frame(
+        val frame = CameraFrame(
             0,
-            ColourImage(ColourFormat.NV12, 1920, 1440, listOf(Plane(colour, 1920, 1), Plane(chroma, 1920, 2))),
+            ColourImage(ColourFormat.NV12, 1920, 1440, listOf(ImagePlane(colour, 1920, 1), ImagePlane(chroma, 1920, 2))),
             DepthImage(
                 DepthFormat.METRES_F32,
                 256,
@@ -23,7 +23,7 @@ class BorderTest {
                 direct(4 * 256 * 192).apply { while (hasRemaining()) putFloat(0.5f + position() * 1e-6f) }.flip(),
             ),
         )
-        Session(sessionOptions(network = network), RunningMode.IMAGE).use { session ->
+        HologramSession(sessionOptions(network = network), RunningMode.IMAGE).use { session ->
             val levels = ByteArray(1920 * 1080)
             val added = MutableList((System.getenv("PHASEFRONT_BORDER") ?: "1").toInt() + 5) {
                 val start = System.nanoTime()

@@ -19,14 +19,14 @@ class ConformanceTest {
 
     private fun JSONArray.objects(): List<JSONObject> = List(length()) { getJSONObject(it) }
 
-    private fun plane(plane: JSONObject): Plane {
+    private fun plane(plane: JSONObject): ImagePlane {
         // Not sliced, because the wrapper must handle positions itself.
         val bytes = memory.duplicate()
         bytes.position(plane.getInt("offset")).limit(plane.getInt("offset") + plane.getInt("length"))
-        return Plane(bytes, plane.getInt("row_stride"), plane.getInt("pixel_stride"))
+        return ImagePlane(bytes, plane.getInt("row_stride"), plane.getInt("pixel_stride"))
     }
 
-    private fun frame(case: JSONObject): Frame {
+    private fun frame(case: JSONObject): CameraFrame {
         val colour = case.getJSONObject("colour")
         val depth = case.getJSONObject("depth")
         val confidence = case.optJSONObject("confidence")?.let {
@@ -55,7 +55,7 @@ class ConformanceTest {
             270 -> Rotation.CLOCKWISE270
             else -> error("$degrees")
         }
-        return Frame(
+        return CameraFrame(
             case.getLong("timestamp_ns"),
             ColourImage(
                 ColourFormat.valueOf(colour.getString("format").uppercase()),
@@ -76,26 +76,26 @@ class ConformanceTest {
         )
     }
 
-    private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
-        "network" -> Method.Trained(network)
-        "sweep" -> Method.Sweep
-        "auto" -> Method.Auto(network)
-        else -> Method.Trained(model(name))
+    private fun method(case: JSONObject): HologramMethod = when (val name = case.getString("method")) {
+        "network" -> HologramMethod.Trained(network)
+        "sweep" -> HologramMethod.Sweep
+        "auto" -> HologramMethod.Auto(network)
+        else -> HologramMethod.Trained(model(name))
     }
 
-    private fun model(file: String): Network = Network.fromFile(folder.resolve("../../models/$file").path)
+    private fun model(file: String): HologramNetwork = HologramNetwork.fromFile(folder.resolve("../../models/$file").path)
 
-    private fun target(case: JSONObject): Target {
-        if (!case.isNull("calibration")) return Target.fromFile(folder.resolve(case.getString("calibration")).path)
+    private fun target(case: JSONObject): HologramTarget {
+        if (!case.isNull("calibration")) return HologramTarget.fromFile(folder.resolve(case.getString("calibration")).path)
         val display = displayFromToml(case.getString("display"))
-        val levels = case.optJSONArray("lut") ?: return Target.ofDisplay(display)
-        return Target.withLookUpTable(display, ByteArray(levels.length()) { levels.getInt(it).toByte() })
+        val levels = case.optJSONArray("lut") ?: return HologramTarget.ofDisplay(display)
+        return HologramTarget.withLookUpTable(display, ByteArray(levels.length()) { levels.getInt(it).toByte() })
     }
 
     private fun options(case: JSONObject): SessionOptions = sessionOptions(target(case), method(case)).copy(
         encoding = when (val name = case.getString("encoding")) {
             "double-phase" -> Encoding.DoublePhase
-            "anti-alias" -> Encoding.AntiAlias(0.7f, 3u)
+            "anti-alias" -> Encoding.AntiAlias(0.7f, 3)
             "band-limit" -> Encoding.BandLimit(1.0f)
             else -> Encoding.Deep(model(name))
         },
@@ -106,7 +106,7 @@ class ConformanceTest {
 
     /** Returns the levels of a case's frames and appends their displayed images to [seen]. */
     private fun levels(case: JSONObject, seen: ByteArrayOutputStream): ByteArray =
-        Session(options(case), RunningMode.valueOf(case.getString("mode").uppercase())).use { session ->
+        HologramSession(options(case), RunningMode.valueOf(case.getString("mode").uppercase())).use { session ->
             val all = ByteArrayOutputStream()
             for (frame in case.getJSONArray("frames").objects()) {
                 session.process(frame(frame)).use { hologram ->

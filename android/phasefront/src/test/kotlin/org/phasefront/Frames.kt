@@ -7,8 +7,8 @@ import kotlin.test.assertEquals
 /** Returns a direct buffer of [size] bytes in little-endian order. */
 internal fun direct(size: Int): ByteBuffer = ByteBuffer.allocateDirect(size).order(ByteOrder.LITTLE_ENDIAN)
 
-internal val network: Network by lazy { Network.builtIn() }
-internal val display: Display = Display(width = 64u, height = 48u)
+internal val network: HologramNetwork by lazy { HologramNetwork.builtIn() }
+internal val display: HologramDisplay = HologramDisplay(width = 64, height = 48)
 
 internal fun options(): SessionOptions = sessionOptions(display, network)
 
@@ -36,7 +36,7 @@ internal fun still(
     timestampNs: Long = 0,
     colour: ByteBuffer = colourBytes(),
     depth: ByteBuffer = depthBytes(),
-): Frame = Frame(
+): CameraFrame = CameraFrame(
     timestampNs,
     ColourImage(ColourFormat.RGBA, 64, 48, colour),
     DepthImage(DepthFormat.METRES_F32, 32, 24, depth),
@@ -44,8 +44,8 @@ internal fun still(
 
 /** The levels of all colours. */
 internal fun Hologram.levels(): ByteArray {
-    val size = info.width.toInt() * info.height.toInt()
-    val colours = Colour.entries.take(info.colours.toInt())
+    val size = info.width * info.height
+    val colours = Colour.entries.take(info.colours)
     val all = ByteArray(colours.size * size)
     for (colour in colours) usePlane(colour) { it.get(all, colour.ordinal * size, size) }
     return all

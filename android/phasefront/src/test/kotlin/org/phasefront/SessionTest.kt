@@ -23,7 +23,7 @@ import kotlinx.coroutines.runBlocking
 
 /** Tests sessions from Kotlin: threads, live streams, misuse and memory. */
 class SessionTest {
-    private fun <T> image(use: (Session) -> T): T = Session(options(), RunningMode.IMAGE).use(use)
+    private fun <T> image(use: (HologramSession) -> T): T = HologramSession(options(), RunningMode.IMAGE).use(use)
 
     private inline fun <reified E : PhasefrontException> assertRefused(words: String, noinline call: () -> Any?) {
         val message = assertFailsWith<E> { call() }.message.orEmpty()
@@ -71,16 +71,16 @@ class SessionTest {
 
     @Test
     fun unusableFramesAreNamed() = image { session ->
-        fun colour(width: Int, height: Int, vararg planes: Plane) =
-            Frame(0, ColourImage(ColourFormat.RGBA, width, height, planes.toList()), still().depth)
+        fun colour(width: Int, height: Int, vararg planes: ImagePlane) =
+            CameraFrame(0, ColourImage(ColourFormat.RGBA, width, height, planes.toList()), still().depth)
         val bytes = colourBytes()
-        assertRefused<PhasefrontException.Frame>("64×0") { session.process(colour(64, 0, Plane(bytes, 256, 4))) }
-        assertRefused<PhasefrontException.Frame>("-64") { session.process(colour(-64, 48, Plane(bytes, 256, 4))) }
-        assertRefused<PhasefrontException.Frame>("must not be negative") { session.process(colour(64, 48, Plane(bytes, -256, 4))) }
-        assertRefused<PhasefrontException.Frame>("row stride") { session.process(colour(64, 48, Plane(bytes, 200, 4))) }
-        assertRefused<PhasefrontException.Frame>("pixel stride") { session.process(colour(64, 48, Plane(bytes, 256, 1))) }
+        assertRefused<PhasefrontException.Frame>("64×0") { session.process(colour(64, 0, ImagePlane(bytes, 256, 4))) }
+        assertRefused<PhasefrontException.Frame>("-64") { session.process(colour(-64, 48, ImagePlane(bytes, 256, 4))) }
+        assertRefused<PhasefrontException.Frame>("must not be negative") { session.process(colour(64, 48, ImagePlane(bytes, -256, 4))) }
+        assertRefused<PhasefrontException.Frame>("row stride") { session.process(colour(64, 48, ImagePlane(bytes, 200, 4))) }
+        assertRefused<PhasefrontException.Frame>("pixel stride") { session.process(colour(64, 48, ImagePlane(bytes, 256, 1))) }
         assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48)) }
-        assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48, *Array(4) { Plane(bytes, 256, 4) })) }
+        assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48, *Array(4) { ImagePlane(bytes, 256, 4) })) }
         session.process(still()).close()
     }
 
@@ -136,7 +136,7 @@ class SessionTest {
             val levels = hologram.levels()
             val rgba = hologram.output().use { image -> image.useBytes { bytes -> ByteArray(bytes.remaining()).also { bytes.get(it) } } }
             assertContentEquals(levels.copyOf(64 * 48), ByteArray(64 * 48) { rgba[4 * it] })
-            hologram.output(Placement(Layout.GREY, flipX = true), 2).use { image ->
+            hologram.output(Placement(ModulatorLayout.GREY, flipX = true), 2).use { image ->
                 assertEquals(1, image.pixelBytes)
                 image.useBytes { assertEquals(levels[2 * 64 * 48 + 63], it.get(0)) }
             }
@@ -148,10 +148,10 @@ class SessionTest {
     fun aLiveStreamAnswersEveryFrameOnItsOwnThread() {
         val answered = Collections.synchronizedList(mutableListOf<Long>())
         val threads = Collections.synchronizedSet(mutableSetOf<Thread>())
-        val session = Session(options(), RunningMode.LIVE) { event ->
+        val session = HologramSession(options(), RunningMode.LIVE) { event ->
             threads.add(Thread.currentThread())
             when (event) {
-                is SessionEvent.Processed -> event.hologram.use { answered.add(it.info.timestampNs.toLong()) }
+                is SessionEvent.Processed -> event.hologram.use { answered.add(it.info.timestampNs) }
                 is SessionEvent.Dropped -> answered.add(event.timestampNs)
                 else -> error("$event")
             }
@@ -160,15 +160,15 @@ class SessionTest {
         assertEquals((1000L until 1050L).toList(), answered.sorted())
         assertEquals(1, threads.size, "the thread is attached once, not for every call")
         assertFalse(Thread.currentThread() in threads)
-        val statistics = session.statistics()
-        assertEquals(50UL, statistics.submitted)
-        assertEquals(50UL, statistics.processed + statistics.dropped.total)
-        assertEquals(0UL, statistics.listenerFailures)
+        val statistics = session.statistics
+        assertEquals(50, statistics.submitted)
+        assertEquals(50, statistics.processed + statistics.dropped.total)
+        assertEquals(0, statistics.listenerFailures)
     }
 
     @Test
     fun aFlowTellsTheSame() = runBlocking {
-        val session = Session(options(), RunningMode.LIVE)
+        val session = HologramSession(options(), RunningMode.LIVE)
         val submitting = thread {
             for (i in 1L..50L) session.submit(still(i))
             session.close()
@@ -177,7 +177,7 @@ class SessionTest {
         submitting.join()
         val timestamps = events.map {
             when (it) {
-                is SessionEvent.Processed -> it.hologram.use { hologram -> hologram.info.timestampNs.toLong() }
+                is SessionEvent.Processed -> it.hologram.use { hologram -> hologram.info.timestampNs }
                 is SessionEvent.Dropped -> it.timestampNs
                 else -> error("$it")
             }
@@ -187,10 +187,10 @@ class SessionTest {
 
     @Test
     fun anUnreadFlowHoldsTwoHologramsAtMost() = runBlocking {
-        val session = Session(options(), RunningMode.LIVE)
+        val session = HologramSession(options(), RunningMode.LIVE)
         for (i in 1L..8L) {
             session.submit(still(i))
-            while (session.statistics().pending > 0UL) Thread.sleep(1)
+            while (session.statistics.pending > 0) Thread.sleep(1)
         }
         session.close()
         val events = session.events.toList()
@@ -202,7 +202,7 @@ class SessionTest {
     @Test
     fun aLateFrameInAStreamHarmsNothing() {
         val events = LinkedBlockingQueue<SessionEvent>()
-        Session(options(), RunningMode.LIVE, events::add).use { session ->
+        HologramSession(options(), RunningMode.LIVE, events::add).use { session ->
             session.submit(still(5))
             assertIs<SessionEvent.Processed>(events.poll(60, TimeUnit.SECONDS))
             assertRefused<PhasefrontException.Timestamp>("5 ns") { session.submit(still(5)) }
@@ -215,7 +215,7 @@ class SessionTest {
     fun whatAListenerThrowsIsCountedAndTheStreamGoesOn() {
         for (thrown in listOf(IllegalStateException("no thanks"), PhasefrontException.Frame("no thanks"))) {
             val heard = LinkedBlockingQueue<SessionEvent>()
-            val session = Session(options(), RunningMode.LIVE) {
+            val session = HologramSession(options(), RunningMode.LIVE) {
                 heard.add(it)
                 throw thrown
             }
@@ -225,15 +225,15 @@ class SessionTest {
                     assertIs<SessionEvent.Processed>(heard.poll(60, TimeUnit.SECONDS))
                 }
             }
-            assertEquals(3UL, session.statistics().listenerFailures)
+            assertEquals(3L, session.statistics.listenerFailures)
         }
     }
 
     @Test
     fun aListenerMayCloseItsSession() {
         val closed = CountDownLatch(1)
-        lateinit var session: Session
-        session = Session(options(), RunningMode.LIVE) {
+        lateinit var session: HologramSession
+        session = HologramSession(options(), RunningMode.LIVE) {
             session.close()
             closed.countDown()
         }
@@ -260,18 +260,18 @@ class SessionTest {
 
     @Test
     fun aClosedSessionSaysSo() {
-        val session = Session(options(), RunningMode.IMAGE)
+        val session = HologramSession(options(), RunningMode.IMAGE)
         session.process(still()).close()
         session.close()
         session.close()
         val calls = listOf({ session.process(still()) }, session::warmUp, session::reset, session::pause, session::resume)
         for (call in calls) assertRefused<PhasefrontException.Session>("closed; make a new one") { call() }
-        assertEquals(1UL, session.statistics().processed)
+        assertEquals(1L, session.statistics.processed)
     }
 
     @Test
     fun aPausedSessionRefusesAndAResetLetsTimeBeginAnew() {
-        Session(options(), RunningMode.VIDEO).use { session ->
+        HologramSession(options(), RunningMode.VIDEO).use { session ->
             session.warmUp()
             session.process(still(100)).close()
             assertRefused<PhasefrontException.Timestamp>("99 ns") { session.process(still(99)) }
@@ -287,39 +287,39 @@ class SessionTest {
     @Test
     fun modesAreNotMixed() {
         image { session -> assertRefused<PhasefrontException.Session>("not live") { session.submit(still()) } }
-        Session(options(), RunningMode.LIVE) {}.use { session ->
+        HologramSession(options(), RunningMode.LIVE) {}.use { session ->
             assertRefused<PhasefrontException.Session>("submitted") { session.process(still()) }
         }
-        assertRefused<PhasefrontException.Session>("listener") { Session(options(), RunningMode.IMAGE) {} }
+        assertRefused<PhasefrontException.Session>("listener") { HologramSession(options(), RunningMode.IMAGE) {} }
         image { session -> runBlocking { assertEquals(listOf(), session.events.toList()) } }
     }
 
     @Test
     fun networksThatAreNoneAreNamed() {
-        assertRefused<PhasefrontException.File>("nowhere.onnx") { Network.fromFile("/nowhere.onnx") }
-        assertRefused<PhasefrontException.Network>("network") { Network.fromBytes(direct(0)) }
-        assertRefused<PhasefrontException.Network>("allocateDirect") { Network.fromBytes(ByteBuffer.allocate(8)) }
+        assertRefused<PhasefrontException.File>("nowhere.onnx") { HologramNetwork.fromFile("/nowhere.onnx") }
+        assertRefused<PhasefrontException.Network>("network") { HologramNetwork.fromBytes(direct(0)) }
+        assertRefused<PhasefrontException.Network>("allocateDirect") { HologramNetwork.fromBytes(ByteBuffer.allocate(8)) }
         val onnx = File(System.getProperty("phasefront.suite")).resolve("../../models/rgbd-8-int8.onnx").readBytes()
         val positioned = direct(onnx.size + 3).position(3).put(onnx).position(3)
-        assertEquals(8u, Network.fromBytes(positioned).info().layers)
+        assertEquals(8, HologramNetwork.fromBytes(positioned).info().layers)
         val file = File.createTempFile("phasefront", ".onnx")
         try {
             file.writeText("not a network")
-            assertRefused<PhasefrontException.Network>("network") { Network.fromFile(file.path) }
+            assertRefused<PhasefrontException.Network>("network") { HologramNetwork.fromFile(file.path) }
         } finally {
             file.delete()
         }
         val info = network.info()
-        assertEquals(8u to 8.0, info.layers to info.pitchUm)
+        assertEquals(8 to 8.0, info.layers to info.pitchUm)
     }
 
     @Test
     fun theNetworkThatIsBuiltInIsTheDefault() {
         for (offset in listOf(0.0, 3.0, 12.0)) {
             val defaults = sessionOptions(display.copy(offsetMm = offset))
-            assertIs<Method.Trained>(defaults.qualityLevels[0].method)
+            assertIs<HologramMethod.Trained>(defaults.qualityLevels[0].method)
             assertTrue(defaults.encoding is Encoding.AntiAlias)
-            Session(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+            HologramSession(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         }
     }
 
@@ -327,60 +327,60 @@ class SessionTest {
     fun thePairThatIsBuiltInCanBeTaken() {
         val pair = builtInPair(6.0)
         val options = sessionOptions(display.copy(offsetMm = 6.0), pair.hologram).copy(encoding = Encoding.Deep(pair.prefilter))
-        Session(options, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+        HologramSession(options, RunningMode.IMAGE).use { session -> session.process(still()).close() }
     }
 
     @Test
     fun stepsAndDarkCanBeSet() {
         fun levels(options: SessionOptions) =
-            Session(options, RunningMode.IMAGE).use { session -> session.process(still()).use { it.levels() } }
+            HologramSession(options, RunningMode.IMAGE).use { session -> session.process(still()).use { it.levels() } }
         val defaults = sessionOptions(display)
-        assertContentEquals(levels(defaults), levels(defaults.copy(darkThreshold = 0.4f, localSteps = 1u)))
-        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(localSteps = 0u))))
-        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(midpointSteps = 1u))))
-        val qualityLevel = defaults.qualityLevels[0].copy(midpointSteps = 1u)
+        assertContentEquals(levels(defaults), levels(defaults.copy(darkThreshold = 0.4f, localSteps = 1)))
+        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(localSteps = 0))))
+        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(midpointSteps = 1))))
+        val qualityLevel = defaults.qualityLevels[0].copy(midpointSteps = 1)
         assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(qualityLevels = listOf(qualityLevel)))))
-        assertRefused<PhasefrontException>("at most 8") { Session(defaults.copy(localSteps = 9u), RunningMode.IMAGE) }
-        assertRefused<PhasefrontException>("from 0 to 1") { Session(defaults.copy(darkThreshold = 2f), RunningMode.IMAGE) }
+        assertRefused<PhasefrontException>("at most 8") { HologramSession(defaults.copy(localSteps = 9), RunningMode.IMAGE) }
+        assertRefused<PhasefrontException>("from 0 to 1") { HologramSession(defaults.copy(darkThreshold = 2f), RunningMode.IMAGE) }
     }
 
     @Test
     fun withoutANetworkTheSweepIsTheDefault() {
         val defaults = sessionOptions(display.copy(pitchUm = 3.74))
-        assertIs<Method.Sweep>(defaults.qualityLevels[0].method)
-        Session(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+        assertIs<HologramMethod.Sweep>(defaults.qualityLevels[0].method)
+        HologramSession(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         assertRefused<PhasefrontException.Network>("pairs for 0, 6, 12 mm") { builtInPair(3.0) }
     }
 
     @Test
     fun targetsThatCannotBeAreNamed() {
         assertRefused<PhasefrontException.Display>("pitch_um") { sessionOptions(display.copy(pitchUm = -1.0)) }
-        assertRefused<PhasefrontException.Setting>("3 levels") { Target.withLookUpTable(display, ByteArray(3)) }
-        assertRefused<PhasefrontException.File>("nowhere.pfc") { Target.fromFile("/nowhere.pfc") }
-        assertRefused<PhasefrontException.Setting>("calibration") { Target.fromBytes(direct(8)) }
-        assertRefused<PhasefrontException.Setting>("allocateDirect") { Target.fromBytes(ByteBuffer.allocate(8)) }
+        assertRefused<PhasefrontException.Setting>("3 levels") { HologramTarget.withLookUpTable(display, ByteArray(3)) }
+        assertRefused<PhasefrontException.File>("nowhere.pfc") { HologramTarget.fromFile("/nowhere.pfc") }
+        assertRefused<PhasefrontException.Setting>("calibration") { HologramTarget.fromBytes(direct(8)) }
+        assertRefused<PhasefrontException.Setting>("allocateDirect") { HologramTarget.fromBytes(ByteBuffer.allocate(8)) }
     }
 
     @Test
     fun aTargetIsTakenAsItsDisplayIs() {
-        val target = Target.withLookUpTable(display, ByteArray(256) { it.toByte() })
+        val target = HologramTarget.withLookUpTable(display, ByteArray(256) { it.toByte() })
         val options = sessionOptions(target)
         assertEquals(display, options.target.display())
-        fun levels(options: SessionOptions) = Session(options, RunningMode.IMAGE).use { it.process(still()).use { made -> made.levels() } }
+        fun levels(options: SessionOptions) = HologramSession(options, RunningMode.IMAGE).use { it.process(still()).use { made -> made.levels() } }
         // This table has equal steps.
         assertContentEquals(levels(sessionOptions(display)), levels(options))
     }
 
     @Test
     fun settingsThatCannotBeMeantAreNamed() {
-        fun make(change: SessionOptions.() -> SessionOptions): () -> Any? = { Session(options().change(), RunningMode.IMAGE) }
+        fun make(change: SessionOptions.() -> SessionOptions): () -> Any? = { HologramSession(options().change(), RunningMode.IMAGE) }
         assertRefused<PhasefrontException.Setting>("no quality levels", make { copy(qualityLevels = listOf()) })
-        assertRefused<PhasefrontException.Setting>("0 threads", make { copy(threads = 0u) })
+        assertRefused<PhasefrontException.Setting>("0 threads", make { copy(threads = 0) })
         assertRefused<PhasefrontException.Setting>("target rate", make { copy(targetRateHz = Double.NaN) })
-        assertRefused<PhasefrontException.Setting>("no quality level 3", make { copy(quality = Quality.Fixed(3u)) })
-        val fine = Target.ofDisplay(display.copy(pitchUm = 3.74))
-        assertRefused<PhasefrontException.Network>("pitch") { Session(sessionOptions(fine, network), RunningMode.IMAGE) }
-        val tiny = Target.ofDisplay(Display(width = 32u, height = 24u))
+        assertRefused<PhasefrontException.Setting>("no quality level 3", make { copy(quality = Quality.Fixed(3)) })
+        val fine = HologramTarget.ofDisplay(display.copy(pitchUm = 3.74))
+        assertRefused<PhasefrontException.Network>("pitch") { HologramSession(sessionOptions(fine, network), RunningMode.IMAGE) }
+        val tiny = HologramTarget.ofDisplay(HologramDisplay(width = 32, height = 24))
         assertRefused<PhasefrontException.Setting>("the modulator's 32×24", make { copy(target = tiny) })
         assertRefused<PhasefrontException.Display>("line 1") { displayFromToml("width = ") }
     }
@@ -388,9 +388,9 @@ class SessionTest {
     @Test
     fun messagesReachTheLog() {
         val messages = Collections.synchronizedList(mutableListOf<Pair<LogLevel, String>>())
-        Log.send(LogLevel.INFO) { level, message -> messages.add(level to message) }
+        HologramLog.send(LogLevel.INFO) { level, message -> messages.add(level to message) }
         image {}
-        Log.send(LogLevel.INFO, null)
+        HologramLog.send(LogLevel.INFO, null)
         image {}
         // Other tests may log at the same time, but not in this process.
         assertEquals(1, messages.size)
@@ -401,9 +401,9 @@ class SessionTest {
     @Test
     fun stagesBeginAndEnd() {
         val stages = Collections.synchronizedList(mutableListOf<Pair<Stage, Boolean>>())
-        Trace.send { stage, begins -> stages.add(stage to begins) }
+        HologramTrace.send { stage, begins -> stages.add(stage to begins) }
         image { it.process(still()).close() }
-        Trace.send(null)
+        HologramTrace.send(null)
         image { it.process(still()).close() }
         val inside = listOf(Stage.COLOUR, Stage.DEPTH, Stage.METHOD, Stage.PROPAGATE, Stage.ENCODE)
         val ended = stages.filterNot { it.second }.map { it.first }
@@ -419,7 +419,7 @@ class SessionTest {
             System.gc()
             return statm.readText().split(' ')[1].toInt() * 4096 / 1e6
         }
-        Session(options().copy(threads = 1u), RunningMode.IMAGE).use { session ->
+        HologramSession(options().copy(threads = 1), RunningMode.IMAGE).use { session ->
             val frame = still()
             val sum = LongArray(1)
             fun frames(count: Int) = repeat(count) {

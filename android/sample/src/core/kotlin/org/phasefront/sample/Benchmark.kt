@@ -2,14 +2,14 @@ package org.phasefront.sample
 
 import org.json.JSONArray
 import org.json.JSONObject
-import org.phasefront.Display
-import org.phasefront.Frame
+import org.phasefront.CameraFrame
 import org.phasefront.FrameTimes
-import org.phasefront.Method
-import org.phasefront.Network
+import org.phasefront.HologramDisplay
+import org.phasefront.HologramMethod
+import org.phasefront.HologramNetwork
+import org.phasefront.HologramSession
 import org.phasefront.PhasefrontException
 import org.phasefront.RunningMode
-import org.phasefront.Session
 import org.phasefront.SessionOptions
 import org.phasefront.sessionOptions
 import org.phasefront.version
@@ -48,9 +48,9 @@ data class Spread(val least: Double, val lower: Double, val median: Double, val 
  * A benchmark run: the [method] and the correction steps [localSteps] of its frames, and the [stage] that it measures.
  * null means the default; with steps, there is no other correction.
  */
-class Run(val name: String, val stage: Stage, val method: Method? = null, val localSteps: UInt? = 0u) {
+class Run(val name: String, val stage: Stage, val method: HologramMethod? = null, val localSteps: Int? = 0) {
     /** Returns the options of the run for [display]. */
-    fun options(display: Display): SessionOptions {
+    fun options(display: HologramDisplay): SessionOptions {
         val defaults = sessionOptions(display, method)
         return if (localSteps == null) defaults else defaults.copy(darkThreshold = 0f, localSteps = localSteps)
     }
@@ -60,14 +60,14 @@ class Run(val name: String, val stage: Stage, val method: Method? = null, val lo
          * Returns the runs: networks of 8, 15 and [deep]'s layers, the plane sweep, one correction step, and the
          * default.
          */
-        fun all(deep: Network): List<Run> {
-            val shallow = Method.Trained(Network.builtIn("rgbd-8"))
+        fun all(deep: HologramNetwork): List<Run> {
+            val shallow = HologramMethod.Trained(HologramNetwork.builtIn("rgbd-8"))
             return listOf(
                 Run("8 layers", Stage.METHOD, shallow),
-                Run("15 layers", Stage.METHOD, Method.Trained(Network.builtIn("rgbd-15"))),
-                Run("${deep.info().layers} layers", Stage.METHOD, Method.Trained(deep)),
-                Run("plane sweep", Stage.METHOD, Method.Sweep),
-                Run("encoder with one step", Stage.ENCODE, shallow, localSteps = 1u),
+                Run("15 layers", Stage.METHOD, HologramMethod.Trained(HologramNetwork.builtIn("rgbd-15"))),
+                Run("${deep.info().layers} layers", Stage.METHOD, HologramMethod.Trained(deep)),
+                Run("plane sweep", Stage.METHOD, HologramMethod.Sweep),
+                Run("encoder with one step", Stage.ENCODE, shallow, localSteps = 1),
                 Run("whole frame", Stage.TOTAL, localSteps = null),
             )
         }
@@ -83,9 +83,9 @@ class Outcome(val line: String, val json: JSONObject)
  */
 class Benchmark(
     private val runs: List<Run>,
-    private val displays: List<Display>,
+    private val displays: List<HologramDisplay>,
     private val frames: Int,
-    private val scene: () -> Frame,
+    private val scene: () -> CameraFrame,
     private val conditions: () -> JSONObject,
 ) {
     /**
@@ -106,9 +106,9 @@ class Benchmark(
         return JSONObject().put("phasefront", version()).put("device", device).put("runs", outcomes)
     }
 
-    private fun time(run: Run, display: Display): Outcome {
+    private fun time(run: Run, display: HologramDisplay): Outcome {
         val json = JSONObject().put("name", run.name).put("stage", run.stage.key)
-            .put("width", display.width.toInt()).put("height", display.height.toInt()).put("before", conditions())
+            .put("width", display.width).put("height", display.height).put("before", conditions())
         return try {
             val spreads = spreads(run, display, json)
             val of = spreads.getValue(run.stage)
@@ -120,12 +120,12 @@ class Benchmark(
     }
 
     /** Returns the times of each stage and adds the total time and the backend to [json]. */
-    private fun spreads(run: Run, display: Display, json: JSONObject): Map<Stage, Spread> {
-        return Session(run.options(display), RunningMode.IMAGE).use { session ->
+    private fun spreads(run: Run, display: HologramDisplay, json: JSONObject): Map<Stage, Spread> {
+        return HologramSession(run.options(display), RunningMode.IMAGE).use { session ->
             repeat(WARM) { session.process(scene()).close() }
             val begun = System.nanoTime()
             val times = List(frames) { session.process(scene()).use { it.info.times } }
-            val statistics = session.statistics()
+            val statistics = session.statistics
             json.put("frames", frames).put("seconds", (System.nanoTime() - begun) / 1e9).put("behind", conditions())
                 .put("backend", statistics.backend).put("why", statistics.backendWhy)
             Stage.entries.associateWith { stage -> Spread.of(times.map(stage.ms)) }
@@ -136,7 +136,7 @@ class Benchmark(
         private const val WARM = 2
 
         /** The modulator of the documentation, and the size of the sample app's holograms. */
-        val DISPLAYS = listOf(Display(), Display(width = 960u, height = 540u))
+        val DISPLAYS = listOf(HologramDisplay(), HologramDisplay(width = 960, height = 540))
 
         /** With this count, each quartile is the time of one frame. */
         const val FRAMES = 9

@@ -16,7 +16,7 @@ import java.nio.ByteBuffer
 import java.time.Instant
 import kotlin.concurrent.thread
 import org.json.JSONObject
-import org.phasefront.Network
+import org.phasefront.HologramNetwork
 import org.phasefront.PhasefrontException
 import org.phasefront.fromBytes
 import org.phasefront.thermalOf
@@ -71,7 +71,7 @@ class BenchmarkActivity : Activity() {
     private fun measure(): File? {
         val begun = Instant.now()
         val scene = SampleScene(assets)
-        val runs = Run.all(Network.fromBytes(asset("rgbd-30-int8.onnx")))
+        val runs = Run.all(HologramNetwork.fromBytes(asset("rgbd-30-int8.onnx")))
         val benchmark = Benchmark(runs, Benchmark.DISPLAYS, Benchmark.FRAMES, { scene.frame(0) }, ::conditions)
         val record = benchmark.record(device(), { isWanted }, ::say).put("begun", begun.toString())
         // A cancelled run leaves no record.

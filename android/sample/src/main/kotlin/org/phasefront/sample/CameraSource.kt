@@ -14,7 +14,7 @@ import android.media.ImageReader
 import android.os.Handler
 import android.os.HandlerThread
 import kotlin.math.abs
-import org.phasefront.Frame
+import org.phasefront.CameraFrame
 import org.phasefront.Orientation
 import org.phasefront.sensorOrientation
 import org.phasefront.toColourImage
@@ -38,7 +38,7 @@ class CameraSource private constructor(
     private var depth: Image? = null
 
     @SuppressLint("MissingPermission") // The activity asks for it first.
-    override fun start(onFrame: (Frame) -> Unit, onError: (String) -> Unit) {
+    override fun start(onFrame: (CameraFrame) -> Unit, onError: (String) -> Unit) {
         val sizes = manager.getCameraCharacteristics(id).get(CameraCharacteristics.SCALER_STREAM_CONFIGURATION_MAP)
         val depthSize = sizes?.getOutputSizes(ImageFormat.DEPTH16)?.maxByOrNull { it.width * it.height }
         // Colour with the depth's field of view: among sizes of its aspect ratio, the one nearest to 1080 lines.
@@ -107,12 +107,12 @@ class CameraSource private constructor(
     }
 
     /** Pairs colour and depth that were captured within half a frame of each other. */
-    private fun pair(onFrame: (Frame) -> Unit) {
+    private fun pair(onFrame: (CameraFrame) -> Unit) {
         val colour = colour ?: return
         val depth = depth ?: return
         if (abs(colour.timestamp - depth.timestamp) > 17_000_000) return
         try {
-            onFrame(Frame(colour.timestamp, colour.toColourImage(), depth.toDepthImage(), orientation))
+            onFrame(CameraFrame(colour.timestamp, colour.toColourImage(), depth.toDepthImage(), orientation))
         } finally {
             colour.close()
             depth.close()

@@ -19,12 +19,12 @@ import android.widget.LinearLayout
 import android.widget.SeekBar
 import android.widget.TextView
 import android.widget.Toast
-import org.phasefront.Display
 import org.phasefront.Hologram
-import org.phasefront.Log
+import org.phasefront.HologramDisplay
+import org.phasefront.HologramLog
+import org.phasefront.HologramSession
 import org.phasefront.PhasefrontException
 import org.phasefront.RunningMode
-import org.phasefront.Session
 import org.phasefront.SessionEvent
 import org.phasefront.sendToLogcat
 import org.phasefront.sessionOptions
@@ -39,10 +39,10 @@ class MainActivity : Activity() {
     private lateinit var preview: ImageView
     private lateinit var focus: SeekBar
     private lateinit var statistics: TextView
-    private var session: Session? = null
+    private var session: HologramSession? = null
     private var source: FrameSource? = null
     private var output: PhaseOutput? = null
-    private val hologramDisplay = Display(width = 960u, height = 540u)
+    private val hologramDisplay = HologramDisplay(width = 960, height = 540)
 
     /** The focus, written on the main thread and read on the session's thread. */
     @Volatile private var zMm = 0.0
@@ -52,7 +52,7 @@ class MainActivity : Activity() {
 
     override fun onCreate(savedInstanceState: Bundle?) {
         super.onCreate(savedInstanceState)
-        Log.sendToLogcat()
+        HologramLog.sendToLogcat()
         preview = ImageView(this).apply {
             adjustViewBounds = true
             setOnTouchListener { view, event -> event.action == MotionEvent.ACTION_UP && tapped(view, event) }
@@ -102,7 +102,7 @@ class MainActivity : Activity() {
     private fun run() {
         if (session != null) return
         try {
-            session = Session(sessionOptions(hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE, ::heard)
+            session = HologramSession(sessionOptions(hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE, ::heard)
         } catch (refused: PhasefrontException) {
             return say(refused.message.orEmpty())
         }
@@ -128,7 +128,7 @@ class MainActivity : Activity() {
     private fun heard(event: SessionEvent) {
         if (event !is SessionEvent.Processed) return
         val hologram = event.hologram
-        val view = hologram.preview(zMm, hologramDisplay.width.toInt() / 2, hologramDisplay.height.toInt() / 2).use { it.toBitmap() }
+        val view = hologram.preview(zMm, hologramDisplay.width / 2, hologramDisplay.height / 2).use { it.toBitmap() }
         val levels: Bitmap? = output?.let { hologram.output().use { image -> image.toBitmap() } }
         runOnUiThread {
             latest?.close()
@@ -140,11 +140,11 @@ class MainActivity : Activity() {
     }
 
     private fun describe(): String {
-        val of = session?.statistics() ?: return ""
+        val of = session?.statistics ?: return ""
         return "%.1f holograms a second, %d dropped of %d\n%s: %.1f ms, of which the network takes %.1f".format(
             of.rateHz,
-            of.dropped.total.toLong(),
-            of.submitted.toLong(),
+            of.dropped.total,
+            of.submitted,
             of.backend,
             of.times.totalMs,
             of.times.methodMs,

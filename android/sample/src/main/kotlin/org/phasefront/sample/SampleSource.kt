@@ -5,18 +5,18 @@ import android.graphics.Bitmap
 import android.graphics.BitmapFactory
 import java.nio.ByteBuffer
 import kotlin.concurrent.thread
+import org.phasefront.CameraFrame
 import org.phasefront.ColourFormat
 import org.phasefront.ColourImage
 import org.phasefront.DepthFormat
 import org.phasefront.DepthImage
-import org.phasefront.Frame
-import org.phasefront.Plane
+import org.phasefront.ImagePlane
 
 /** A source for phones without depth: a window that moves over the project's sample scene, 30 times per second. */
 class SampleSource(private val assets: AssetManager) : FrameSource {
     @Volatile private var running = false
 
-    override fun start(onFrame: (Frame) -> Unit, onError: (String) -> Unit) {
+    override fun start(onFrame: (CameraFrame) -> Unit, onError: (String) -> Unit) {
         running = true
         thread(name = "sample scene") {
             val scene = SampleScene(assets)
@@ -45,24 +45,24 @@ class SampleScene(assets: AssetManager) {
     }
 
     /** Returns a frame with the current time, of a window that has moved [step] pixels to and fro. */
-    fun frame(step: Int): Frame {
+    fun frame(step: Int): CameraFrame {
         val margin = colour.width / 8
         val x = if (step / margin % 2 == 0) step % margin else margin - 1 - step % margin
         val depthX = x * depth.width / colour.width
         val depthMargin = margin * depth.width / colour.width
-        return Frame(
+        return CameraFrame(
             System.nanoTime(),
             ColourImage(
                 ColourFormat.RGBA,
                 colour.width - margin,
                 colour.height - margin * colour.height / colour.width,
-                listOf(Plane(window(colours, 4 * x), 4 * colour.width, 4)),
+                listOf(ImagePlane(window(colours, 4 * x), 4 * colour.width, 4)),
             ),
             DepthImage(
                 DepthFormat.NORMALIZED_U8,
                 depth.width - depthMargin,
                 depth.height - depthMargin * depth.height / depth.width,
-                Plane(window(depths, depthX), depth.width, 1),
+                ImagePlane(window(depths, depthX), depth.width, 1),
             ),
         )
     }

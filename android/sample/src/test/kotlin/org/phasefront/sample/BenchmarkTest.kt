@@ -7,28 +7,28 @@ import kotlin.test.assertContains
 import kotlin.test.assertEquals
 import kotlin.test.assertTrue
 import org.json.JSONObject
+import org.phasefront.CameraFrame
 import org.phasefront.ColourFormat
 import org.phasefront.ColourImage
 import org.phasefront.DepthFormat
 import org.phasefront.DepthImage
-import org.phasefront.Display
-import org.phasefront.Frame
-import org.phasefront.Method
-import org.phasefront.Network
+import org.phasefront.HologramDisplay
+import org.phasefront.HologramMethod
+import org.phasefront.HologramNetwork
 
 class BenchmarkTest {
-    private fun scene(): Frame {
+    private fun scene(): CameraFrame {
         val bytes = { size: Int ->
             ByteBuffer.allocateDirect(size).apply { repeat(size) { put((it % 251).toByte()) } }.flip()
         }
-        return Frame(
+        return CameraFrame(
             0,
             ColourImage(ColourFormat.RGBA, 32, 24, bytes(4 * 32 * 24)),
             DepthImage(DepthFormat.NORMALIZED_U8, 32, 24, bytes(32 * 24)),
         )
     }
 
-    private fun benchmark(runs: List<Run>, display: Display): Benchmark {
+    private fun benchmark(runs: List<Run>, display: HologramDisplay): Benchmark {
         var asked = 0
         return Benchmark(runs, listOf(display), 3, ::scene) { JSONObject().put("asked", ++asked) }
     }
@@ -42,8 +42,8 @@ class BenchmarkTest {
     @Test
     fun aRecordHasEveryRunWithItsStagesAndConditions() {
         val lines = mutableListOf<String>()
-        val runs = Run.all(Network.fromFile(System.getProperty("phasefront.suite") + "/../../models/rgbd-30-int8.onnx"))
-        val record = benchmark(runs, Display(width = 64u, height = 48u))
+        val runs = Run.all(HologramNetwork.fromFile(System.getProperty("phasefront.suite") + "/../../models/rgbd-30-int8.onnx"))
+        val record = benchmark(runs, HologramDisplay(width = 64, height = 48))
             .record(JSONObject().put("model", "a test"), { true }, lines::add)
         // tests/kotlin converts it to a table.
         File(System.getProperty("phasefront.record")).writeText(record.toString())
@@ -69,9 +69,9 @@ class BenchmarkTest {
     @Test
     fun whatIsRefusedIsSaidAndTheOthersGoOn() {
         // No network was trained for this display.
-        val display = Display(width = 64u, height = 48u, pitchUm = 3.74)
-        val network = Method.Trained(Network.builtIn("rgbd-8"))
-        val runs = listOf(Run("8 layers", Stage.METHOD, network), Run("sweep", Stage.METHOD, Method.Sweep))
+        val display = HologramDisplay(width = 64, height = 48, pitchUm = 3.74)
+        val network = HologramMethod.Trained(HologramNetwork.builtIn("rgbd-8"))
+        val runs = listOf(Run("8 layers", Stage.METHOD, network), Run("sweep", Stage.METHOD, HologramMethod.Sweep))
         val record = benchmark(runs, display).record(JSONObject(), { true }) {}.getJSONArray("runs")
         assertContains(record.getJSONObject(0).getString("refused"), "trained for")
         assertTrue(record.getJSONObject(1).has("stages_ms"))
