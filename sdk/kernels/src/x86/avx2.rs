@@ -56,16 +56,15 @@ fn int8_filters(layer: &Packed, places: &Places<'_>, skip: Option<&[u8]>, out: &
     assert!(out.len() >= groups * geometry.stride());
     assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
     let zero = _mm256_set1_epi8(layer.zero_point as i8);
-    let mut words = layer.weights.as_chunks().0;
-    for g in 0..groups {
-        let (bias, multiplier) = (
-            &layer.bias[g * GROUP..][..GROUP],
-            &layer.multiplier[g * GROUP..][..GROUP],
-        );
-        let mut rest = words;
-        for x in (0..geometry.width).step_by(8 * INT8_BLOCKS) {
+    for x in (0..geometry.width).step_by(8 * INT8_BLOCKS) {
+        let mut words = layer.weights.as_chunks().0;
+        for g in 0..groups {
+            let (bias, multiplier) = (
+                &layer.bias[g * GROUP..][..GROUP],
+                &layer.multiplier[g * GROUP..][..GROUP],
+            );
             let sums;
-            (sums, rest) = int8_sums(words, bias, places, x);
+            (sums, words) = int8_sums(words, bias, places, x);
             #[allow(clippy::needless_range_loop)]
             for b in 0..INT8_BLOCKS {
                 let at = g * geometry.stride() + geometry.start() + (x + 8 * b) * GROUP;
@@ -83,7 +82,6 @@ fn int8_filters(layer: &Packed, places: &Places<'_>, skip: Option<&[u8]>, out: &
                 }
             }
         }
-        words = rest;
     }
 }
 

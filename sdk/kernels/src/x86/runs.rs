@@ -79,10 +79,7 @@ fn runs(mut entries: Vec<(usize, Weights)>) -> Vec<Vec<(usize, Weights)>> {
             None => runs.push((load(&weights), vec![(place, weights)])),
         }
     }
-    let mut runs: Vec<Vec<_>> = runs.into_iter().map(|(_, run)| run).collect();
-    // Memory is read in order.
-    runs.iter_mut().for_each(|run| run.sort_by_key(|(place, _)| *place));
-    runs
+    runs.into_iter().map(|(_, run)| run).collect()
 }
 
 fn fits(load: Load) -> bool {
