@@ -2,20 +2,24 @@
 //! display's resolution along the edges of the colour image. Tests compare the results with [`mod@reference`].
 //!
 //! The steps work on the readings, except for the last two, which work on the display's pixels at edges:
-//! 1. `register`: the shift between depth and colour is found from their edges.
-//! 2. `fill`: holes take the depth of the surface with their colour.
-//! 3. `smooth`: noise within surfaces is removed; slopes stay.
-//! 4. `edges`: readings at edges are found, and those whose depth is a mixture of two surfaces.
-//! 5. `surfaces`: the 3×3 readings around a reading at an edge form surfaces. Each display pixel there takes the
+//! 1. `register`: the shift between depth and colour is found from their edges, and whether near surfaces are too wide.
+//! 2. `narrow`: near surfaces that are too wide become narrower.
+//! 3. `fill`: holes take the depth of the surface with their colour.
+//! 4. `smooth`: noise within surfaces is removed; slopes stay.
+//! 5. `edges`: readings at edges are found, and those whose depth is a mixture of two surfaces.
+//! 6. `contradict`: readings of a few pixels near edges whose colour is that of another surface take its depth.
+//! 7. `surfaces`: the 3×3 readings around a reading at an edge form surfaces. Each display pixel there takes the
 //!    surface that covers its place and has its colour. All other pixels are interpolated.
-//! 6. Pixels that are nearly undecided follow their neighbours of the same colour.
+//! 8. Pixels that are nearly undecided follow their neighbours of the same colour.
 //!
-//! Clean depth of the display's resolution is only shifted and filled.
+//! Clean depth of the display's resolution is only shifted, narrowed and filled.
 
 mod axis;
 mod colour;
+mod contradict;
 mod edges;
 mod fill;
+mod narrow;
 mod pixels;
 pub mod reference;
 mod register;
@@ -30,6 +34,7 @@ use colour::Moments;
 use edges::Kind;
 use fill::FillScratch;
 use pixels::{Decider, Pixels};
+pub use register::Misfit;
 use register::Registration;
 use smooth::SmoothScratch;
 
@@ -48,6 +53,10 @@ pub struct ConditionScratch {
     x: AxisMap,
     y: AxisMap,
     readings: Vec<f32>,
+    /// The readings before a step that needs all of them.
+    before: Vec<f32>,
+    /// Whether each reading was a hole or contradicted.
+    filled: Vec<bool>,
     kinds: Vec<Kind>,
     bent: Vec<bool>,
     colours: Vec<Moments>,
@@ -100,6 +109,8 @@ impl Conditioner {
             x: AxisMap::new(self.depth.1, self.out.1),
             y: AxisMap::new(self.depth.0, self.out.0),
             readings: vec![0.0; size],
+            before: vec![0.0; size],
+            filled: vec![false; size],
             kinds: vec![Kind::Inside; size],
             bent: vec![false; size],
             colours: vec![Moments::default(); size],
@@ -124,24 +135,16 @@ impl Conditioner {
         assert_eq!(depth.len(), self.depth.0 * self.depth.1);
         assert_eq!(rgb.len(), 3 * height * width);
         assert_eq!(to.len(), height * width);
-        let holes = depth.iter().filter(|d| d.is_nan()).count();
-        if holes == depth.len() {
+        if depth.iter().all(|d| d.is_nan()) {
             return Err(no_reading());
         }
-        self.place(depth, rgb, scratch);
-        let axes = (&scratch.x, &scratch.y);
-        scratch.readings.copy_from_slice(depth);
-        if holes > 0 {
-            colour::colours(rgb, axes, fill::REACH, |i| depth[i].is_nan(), &mut scratch.colours);
-            fill::fill(&mut scratch.readings, self.depth.1, &scratch.colours, &mut scratch.fill);
-        }
-        if self.depth == self.out && sharpness::measure_planes(rgb, &scratch.readings, width).is_clean() {
-            scratch.kinds.fill(Kind::Inside);
-        } else {
-            smooth::smooth(&mut scratch.readings, self.depth.1, &mut scratch.smooth);
-            edges::find(&scratch.readings, self.depth.1, &mut scratch.bent, &mut scratch.kinds);
-            let kinds = &scratch.kinds;
-            colour::colours(rgb, axes, 1, |i| kinds[i] != Kind::Inside, &mut scratch.colours);
+        let growth = self.place(depth, rgb, scratch);
+        self.fill(depth, rgb, growth, scratch);
+        let clean =
+            self.depth == self.out && sharpness::measure_planes(rgb, &scratch.readings, self.depth.1).is_clean();
+        match clean {
+            true => scratch.kinds.fill(Kind::Inside),
+            false => self.find_surfaces(rgb, scratch),
         }
         let readings = surfaces::Readings {
             depth: &scratch.readings,
@@ -158,14 +161,60 @@ impl Conditioner {
         Ok(())
     }
 
-    /// Finds the shift between depth and colour and places the display's pixels among the readings.
-    fn place(&self, depth: &[f32], rgb: &[f32], scratch: &mut ConditionScratch) {
-        let (shift_y, shift_x) = match &mut scratch.registration {
-            Some(registration) => registration.shift(depth, rgb),
-            None => (0.0, 0.0),
-        };
-        scratch.x.place(self.crop.x + shift_x, self.crop.width);
-        scratch.y.place(self.crop.y + shift_y, self.crop.height);
+    /// Finds the shift between depth and colour, places the display's pixels among the readings, and returns the number
+    /// of readings by which near surfaces are too wide.
+    fn place(&self, depth: &[f32], rgb: &[f32], scratch: &mut ConditionScratch) -> usize {
+        let registration = scratch.registration.as_mut();
+        let Misfit { shift: (y, x), growth } = registration.map_or(Misfit::default(), |r| r.misfit(depth, rgb));
+        scratch.x.place(self.crop.x + x, self.crop.width);
+        scratch.y.place(self.crop.y + y, self.crop.height);
+        growth
+    }
+
+    /// Narrows near surfaces by `growth` readings and fills holes.
+    fn fill(&self, depth: &[f32], rgb: &[f32], growth: usize, scratch: &mut ConditionScratch) {
+        let width = self.depth.1;
+        narrow::narrow(depth, width, growth, &mut scratch.readings);
+        if scratch.readings.iter().all(|reading| reading.is_nan()) {
+            scratch.readings.copy_from_slice(depth);
+        }
+        for (filled, reading) in scratch.filled.iter_mut().zip(&scratch.readings) {
+            *filled = reading.is_nan();
+        }
+        if scratch.filled.contains(&true) {
+            let (axes, filled) = ((&scratch.x, &scratch.y), &scratch.filled);
+            colour::colours(rgb, axes, fill::REACH, |i| filled[i], &mut scratch.colours);
+            fill::fill(&mut scratch.readings, width, &scratch.colours, &mut scratch.fill);
+        }
+    }
+
+    /// Smooths the readings, finds their kinds and the colours around edges, and replaces contradicted readings.
+    fn find_surfaces(&self, rgb: &[f32], scratch: &mut ConditionScratch) {
+        let (axes, width) = ((&scratch.x, &scratch.y), self.depth.1);
+        smooth::smooth(&mut scratch.readings, width, &mut scratch.smooth);
+        edges::find(&scratch.readings, width, &mut scratch.bent, &mut scratch.kinds);
+        if contradict::applies(self.crop, self.out) {
+            let kinds = &scratch.kinds;
+            let is_edge = |i: usize| kinds[i] != Kind::Inside;
+            colour::colours(rgb, axes, 2 * fill::REACH, is_edge, &mut scratch.colours);
+            scratch.before.copy_from_slice(&scratch.readings);
+            let known = (&scratch.kinds[..], &scratch.colours[..]);
+            contradict::replace(
+                &scratch.before,
+                width,
+                known,
+                &mut scratch.readings,
+                &mut scratch.filled,
+            );
+            edges::find(&scratch.readings, width, &mut scratch.bent, &mut scratch.kinds);
+        }
+        for (kind, filled) in scratch.kinds.iter_mut().zip(&scratch.filled) {
+            if *filled && *kind == Kind::Edge {
+                *kind = Kind::Filled;
+            }
+        }
+        let kinds = &scratch.kinds;
+        colour::colours(rgb, axes, 1, |i| kinds[i] != Kind::Inside, &mut scratch.colours);
     }
 }
 

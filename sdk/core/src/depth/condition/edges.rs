@@ -21,6 +21,8 @@ pub(super) enum Kind {
     Inside,
     /// At an edge, on a surface.
     Edge,
+    /// At an edge, without a reading of its own: filled.
+    Filled,
     /// At an edge, with a depth between two surfaces.
     Mixed,
 }

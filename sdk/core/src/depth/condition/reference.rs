@@ -2,15 +2,50 @@
 //! pixel separately. Tests compare [`super::Conditioner`] with it.
 
 use super::edges::{EDGE, MIXED, MIXED_BY, UNEXPLAINED};
-use super::{fill, pixels, register, smooth, surfaces};
+use super::{Misfit, contradict, fill, narrow, pixels, register, smooth, surfaces};
 use crate::depth::{fill_nearest, sharpness};
 use crate::frame::Crop;
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
-/// Returns the distance (y, x) of the edges of `depth`, (h, w), from those of `rgb`, (3, H, W), in readings.
-pub fn shift(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) -> (f64, f64) {
-    let ((h, w), (_, height, width)) = (depth.dim(), rgb.dim());
-    let samples = ((height as f64 / crop.height).round() as usize).clamp(1, register::MOST_SAMPLES);
+/// Returns how `depth`, (h, w), lies beside `rgb`, (3, H, W).
+pub fn misfit(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) -> Misfit {
+    let samples = ((rgb.dim().1 as f64 / crop.height).round() as usize).clamp(1, register::MOST_SAMPLES);
+    let edges = colour_edges(depth.dim(), samples, crop, rgb);
+    let reach = register::REACH as isize;
+    let evidence = |(y, x): (isize, isize), growth: isize| evidence(depth, samples, &edges, (y, x), growth);
+    let shifts = |reach: isize| (-reach..=reach).flat_map(move |y| (-reach..=reach).map(move |x| (y, x)));
+    let (mut best, mut most) = (((0, 0), 0), evidence((0, 0), 0).0);
+    for growth in 0..=register::MOST_GROWTH as isize {
+        let by = growth * samples as isize;
+        let top = shifts(reach - by)
+            .map(|shift| (shift, evidence(shift, growth).0))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let gain = f64::from(if growth == 0 { 1.0 } else { register::GROWTH_GAIN });
+        if let Some((shift, sum)) = top.filter(|(_, sum)| *sum > gain * most) {
+            (best, most) = ((shift, growth), sum);
+        }
+    }
+    let (zero, weights) = evidence((0, 0), 0);
+    if most <= f64::from(register::GAIN) * zero {
+        (best, most) = (((0, 0), 0), zero);
+    }
+    let sums: Vec<f64> = shifts(reach).map(|shift| evidence(shift, 0).0).collect();
+    let mean = sums.iter().sum::<f64>() / sums.len() as f64;
+    let variance = sums.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / sums.len() as f64;
+    let weak = weights < f64::from(register::LEAST_EDGES);
+    if weak || most - mean < f64::from(register::DISTINCT) * variance.sqrt() {
+        return Misfit::default();
+    }
+    let ((y, x), growth) = best;
+    Misfit {
+        shift: (y as f64 / samples as f64, x as f64 / samples as f64),
+        growth: growth as usize,
+    }
+}
+
+/// Returns the colour edges at the samples of (h, w) readings, along x and along y, as multiples of the mean around.
+fn colour_edges((h, w): (usize, usize), samples: usize, crop: Crop, rgb: ArrayView3<'_, f32>) -> [Array2<f64>; 2] {
+    let (_, height, width) = rgb.dim();
     let (rows, columns) = (h * samples, w * samples);
     let colour = |y: usize, x: usize| {
         let place = |i: usize, from: f64, scale: f64| ((i as f64 + 0.5) / samples as f64 - from) * scale;
@@ -23,67 +58,72 @@ pub fn shift(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) -
         let sum = a.zip(b).map_or(0.0, |(a, b)| (0..3).map(|c| (a[c] - b[c]).abs()).sum());
         f64::from(sum / (sum + register::HALF))
     };
+    let before = |i: usize| if samples % 2 == 0 { i.saturating_sub(1) } else { i };
     let edges = [false, true].map(|down| {
         Array2::from_shape_fn((rows, columns), |(y, x)| match down {
-            false => change(colour(y, x.saturating_sub(1)), colour(y, (x + 1).min(columns - 1))),
-            true => change(colour(y.saturating_sub(1), x), colour((y + 1).min(rows - 1), x)),
+            false => change(colour(y, before(x)), colour(y, (x + 1).min(columns - 1))),
+            true => change(colour(before(y), x), colour((y + 1).min(rows - 1), x)),
         })
     });
-    let evidence = |shift_y: isize, shift_x: isize| {
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for ((y, x), d) in depth.indexed_iter() {
-            for (down, next) in [depth.get((y, x + 1)), depth.get((y + 1, x))].into_iter().enumerate() {
-                let step = next.map_or(0.0, |next| (next - d).abs());
-                if step < *register::EDGE.start() || step.is_nan() {
-                    continue;
-                }
-                let step = f64::from(step.min(*register::EDGE.end()));
-                let start = |i: usize, middle: bool, shift: isize, size: usize| {
-                    let at = (i * samples + if middle { samples / 2 } else { 0 }) as isize - shift;
-                    at.clamp(0, size as isize - 1) as usize
-                };
-                let (top, left) = (
-                    start(y, down == 1, shift_y, rows),
-                    start(x, down == 0, shift_x, columns),
-                );
-                let reading = (top..(top + samples).min(rows))
-                    .flat_map(|y| (left..(left + samples).min(columns)).map(move |x| (y, x)));
-                sum += step * reading.map(|at| edges[down][at]).sum::<f64>();
-                weights += step;
-            }
-        }
-        (sum, weights)
+    let tile = |i: usize, size: usize| {
+        let first = i / register::TILE * register::TILE;
+        first..(first + register::TILE).min(size)
     };
-    let reach = register::REACH as isize;
-    let shifts: Vec<(isize, isize)> = (-reach..=reach)
-        .flat_map(|y| (-reach..=reach).map(move |x| (y, x)))
-        .collect();
-    let sums: Vec<f64> = shifts.iter().map(|(y, x)| evidence(*y, *x).0).collect();
-    let top = (0..sums.len())
-        .max_by(|a, b| sums[*a].total_cmp(&sums[*b]))
-        .unwrap_or(0);
-    let zero = sums.len() / 2;
-    let best = if sums[top] > f64::from(register::GAIN) * sums[zero] {
-        top
-    } else {
-        zero
-    };
-    let mean = sums.iter().sum::<f64>() / sums.len() as f64;
-    let variance = sums.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / sums.len() as f64;
-    let weak = evidence(0, 0).1 < f64::from(register::LEAST_EDGES)
-        || sums[best] - mean < f64::from(register::DISTINCT) * variance.sqrt();
-    match weak {
-        true => (0.0, 0.0),
-        false => (
-            shifts[best].0 as f64 / samples as f64,
-            shifts[best].1 as f64 / samples as f64,
-        ),
-    }
+    let mean = Array2::from_shape_fn((rows, columns), |(y, x)| {
+        let part = ndarray::s![tile(y, rows), tile(x, columns)];
+        let means = [0, 1].map(|down| edges[down].slice(part).mean().expect("not empty"));
+        (means[0] + means[1]) / 2.0
+    });
+    edges.map(|edges| edges / (&mean + f64::from(register::FAINT)))
 }
 
-/// Conditions the part `crop` of `depth`, (h, w), whose edges lie `shift` readings beside those of `rgb`, (3, H, W),
-/// and returns (H, W). `depth` has NaN for no reading and at least one reading.
-pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>, shift: (f64, f64)) -> Array2<f32> {
+/// Returns the sum of colour edges under the edges of `depth`, moved by a shift and outward by a growth, and the sum of
+/// weights.
+fn evidence(
+    depth: ArrayView2<'_, f32>,
+    samples: usize,
+    edges: &[Array2<f64>; 2],
+    (shift_y, shift_x): (isize, isize),
+    growth: isize,
+) -> (f64, f64) {
+    let (h, w) = depth.dim();
+    let (rows, columns) = edges[0].dim();
+    let clamped = |i: isize, size: usize| i.clamp(0, size as isize - 1) as usize;
+    let at = |y: isize, x: isize| depth[(clamped(y, h), clamped(x, w))];
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for ((y, x), d) in depth.indexed_iter() {
+        for (axis, next) in [depth.get((y, x + 1)), depth.get((y + 1, x))].into_iter().enumerate() {
+            let (row, column) = (y as isize, x as isize);
+            let (dy, dx) = if axis == 0 { (0, 1) } else { (1, 0) };
+            let step = next.map_or(0.0, |next| next - d);
+            let around = [at(row - dy, column - dx), at(row + 2 * dy, column + 2 * dx)];
+            if step.is_nan() || step.abs() < *register::EDGE.start() || around.iter().any(|d| d.is_nan()) {
+                continue;
+            }
+            let after = at(row + dx, column + dy) + at(row + dx + dy, column + dy + dx);
+            let turn = after - at(row - dx, column - dy) - at(row - dx + dy, column - dy + dx);
+            let (right, down) = if axis == 0 { (step, turn) } else { (turn, step) };
+            let outward = |d: f32| if d < 0.0 { -growth } else { growth } * samples as isize;
+            let start = |i: usize, middle: bool, shift: isize, size: usize| {
+                let at = (i * samples + if middle { samples / 2 } else { 0 }) as isize - shift;
+                at.clamp(0, size as isize - 1) as usize
+            };
+            let top = start(y, axis == 1, shift_y + outward(down), rows);
+            let left = start(x, axis == 0, shift_x + outward(right), columns);
+            let weight = f64::from(step.abs().min(*register::EDGE.end()));
+            let reading = (top..(top + samples).min(rows))
+                .flat_map(|y| (left..(left + samples).min(columns)).map(move |x| (y, x)));
+            sum += weight * reading.map(|at| edges[axis][at]).sum::<f64>();
+            weights += weight;
+        }
+    }
+    (sum, weights)
+}
+
+/// Conditions the part `crop` of `depth`, (h, w), which lies beside `rgb`, (3, H, W), as `misfit` says, and returns
+/// (H, W). `depth` has NaN for no reading and at least one reading.
+pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>, misfit: Misfit) -> Array2<f32> {
+    let shift = misfit.shift;
     let (_, height, width) = rgb.dim();
     let rows = Axis::new(crop.y + shift.0, crop.height, depth.dim().0, height);
     let columns = Axis::new(crop.x + shift.1, crop.width, depth.dim().1, width);
@@ -93,11 +133,14 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
             .map(|(y, x)| [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)])))
             .collect()
     };
-    let mut readings = depth.to_owned();
-    for _ in 0..fill::PASSES {
+    let mut readings = narrowed(depth, misfit.growth);
+    let mut filled = readings.mapv(f32::is_nan);
+    for pass in 0..fill::PASSES {
         let before = readings.clone();
         for (at, value) in readings.indexed_iter_mut().filter(|(_, value)| value.is_nan()) {
-            *value = from_rim(&before, at, &colours);
+            if pass >= fill::ALIKE_PASSES || has_alike(&before, at, &colours) {
+                *value = surface(rim(&before, at, &colours)).0;
+            }
         }
     }
     fill_nearest(&mut readings).expect("there is a reading");
@@ -111,7 +154,18 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
             readings = fitted(&fitted(&readings, 0, 1), 1, 0);
         }
     }
-    let kinds = kinds(&readings);
+    let mut kinds = kinds_of(&readings);
+    if !clean && contradict::applies(crop, (height, width)) {
+        let before = readings.clone();
+        for (at, value) in readings.indexed_iter_mut().filter(|(at, _)| !kinds[*at].1) {
+            if near(depth.dim(), at, fill::REACH).any(|(at, _)| kinds[at].0)
+                && let Some(depth) = contradiction(&before, &kinds, at, &colours)
+            {
+                (*value, filled[at]) = (depth, true);
+            }
+        }
+        kinds = kinds_of(&readings);
+    }
     let choices = Array2::from_shape_fn((height, width), |(y, x)| {
         let (row, column) = (rows.reading(y), columns.reading(x));
         let around: [(usize, usize); 9] = std::array::from_fn(|k| {
@@ -126,9 +180,12 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
             let depth = place.of(&around.map(|at| readings[at]));
             return (depth, 0.0, f64::INFINITY);
         }
-        let surfaces = surfaces_of(around.map(|at| (readings[at], kinds[at].1)), &|k| {
-            colours(around[k].0, around[k].1)
+        let rounds = around.map(|at| match kinds[at] {
+            (_, true) => 2,
+            (is_edge, _) => usize::from(is_edge && filled[at]),
         });
+        let depths = around.map(|at| readings[at]);
+        let surfaces = surfaces_of(depths, rounds, &|k| colours(around[k].0, around[k].1));
         let colour = [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)]));
         let likelihood = |surface: &Surface| {
             let square: f64 = (0..3).map(|c| (colour[c] - surface.mean[c]).powi(2)).sum();
@@ -204,18 +261,49 @@ fn near(
         .map(move |at| (at, (at.0 as f64 - y as f64, at.1 as f64 - x as f64)))
 }
 
-fn from_rim(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>) -> f32 {
+/// Returns `depth` with near surfaces narrowed by `growth` readings, or as it is if no reading remains.
+fn narrowed(depth: ArrayView2<'_, f32>, growth: usize) -> Array2<f32> {
+    let narrowed = Array2::from_shape_fn(depth.dim(), |at| {
+        let around = || near(depth.dim(), at, growth);
+        let behind = around().filter(|(other, _)| depth[*other] - depth[at] > narrow::EDGE);
+        let nearest = behind.min_by(|a, b| a.1.0.hypot(a.1.1).total_cmp(&b.1.0.hypot(b.1.1)));
+        match nearest {
+            Some((other, _)) => depth[other],
+            None if around().any(|(other, _)| depth[other].is_nan()) => f32::NAN,
+            None => depth[at],
+        }
+    });
+    match narrowed.iter().all(|d| d.is_nan()) {
+        true => depth.to_owned(),
+        false => narrowed,
+    }
+}
+
+/// Returns the depth and the weight of each reading around one.
+fn rim(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>) -> Vec<(f32, f64)> {
     let own = mean(&colours(at.0, at.1));
-    let mut votes: Vec<(f32, f64)> = near(depth.dim(), at, fill::REACH)
-        .filter(|(at, _)| !depth[*at].is_nan())
-        .map(|(at, (dy, dx))| {
-            let theirs = mean(&colours(at.0, at.1));
-            let apart: f64 = (0..3).map(|c| (own[c] - theirs[c]).powi(2)).sum();
-            let weight = (1.0 + (dx * dx + dy * dy) / f64::from(fill::NEAR).powi(2))
-                * (1.0 + apart / f64::from(fill::ALIKE).powi(2));
-            (depth[at], weight.powi(-2))
-        })
-        .collect();
+    let around = near(depth.dim(), at, fill::REACH).map(|(at, (dy, dx))| {
+        let theirs = mean(&colours(at.0, at.1));
+        let apart: f64 = (0..3).map(|c| (own[c] - theirs[c]).powi(2)).sum();
+        let weight = (1.0 + (dx * dx + dy * dy) / f64::from(fill::NEAR).powi(2))
+            * (1.0 + apart / f64::from(fill::ALIKE).powi(2));
+        (depth[at], weight.powi(-2))
+    });
+    around.filter(|vote| !vote.0.is_nan()).collect()
+}
+
+/// Returns whether a reading around one has nearly its colour.
+fn has_alike(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>) -> bool {
+    let own = mean(&colours(at.0, at.1));
+    let known = near(depth.dim(), at, fill::REACH).filter(|(at, _)| !depth[*at].is_nan());
+    known.map(|(at, _)| mean(&colours(at.0, at.1))).any(|theirs| {
+        let apart: f64 = (0..3).map(|c| (own[c] - theirs[c]).powi(2)).sum();
+        apart <= f64::from(fill::ALIKE).powi(2)
+    })
+}
+
+/// Returns the mean and the weight of the votes that agree with their weighted median.
+fn surface(mut votes: Vec<(f32, f64)>) -> (f32, f64) {
     votes.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = votes.iter().map(|vote| vote.1).sum::<f64>() / 2.0;
     let mut sum = 0.0;
@@ -224,11 +312,28 @@ fn from_rim(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usi
         sum >= half
     });
     let Some(&(median, _)) = median else {
-        return f32::NAN;
+        return (f32::NAN, 0.0);
     };
     votes.retain(|vote| (vote.0 - median).abs() <= fill::TOLERANCE);
     let weights: f64 = votes.iter().map(|vote| vote.1).sum();
-    (votes.iter().map(|vote| f64::from(vote.0) * vote.1).sum::<f64>() / weights) as f32
+    let sum = votes.iter().map(|vote| f64::from(vote.0) * vote.1).sum::<f64>();
+    ((sum / weights) as f32, weights)
+}
+
+/// Returns the depth of the surface that contradicts a reading by its colour.
+fn contradiction(
+    depth: &Array2<f32>,
+    kinds: &Array2<(bool, bool)>,
+    at: (usize, usize),
+    colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>,
+) -> Option<f32> {
+    let mut unmixed = depth.clone();
+    unmixed.zip_mut_with(kinds, |d, kind| *d = if kind.1 { f32::NAN } else { *d });
+    let agrees = |vote: &(f32, f64)| (vote.0 - depth[at]).abs() <= fill::TOLERANCE;
+    let (own, others): (Vec<_>, Vec<_>) = rim(&unmixed, at, colours).into_iter().partition(agrees);
+    let own = own.iter().map(|vote| vote.1).sum::<f64>() + f64::from(contradict::OWN) - 1.0;
+    let (value, weight) = surface(others);
+    (weight > own).then_some(value)
 }
 
 /// Moves each reading onto the line that fits its neighbours in the direction (`dy`, `dx`) best.
@@ -256,7 +361,7 @@ fn fitted(depth: &Array2<f32>, dy: isize, dx: isize) -> Array2<f32> {
 }
 
 /// Returns whether each reading is at an edge, and whether it is mixed.
-fn kinds(depth: &Array2<f32>) -> Array2<(bool, bool)> {
+fn kinds_of(depth: &Array2<f32>) -> Array2<(bool, bool)> {
     let range = |at: (usize, usize), reach: usize| {
         near(depth.dim(), at, reach).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), (at, _)| {
             (a.min(depth[at]), b.max(depth[at]))
@@ -314,15 +419,17 @@ impl Surface {
     }
 }
 
-/// Groups 3×3 readings, each a depth and whether it is mixed, with their colours.
-fn surfaces_of(readings: [(f32, bool); 9], colours: &dyn Fn(usize) -> Vec<[f64; 3]>) -> Vec<Surface> {
+/// Groups 3×3 readings with their colours: in round 0 those that are neither filled nor mixed, in round 1 the filled
+/// ones, in round 2 the mixed ones.
+fn surfaces_of(readings: [f32; 9], rounds: [usize; 9], colours: &dyn Fn(usize) -> Vec<[f64; 3]>) -> Vec<Surface> {
     let mut found: Vec<Surface> = Vec::new();
-    for mixed in [false, true] {
+    for round in 0..3 {
+        let mixed = round == 2;
         for at in [4, 1, 3, 5, 7, 0, 2, 6, 8]
             .into_iter()
-            .filter(|at| readings[*at].1 == mixed)
+            .filter(|at| rounds[*at] == round)
         {
-            let depth = readings[at].0;
+            let depth = readings[at];
             found.sort_by(|a, b| a.depth.total_cmp(&b.depth));
             let apart = |surface: &Surface| (surface.depth - depth).abs();
             let nearest = (0..found.len()).min_by(|a, b| apart(&found[*a]).total_cmp(&apart(&found[*b])));
@@ -354,13 +461,20 @@ fn surfaces_of(readings: [(f32, bool); 9], colours: &dyn Fn(usize) -> Vec<[f64; 
             }
         }
     }
+    let count = found.len();
+    for at in (0..9).filter(|at| rounds[*at] == 1 && count > 1) {
+        let others = (1.0 - surfaces::FILLED) / (count - 1) as f32;
+        for covers in found.iter_mut().map(|surface| &mut surface.covers[at]) {
+            *covers = if *covers >= 1.0 { surfaces::FILLED } else { others };
+        }
+    }
     for surface in &mut found {
         surface.mean = mean(&surface.colours);
         let squares = surface.colours.iter().flatten().map(|v| v * v).sum::<f64>() / surface.colours.len() as f64;
         let square = surface.mean.iter().map(|v| v * v).sum::<f64>();
         surface.variance = (squares - square).max(f64::from(surfaces::LEAST_VARIANCE));
         surface.has = surface.covers.map(|covers| f32::from(covers >= 1.0));
-        surface.differences = std::array::from_fn(|k| surface.has[k] * (readings[k].0 - surface.depth));
+        surface.differences = std::array::from_fn(|k| surface.has[k] * (readings[k] - surface.depth));
     }
     found
 }

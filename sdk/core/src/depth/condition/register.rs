@@ -1,7 +1,10 @@
-//! Registration: finds the shift between depth and colour from their edges. The difference between two neighbouring
-//! readings marks an edge of depth between them, and the shift is right where the most colour edges lie under these.
+//! Registration: finds the shift between depth and colour from their edges, and by how many readings near surfaces are
+//! too wide, as sensors that compare windows of two pictures make them. The difference between two neighbouring
+//! readings marks an edge of depth between them. Shift and growth are right where the most colour edges lie under these.
 //!
+//! Growth moves an edge toward what is behind it, so the evidence of each diagonal direction is summed separately.
 //! Colour is sampled at up to four places per reading along each axis, so a shift is found to a quarter of a reading.
+//! Colour edges count in proportion to their surroundings: a texture has many.
 
 use crate::frame::Crop;
 use rayon::prelude::*;
@@ -13,14 +16,27 @@ pub(super) const REACH: usize = 6;
 /// The number of shifts along each axis.
 const SIDE: usize = 2 * REACH + 1;
 const SHIFTS: usize = SIDE * SIDE;
+/// The diagonal directions in which depth can grow at an edge.
+const DIRECTIONS: usize = 4;
+/// The number of sums in the evidence: one for each direction and shift, and the sum of the weights.
+const SUMS: usize = DIRECTIONS * SHIFTS + 1;
+/// The largest growth of near surfaces, in readings.
+pub(super) const MOST_GROWTH: usize = 3;
+/// The least ratio of the evidence for a growth to that for less.
+pub(super) const GROWTH_GAIN: f32 = 1.1;
 /// The least and the most difference of depth that counts at an edge, as a share of the volume.
 pub(super) const EDGE: std::ops::RangeInclusive<f32> = 0.05..=0.2;
 /// The colour change that counts half, as the sum of the changes of red, green and blue.
 pub(super) const HALF: f32 = 0.2;
+/// The side of the tiles, in samples, whose mean colour edge an edge is compared with, and the least mean.
+pub(super) const TILE: usize = 16;
+pub(super) const FAINT: f32 = 0.02;
 /// The number of standard deviations by which the best shift must exceed the mean of all shifts.
 pub(super) const DISTINCT: f32 = 2.0;
 /// The least sum of differences of depth.
-pub(super) const LEAST_EDGES: f32 = 4.0;
+pub(super) const LEAST_EDGES: f32 = 8.0;
+/// The best shift and growth without evidence.
+const NONE: (usize, usize) = (SHIFTS / 2, 0);
 /// The number of frames from one search to the next. Cameras do not move against each other.
 const INTERVAL: u32 = 4;
 /// The share of the evidence that remains in the next search.
@@ -28,7 +44,16 @@ const MEMORY: f32 = 0.7;
 /// The relative gain in evidence at which a shift replaces the one of the previous frame.
 pub(super) const GAIN: f32 = 1.02;
 
-/// Finds the shift of a sequence of frames.
+/// How depth lies beside colour.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Misfit {
+    /// The distance (y, x) of the edges of depth from those of colour, in readings.
+    pub shift: (f64, f64),
+    /// The number of readings by which near surfaces are too wide on every side.
+    pub growth: usize,
+}
+
+/// Finds the misfit of a sequence of frames.
 pub(super) struct Registration {
     /// (H, W) of the readings.
     shape: (usize, usize),
@@ -42,14 +67,15 @@ pub(super) struct Registration {
     colour: Vec<f32>,
     /// The colour edges in a reading's size around each sample, along x and along y.
     edges: [Vec<f32>; 2],
-    /// The evidence of each row of readings: [`SHIFTS`] sums, and the sum of the weights.
-    rows: Vec<[f32; SHIFTS + 1]>,
+    /// The evidence of each row of readings.
+    rows: Vec<[f32; SUMS]>,
     /// The evidence of all frames so far.
-    evidence: [f32; SHIFTS + 1],
-    best: usize,
+    evidence: [f32; SUMS],
+    /// The index of the best shift, and the best growth.
+    best: (usize, usize),
     /// The number of frames since the last search, or `None` before the first.
     age: Option<u32>,
-    found: (f64, f64),
+    found: Misfit,
 }
 
 impl Registration {
@@ -77,24 +103,23 @@ impl Registration {
             out,
             colour: vec![0.0; 3 * size],
             edges: [vec![0.0; size], vec![0.0; size]],
-            rows: vec![[0.0; SHIFTS + 1]; shape.0],
-            evidence: [0.0; SHIFTS + 1],
-            best: SHIFTS / 2,
+            rows: vec![[0.0; SUMS]; shape.0],
+            evidence: [0.0; SUMS],
+            best: NONE,
             age: None,
-            found: (0.0, 0.0),
+            found: Misfit::default(),
         }
     }
 
     /// Forgets the frames so far.
     pub(super) fn reset(&mut self) {
         self.evidence.fill(0.0);
-        self.best = SHIFTS / 2;
+        self.best = NONE;
         self.age = None;
     }
 
-    /// Returns the distance (y, x) of the edges of `depth`, which may contain NaN, from those of `rgb`, (3, H, W), in
-    /// readings, or 0 if the evidence is weak.
-    pub(super) fn shift(&mut self, depth: &[f32], rgb: &[f32]) -> (f64, f64) {
+    /// Returns how `depth`, which may contain NaN, lies beside `rgb`, (3, H, W). Without evidence it does not.
+    pub(super) fn misfit(&mut self, depth: &[f32], rgb: &[f32]) -> Misfit {
         self.age = self.age.map(|age| age + 1).filter(|age| *age < INTERVAL).or(Some(0));
         if self.age == Some(0) {
             self.found = self.search(depth, rgb);
@@ -102,7 +127,7 @@ impl Registration {
         self.found
     }
 
-    fn search(&mut self, depth: &[f32], rgb: &[f32]) -> (f64, f64) {
+    fn search(&mut self, depth: &[f32], rgb: &[f32]) -> Misfit {
         self.sample(rgb);
         self.find_edges();
         self.compare(depth);
@@ -110,20 +135,50 @@ impl Registration {
         for row in &self.rows {
             self.evidence.iter_mut().zip(row).for_each(|(sum, v)| *sum += v);
         }
-        let sums = &self.evidence[..SHIFTS];
-        let top = (0..SHIFTS)
-            .max_by(|a, b| sums[*a].total_cmp(&sums[*b]))
-            .unwrap_or(SHIFTS / 2);
-        if sums[top] > GAIN * sums[self.best] {
+        let top = self.top();
+        if self.support(top) > GAIN * self.support(self.best) {
             self.best = top;
         }
-        let mean = sums.iter().sum::<f32>() / SHIFTS as f32;
-        let variance = sums.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / SHIFTS as f32;
-        if self.evidence[SHIFTS] < LEAST_EDGES || sums[self.best] - mean < DISTINCT * variance.sqrt() {
-            return (0.0, 0.0);
+        let sums = || (0..SHIFTS).map(|shift| self.support((shift, 0)));
+        let mean = sums().sum::<f32>() / SHIFTS as f32;
+        let variance = sums().map(|v| (v - mean) * (v - mean)).sum::<f32>() / SHIFTS as f32;
+        let weak = self.evidence[SUMS - 1] < LEAST_EDGES;
+        if weak || self.support(self.best) - mean < DISTINCT * variance.sqrt() {
+            return Misfit::default();
         }
+        let (shift, growth) = self.best;
         let steps = |i: usize| (i as f64 - REACH as f64) / self.samples as f64;
-        (steps(self.best / SIDE), steps(self.best % SIDE))
+        Misfit {
+            shift: (steps(shift / SIDE), steps(shift % SIDE)),
+            growth,
+        }
+    }
+
+    /// Returns the evidence for a shift and a growth.
+    fn support(&self, (shift, growth): (usize, usize)) -> f32 {
+        let by = growth * self.samples;
+        let (down, up) = (shift + by * SIDE, shift - by * SIDE);
+        let places = [down + by, down - by, up + by, up - by];
+        let of_directions = self.evidence.chunks_exact(SHIFTS).zip(places);
+        of_directions.map(|(sums, place)| sums[place]).sum()
+    }
+
+    /// Returns the shift and the growth with the most evidence.
+    fn top(&self) -> (usize, usize) {
+        let mut best = NONE;
+        for growth in (0..=MOST_GROWTH).take_while(|growth| growth * self.samples <= REACH) {
+            let range = growth * self.samples..SIDE - growth * self.samples;
+            let shifts = range.clone().flat_map(|y| range.clone().map(move |x| y * SIDE + x));
+            let top = shifts
+                .map(|shift| (shift, growth))
+                .max_by(|a, b| self.support(*a).total_cmp(&self.support(*b)))
+                .unwrap_or(NONE);
+            let gain = if growth == 0 { 1.0 } else { GROWTH_GAIN };
+            if self.support(top) > gain * self.support(best) {
+                best = top;
+            }
+        }
+        best
     }
 
     /// Samples the colours. Samples outside the display are NaN.
@@ -153,17 +208,36 @@ impl Registration {
             // Nothing is known of edges outside the display.
             if sum.is_nan() { 0.0 } else { sum / (sum + HALF) }
         };
+        // The edges lie between two readings, so the samples around an edge are as many on both sides.
+        let before = 1 - samples % 2;
         let [along_x, along_y] = &mut self.edges;
         along_x.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
             let at = |x: usize| y * width + x;
             for (x, to) in row.iter_mut().enumerate() {
-                *to = change(at(x.saturating_sub(1)), at((x + 1).min(width - 1)));
+                *to = change(at(x.saturating_sub(before)), at((x + 1).min(width - 1)));
             }
         });
         along_y.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-            let (above, below) = (y.saturating_sub(1) * width, (y + 1).min(height - 1) * width);
+            let (above, below) = (y.saturating_sub(before) * width, (y + 1).min(height - 1) * width);
             for (x, to) in row.iter_mut().enumerate() {
                 *to = change(above + x, below + x);
+            }
+        });
+        let bands = along_x
+            .par_chunks_mut(TILE * width)
+            .zip(along_y.par_chunks_mut(TILE * width));
+        bands.for_each(|(along_x, along_y)| {
+            for left in (0..width).step_by(TILE) {
+                let tile = left..(left + TILE).min(width);
+                let sum = |edges: &[f32]| {
+                    let rows = edges.chunks_exact(width);
+                    rows.map(|row| row[tile.clone()].iter().sum::<f32>()).sum::<f32>()
+                };
+                let count = 2 * tile.len() * along_x.len() / width;
+                let scale = 1.0 / ((sum(along_x) + sum(along_y)) / count as f32 + FAINT);
+                for row in along_x.chunks_exact_mut(width).chain(along_y.chunks_exact_mut(width)) {
+                    row[tile.clone()].iter_mut().for_each(|edge| *edge *= scale);
+                }
             }
         });
         // Sums over a reading: to the right, then downward. The colours are not needed any more.
@@ -183,7 +257,7 @@ impl Registration {
         }
     }
 
-    /// Sums the colour edges under the depth edges of each row, for each shift.
+    /// Sums the colour edges under the depth edges of each row, for each direction and shift.
     fn compare(&mut self, depth: &[f32]) {
         let (h, w) = self.shape;
         let (samples, width, height) = (self.samples, self.samples * w, self.samples * h);
@@ -191,23 +265,18 @@ impl Registration {
         self.rows.par_iter_mut().enumerate().for_each(|(y, sums)| {
             sums.fill(0.0);
             for x in 0..w {
-                let at = y * w + x;
-                // The edge lies between the middles of two readings: along x, or along y.
-                for (axis, next, inside) in [(0, at + 1, x + 1 < w), (1, at + w, y + 1 < h)] {
-                    if !inside {
+                for axis in [0, 1] {
+                    let Some((step, direction)) = step(depth, self.shape, (y, x), axis) else {
                         continue;
-                    }
-                    let step = (depth[next] - depth[at]).abs();
-                    if step.is_nan() || step < *EDGE.start() {
-                        continue;
-                    }
-                    let step = step.min(*EDGE.end());
-                    sums[SHIFTS] += step;
+                    };
+                    sums[SUMS - 1] += step;
+                    // The edge lies between the middles of two readings: along x, or along y.
                     let (top, left) = match axis {
                         0 => (samples * y, samples * x + samples / 2),
                         _ => (samples * y + samples / 2, samples * x),
                     };
-                    for (i, sums) in sums[..SHIFTS].chunks_exact_mut(SIDE).enumerate() {
+                    let sums = &mut sums[direction * SHIFTS..][..SHIFTS];
+                    for (i, sums) in sums.chunks_exact_mut(SIDE).enumerate() {
                         let row = (top + REACH).saturating_sub(i).min(height - 1);
                         for (j, sum) in sums.iter_mut().enumerate() {
                             let column = (left + REACH).saturating_sub(j).min(width - 1);
@@ -218,4 +287,28 @@ impl Registration {
             }
         });
     }
+}
+
+/// Returns the weight and the direction of the edge of `depth` between the reading (`y`, `x`) and the next one along
+/// x (`axis` 0) or y (1), or `None` without an edge.
+///
+/// An edge beside a hole does not count: the hole may hide where the near surface ends.
+fn step(depth: &[f32], (h, w): (usize, usize), (y, x): (usize, usize), axis: usize) -> Option<(f32, usize)> {
+    let at = y * w + x;
+    let along = [(x, w, 1), (y, h, w)];
+    let ((i, n, by), (j, m, across)) = (along[axis], along[1 - axis]);
+    if i + 1 >= n {
+        return None;
+    }
+    let step = depth[at + by] - depth[at];
+    let beside_hole = i > 0 && depth[at - by].is_nan() || i + 2 < n && depth[at + 2 * by].is_nan();
+    if step.is_nan() || step.abs() < *EDGE.start() || beside_hole {
+        return None;
+    }
+    let before = if j > 0 { at - across } else { at };
+    let after = if j + 1 < m { at + across } else { at };
+    let turn = depth[after] + depth[after + by] - depth[before] - depth[before + by];
+    let (right, down) = if axis == 0 { (step, turn) } else { (turn, step) };
+    let direction = 2 * usize::from(down < 0.0) + usize::from(right < 0.0);
+    Some((step.abs().min(*EDGE.end()), direction))
 }

@@ -1,7 +1,8 @@
 //! The surfaces at an edge: groups of the 3×3 readings around a reading, with their colours.
 //!
 //! Readings that are not mixed form the surfaces. A mixed reading between two surfaces covers a share of each, by its
-//! depth; one beyond all surfaces is the only reading of a surface of its own, such as a thin bar.
+//! depth; one beyond all surfaces is the only reading of a surface of its own, such as a thin bar. A filled reading
+//! covers a share of every surface, since nothing is known of its place but its colour.
 
 use super::colour::Moments;
 use super::edges::Kind;
@@ -10,6 +11,8 @@ use super::edges::Kind;
 pub(super) const TOLERANCE: f32 = 0.03;
 /// The largest number of surfaces.
 pub(super) const MOST: usize = 4;
+/// The share of a filled reading that the surface of its depth covers.
+pub(super) const FILLED: f32 = 0.6;
 /// The least variance of a surface's colour, summed over red, green and blue.
 pub(super) const LEAST_VARIANCE: f32 = 0.003;
 /// The 3×3 readings, nearest first.
@@ -87,10 +90,16 @@ impl Readings<'_> {
     /// Groups the 3×3 readings at the indices `around` and returns the number of surfaces.
     pub(super) fn surfaces(&self, around: &[usize; 9], surfaces: &mut [Surface; MOST]) -> usize {
         let mut count = 0;
-        for mixed in [false, true] {
+        for round in 0..3 {
+            let mixed = round == 2;
             for at in ORDER {
                 let i = around[at];
-                if (self.kinds[i] == Kind::Mixed) != mixed {
+                let of_round = match self.kinds[i] {
+                    Kind::Inside | Kind::Edge => 0,
+                    Kind::Filled => 1,
+                    Kind::Mixed => 2,
+                };
+                if of_round != round {
                     continue;
                 }
                 let depth = self.depth[i];
@@ -107,6 +116,15 @@ impl Readings<'_> {
                 } else if count < MOST {
                     surfaces[count] = Surface::new(at, depth, &self.colours[i]);
                     count += 1;
+                }
+            }
+        }
+        if count > 1 {
+            for at in ORDER.into_iter().filter(|at| self.kinds[around[*at]] == Kind::Filled) {
+                let others = (1.0 - FILLED) / (count - 1) as f32;
+                for surface in &mut surfaces[..count] {
+                    let own = surface.covers[at] >= 1.0;
+                    surface.covers[at] = if own { FILLED } else { others };
                 }
             }
         }
