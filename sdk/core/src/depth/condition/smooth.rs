@@ -1,6 +1,7 @@
 //! Smoothing within surfaces. Along rows and then columns, each reading moves onto the line that fits its neighbours of
 //! the same surface best, so that slopes stay slopes.
 
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// The number of neighbours on each side.
@@ -49,7 +50,7 @@ pub(super) fn smooth(readings: &mut [f32], width: usize, scratch: &mut SmoothScr
             .for_each(|((to, padded), row)| {
                 padded[REACH..REACH + width].copy_from_slice(row);
                 let padded = &*padded;
-                fit(std::array::from_fn(|k| &padded[k..k + width]), to);
+                wide!(fit(std::array::from_fn(|k| &padded[k..k + width]), to));
             });
         let row = |y: usize| match (REACH..height + REACH).contains(&y) {
             true => &along_rows[(y - REACH) * width..][..width],
@@ -57,13 +58,14 @@ pub(super) fn smooth(readings: &mut [f32], width: usize, scratch: &mut SmoothScr
         };
         (readings.par_chunks_exact_mut(width))
             .enumerate()
-            .for_each(|(y, to)| fit(std::array::from_fn(|k| row(y + k)), to));
+            .for_each(|(y, to)| wide!(fit(std::array::from_fn(|k| row(y + k)), to)));
     }
 }
 
 /// Fits a line through the values of `taps` at each place and writes its value in the middle tap to `to`.
 ///
 /// The weights are Tukey's biweight of the difference from the middle tap.
+#[inline(always)]
 fn fit(taps: [&[f32]; TAPS], to: &mut [f32]) {
     let taps = taps.map(|tap| &tap[..to.len()]);
     for (x, to) in to.iter_mut().enumerate() {
