@@ -5,7 +5,7 @@ use crate::options::EncoderOptions;
 use crate::statistics::FrameTimes;
 use crate::target::Target;
 use num_complex::Complex32;
-use phasefront::output::{Output, Placement};
+use phasefront::output::{self, Layout, Output, Placement};
 use phasefront::session;
 use std::sync::Arc;
 
@@ -14,6 +14,57 @@ use std::sync::Arc;
 #[derive(Debug, uniffi::Object)]
 pub struct RawHologram {
     pub(crate) core: session::Hologram,
+}
+
+/// The images that a modulator's input takes of a hologram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
+pub struct OutputSize {
+    /// The width of an image in pixels.
+    pub width: usize,
+    /// The height of an image in pixels.
+    pub height: usize,
+    /// The number of bytes of a pixel.
+    pub pixel_bytes: usize,
+    /// The number of images: one, or one for each colour.
+    pub images: usize,
+}
+
+impl From<output::OutputSize> for OutputSize {
+    fn from(size: output::OutputSize) -> Self {
+        OutputSize {
+            width: size.width,
+            height: size.height,
+            pixel_bytes: size.pixel_bytes,
+            images: size.images,
+        }
+    }
+}
+
+/// The caller's memory for an image. The layers written by hand promise that it stays valid during the call and that
+/// nobody else uses it.
+#[derive(Debug, Clone, Copy, uniffi::Record)]
+pub struct RawMemory {
+    /// The address of the first byte.
+    pub address: u64,
+    /// The number of bytes.
+    pub length: u64,
+    /// The number of bytes from one row to the next.
+    pub row_stride: usize,
+}
+
+impl RawMemory {
+    /// Returns the bytes.
+    ///
+    /// # Errors
+    /// Returns an error if there is no memory.
+    #[allow(unsafe_code)]
+    pub(crate) fn bytes<'a>(self) -> Result<&'a mut [u8], PhasefrontError> {
+        if self.address == 0 {
+            return Err(PhasefrontError::Setting("the image has no memory".into()));
+        }
+        // SAFETY: the promise of the layers.
+        Ok(unsafe { std::slice::from_raw_parts_mut(self.address as usize as *mut u8, self.length as usize) })
+    }
 }
 
 /// The properties of a hologram.
@@ -131,20 +182,23 @@ impl RawHologram {
         self.core.z_at(x, y) * 1e3
     }
 
-    /// Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
+    /// Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
     ///
     /// # Errors
-    /// Returns an error if the image is empty or z is too far away.
-    pub fn preview(&self, z_mm: f64, width: usize, height: usize) -> Result<Arc<RawImage>, PhasefrontError> {
+    /// Returns an error if the image is empty or does not fit, or z is too far away.
+    pub fn write_preview(
+        &self,
+        z_mm: f64,
+        width: usize,
+        height: usize,
+        layout: Layout,
+        to: RawMemory,
+    ) -> Result<(), PhasefrontError> {
         guard(|| {
-            let mut bytes = vec![0; session::Hologram::preview_bytes(height, width)?];
-            self.core.preview(z_mm / 1e3, height, width, &mut bytes)?;
-            Ok(Arc::new(RawImage {
-                bytes,
-                width,
-                height,
-                pixel_bytes: 4,
-            }))
+            let screen = (height, width);
+            Ok(self
+                .core
+                .write_preview(z_mm / 1e3, screen, layout, to.bytes()?, to.row_stride)?)
         })
     }
 
@@ -165,23 +219,29 @@ impl RawHologram {
         guard(|| Ok(self.planes(Numbers::Field(self.core.field(z_mm / 1e3)?))))
     }
 
-    /// Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
-    /// levels in the upper bits of a byte; `placement` positions the hologram.
+    /// Returns the size of the images of `layout` for the modulator.
+    pub fn output_size(&self, layout: Layout) -> OutputSize {
+        let (height, width) = self.core.target().modulator();
+        OutputSize {
+            width,
+            height,
+            pixel_bytes: layout.pixel_bytes(),
+            images: layout.images(self.core.colours()),
+        }
+    }
+
+    /// Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
+    /// fewer bits than their place use its upper bits; `placement` positions the hologram.
     ///
     /// # Errors
-    /// Returns an error if the layout does not have this image.
-    pub fn output(&self, placement: Placement, image: usize) -> Result<Arc<RawImage>, PhasefrontError> {
+    /// Returns an error if the layout does not have this image or the image does not fit.
+    pub fn write_output(&self, placement: Placement, image: usize, to: RawMemory) -> Result<(), PhasefrontError> {
         guard(|| {
             let plan = Output::new(self.core.target(), self.core.shape(), placement)?;
-            let mut bytes = vec![0; plan.image_bytes()];
-            plan.write(self.core.output_levels(), image, &mut bytes)?;
-            let (height, width) = plan.shape();
-            Ok(Arc::new(RawImage {
-                bytes,
-                width: width,
-                height: height,
-                pixel_bytes: placement.layout.pixel_bytes(),
-            }))
+            let (levels, bytes) = (self.core.output_levels(), to.bytes()?);
+            Ok(self
+                .core
+                .on_threads(|| plan.write(levels, image, bytes, to.row_stride))?)
         })
     }
 }
@@ -265,47 +325,5 @@ impl RawPlanes {
     /// Returns the number of planes: 3, or 1 for a display with one laser.
     pub fn colours(&self) -> usize {
         self.colours
-    }
-}
-
-/// An image without gaps between rows. The layers written by hand read it.
-#[derive(Debug, uniffi::Object)]
-pub struct RawImage {
-    pub(crate) bytes: Vec<u8>,
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pub(crate) pixel_bytes: usize,
-}
-
-#[uniffi::export]
-impl RawImage {
-    /// Returns another handle to the same image. Each reader of its memory holds one.
-    pub fn share(self: Arc<Self>) -> Arc<Self> {
-        self
-    }
-
-    /// Returns the address of the bytes. It is valid as long as this object.
-    pub fn address(&self) -> u64 {
-        self.bytes.as_ptr() as u64
-    }
-
-    /// Returns the number of bytes.
-    pub fn byte_len(&self) -> u64 {
-        self.bytes.len() as u64
-    }
-
-    /// Returns the width in pixels.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Returns the height in pixels.
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
-    /// Returns the number of bytes of a pixel.
-    pub fn pixel_bytes(&self) -> usize {
-        self.pixel_bytes
     }
 }

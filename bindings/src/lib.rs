@@ -6,7 +6,8 @@
 //! crate follows these rules:
 //!
 //! - Images are passed as `&[u8]`, which UniFFI passes without a copy. Results are objects whose memory is read in
-//!   place, at an address that is valid as long as the object. Nothing is passed pixel by pixel.
+//!   place, at an address that is valid as long as the object, and images are written into memory of the caller. Nothing
+//!   is passed pixel by pixel.
 //! - Every call that can fail returns a result. A panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 
@@ -28,12 +29,13 @@ pub use display::{Display, display_from_toml};
 pub use error::guard;
 pub use error::{ListenerError, PhasefrontError};
 pub use frame::{Cameras, ColourFormat, ColourInfo, ConfidenceInfo, DepthInfo, FrameInfo, PlaneInfo, Pose};
-pub use hologram::{HologramInfo, RawHologram, RawImage, RawPlanes};
+pub use hologram::{HologramInfo, OutputSize, RawHologram, RawMemory, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
-pub use modulator::RawModulator;
+pub use modulator::{RawModulator, modulator_names};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{
-    Brightness, EncoderOptions, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, session_options,
+    Brightness, EncoderOptions, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, phone_options,
+    session_options,
 };
 pub use phasefront::input::{ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix};
 pub use phasefront::output::{Layout, Placement};

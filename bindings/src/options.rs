@@ -220,8 +220,13 @@ pub enum Layout {
     Rgba,
     /// One image with bytes blue, green, red, alpha 255.
     Bgra,
+    /// One image with 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
+    /// RGBA_1010102, Metal's rgb10a2.
+    Rgb10,
     /// One image for each colour in the order red, green, blue, with one byte for each pixel.
     Grey,
+    /// One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
+    Grey16,
 }
 
 /// The placement of a hologram on its modulator.
@@ -267,6 +272,28 @@ pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<Se
             None => default_options(&target.core),
         };
         Ok(SessionOptions::new(target, defaults))
+    })
+}
+
+/// Returns options for a live session on a phone: the defaults of [`session_options`] with a target rate and three
+/// quality levels, at the modulator's resolution and at three quarters and half of it along each side. The session
+/// lowers the level when frames are too slow for the rate or the device is hot, and raises it when there is time left.
+#[uniffi::export(default(rate_hz = 30.0, method = None))]
+pub fn phone_options(
+    target: Arc<Target>,
+    rate_hz: f64,
+    method: Option<Method>,
+) -> Result<SessionOptions, PhasefrontError> {
+    guard(|| {
+        let mut options = session_options(target, method)?;
+        let best = options.quality_levels[0].clone();
+        options.quality_levels.extend([3, 2].map(|quarters| QualityLevel {
+            width: (best.width * quarters / 4).max(1),
+            height: (best.height * quarters / 4).max(1),
+            ..best.clone()
+        }));
+        options.target_rate_hz = Some(rate_hz);
+        Ok(options)
     })
 }
 

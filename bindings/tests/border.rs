@@ -5,18 +5,19 @@
 use std::path::Path;
 
 /// The calls that only read what exists already, and the end of a session, which has no error to report.
-const PLAIN: [&str; 14] = [
-    "address",
-    "byte_len",
+const PLAIN: [&str; 15] = [
     "colours",
     "display",
     "height",
     "info",
+    "modulator_names",
+    "output_size",
     "pixel_bytes",
     "plane_len",
     "share",
     "shut_down",
     "statistics",
+    "target",
     "version",
     "width",
     "z_at",

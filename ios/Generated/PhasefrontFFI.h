@@ -356,9 +356,9 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_field(uint64_t ptr, double 
 RustBuffer uniffi_phasefront_ffi_fn_method_rawhologram_info(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_OUTPUT
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_OUTPUT
-uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_output(uint64_t ptr, RustBuffer placement, int32_t image, RustCallStatus *_Nonnull out_status
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_OUTPUT_SIZE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_OUTPUT_SIZE
+RustBuffer uniffi_phasefront_ffi_fn_method_rawhologram_output_size(uint64_t ptr, RustBuffer layout, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PLANE_ADDRESS
@@ -371,11 +371,6 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_plane_address(uint64_t ptr,
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_plane_len(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PREVIEW
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PREVIEW
-uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_preview(uint64_t ptr, double z_mm, int32_t width, int32_t height, RustCallStatus *_Nonnull out_status
-);
-#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_REFOCUS
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_REFOCUS
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_refocus(uint64_t ptr, double z_mm, RustCallStatus *_Nonnull out_status
@@ -386,49 +381,19 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_refocus(uint64_t ptr, doubl
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_share(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_WRITE_OUTPUT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_WRITE_OUTPUT
+void uniffi_phasefront_ffi_fn_method_rawhologram_write_output(uint64_t ptr, RustBuffer placement, int32_t image, RustBuffer to, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_WRITE_PREVIEW
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_WRITE_PREVIEW
+void uniffi_phasefront_ffi_fn_method_rawhologram_write_preview(uint64_t ptr, double z_mm, int32_t width, int32_t height, RustBuffer layout, RustBuffer to, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_Z_AT
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_Z_AT
 double uniffi_phasefront_ffi_fn_method_rawhologram_z_at(uint64_t ptr, double x, double y, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWIMAGE
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWIMAGE
-uint64_t uniffi_phasefront_ffi_fn_clone_rawimage(uint64_t handle, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWIMAGE
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWIMAGE
-void uniffi_phasefront_ffi_fn_free_rawimage(uint64_t handle, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_ADDRESS
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_ADDRESS
-uint64_t uniffi_phasefront_ffi_fn_method_rawimage_address(uint64_t ptr, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_BYTE_LEN
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_BYTE_LEN
-uint64_t uniffi_phasefront_ffi_fn_method_rawimage_byte_len(uint64_t ptr, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_HEIGHT
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_HEIGHT
-int32_t uniffi_phasefront_ffi_fn_method_rawimage_height(uint64_t ptr, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_PIXEL_BYTES
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_PIXEL_BYTES
-int32_t uniffi_phasefront_ffi_fn_method_rawimage_pixel_bytes(uint64_t ptr, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_SHARE
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_SHARE
-uint64_t uniffi_phasefront_ffi_fn_method_rawimage_share(uint64_t ptr, RustCallStatus *_Nonnull out_status
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_WIDTH
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_WIDTH
-int32_t uniffi_phasefront_ffi_fn_method_rawimage_width(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWPLANES
@@ -511,9 +476,14 @@ uint64_t uniffi_phasefront_ffi_fn_constructor_rawmodulator_from_toml(RustBuffer 
 uint64_t uniffi_phasefront_ffi_fn_constructor_rawmodulator_named(RustBuffer name, RustCallStatus *_Nonnull out_status
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_PACK
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_PACK
-RustBuffer uniffi_phasefront_ffi_fn_method_rawmodulator_pack(uint64_t ptr, uint64_t hologram, RustCallStatus *_Nonnull out_status
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_OUTPUT_SIZE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_OUTPUT_SIZE
+RustBuffer uniffi_phasefront_ffi_fn_method_rawmodulator_output_size(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_READ
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_READ
+void uniffi_phasefront_ffi_fn_method_rawmodulator_read(uint64_t ptr, ForeignBytes images, int32_t width, int32_t height, RustBuffer to, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_TARGET
@@ -521,9 +491,9 @@ RustBuffer uniffi_phasefront_ffi_fn_method_rawmodulator_pack(uint64_t ptr, uint6
 uint64_t uniffi_phasefront_ffi_fn_method_rawmodulator_target(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_UNPACK
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_UNPACK
-uint64_t uniffi_phasefront_ffi_fn_method_rawmodulator_unpack(uint64_t ptr, ForeignBytes images, int32_t width, int32_t height, RustCallStatus *_Nonnull out_status
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_WRITE_OUTPUT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_WRITE_OUTPUT
+void uniffi_phasefront_ffi_fn_method_rawmodulator_write_output(uint64_t ptr, uint64_t hologram, int32_t image, RustBuffer to, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_HOLOGRAMNETWORK
@@ -737,9 +707,20 @@ RustBuffer uniffi_phasefront_ffi_fn_func_display_from_toml(RustBuffer text, Rust
 void uniffi_phasefront_ffi_fn_func_set_log_listener(RustBuffer level, RustBuffer listener, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_MODULATOR_NAMES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_MODULATOR_NAMES
+RustBuffer uniffi_phasefront_ffi_fn_func_modulator_names(RustCallStatus *_Nonnull out_status
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_BUILT_IN_PAIR
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_BUILT_IN_PAIR
 RustBuffer uniffi_phasefront_ffi_fn_func_built_in_pair(double offset_mm, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_PHONE_OPTIONS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_PHONE_OPTIONS
+RustBuffer uniffi_phasefront_ffi_fn_func_phone_options(uint64_t target, double rate_hz, RustBuffer method, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SESSION_OPTIONS
@@ -1030,9 +1011,21 @@ uint16_t uniffi_phasefront_ffi_checksum_func_set_log_listener(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_MODULATOR_NAMES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_MODULATOR_NAMES
+uint16_t uniffi_phasefront_ffi_checksum_func_modulator_names(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_BUILT_IN_PAIR
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_BUILT_IN_PAIR
 uint16_t uniffi_phasefront_ffi_checksum_func_built_in_pair(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_PHONE_OPTIONS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_PHONE_OPTIONS
+uint16_t uniffi_phasefront_ffi_checksum_func_phone_options(void
     
 );
 #endif
@@ -1060,9 +1053,9 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_info(void
     
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_OUTPUT
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_OUTPUT
-uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_output(void
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_OUTPUT_SIZE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_OUTPUT_SIZE
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_output_size(void
     
 );
 #endif
@@ -1078,12 +1071,6 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len(void
     
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_PREVIEW
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_PREVIEW
-uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_preview(void
-    
-);
-#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_REFOCUS
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_REFOCUS
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_refocus(void
@@ -1096,45 +1083,21 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_share(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_WRITE_OUTPUT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_WRITE_OUTPUT
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_write_output(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_WRITE_PREVIEW
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_WRITE_PREVIEW
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_write_preview(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_Z_AT
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_Z_AT
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_z_at(void
-    
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_ADDRESS
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_ADDRESS
-uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_address(void
-    
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_BYTE_LEN
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_BYTE_LEN
-uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_byte_len(void
-    
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_HEIGHT
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_HEIGHT
-uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_height(void
-    
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_PIXEL_BYTES
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_PIXEL_BYTES
-uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_pixel_bytes(void
-    
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_SHARE
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_SHARE
-uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_share(void
-    
-);
-#endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_WIDTH
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_WIDTH
-uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_width(void
     
 );
 #endif
@@ -1180,9 +1143,15 @@ uint16_t uniffi_phasefront_ffi_checksum_method_loglistener_on_log(void
     
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_PACK
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_PACK
-uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_pack(void
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_OUTPUT_SIZE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_OUTPUT_SIZE
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_output_size(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_READ
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_READ
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_read(void
     
 );
 #endif
@@ -1192,9 +1161,9 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_target(void
     
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_UNPACK
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_UNPACK
-uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_unpack(void
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_WRITE_OUTPUT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_WRITE_OUTPUT
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_write_output(void
     
 );
 #endif

@@ -76,6 +76,9 @@ pub mod output {
     pub use phasefront_core::display::levels::Levels;
     pub use phasefront_core::output::modulator::{ModulatorSpec, Packing};
     pub use phasefront_core::output::{BitPlanes, Cells, Layout, Output, Placement};
+    // For the bindings, which have them in each language.
+    #[doc(hidden)]
+    pub use phasefront_core::output::{ModulatorInput, OutputSize};
 }
 pub mod session;
 pub mod target {

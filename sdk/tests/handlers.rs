@@ -9,6 +9,7 @@ mod counting;
 use camera::{Scene, frame, options};
 use counting::HELD;
 use phasefront::input::DepthFormat;
+use phasefront::output::Layout;
 use phasefront::session::{Event, Quality, SessionHandle};
 use phasefront::{Hologram, LiveSession, SessionOptions, VideoSession};
 use std::sync::atomic::Ordering;
@@ -138,7 +139,7 @@ fn calling_back() {
                     process(&calling, 9).map(|_| ()),
                     process(&other, 9).map(|_| ()),
                     calling.warm_up(),
-                    view.preview(0.0, 8, 8, &mut rgba),
+                    view.write_preview(0.0, (8, 8), Layout::Rgba, &mut rgba, 32),
                 ];
                 calling.set_quality(Quality::Fixed(0)).unwrap();
                 calling.pause();

@@ -13,10 +13,11 @@ public final class CGDataProvider {
         releaseData: @escaping CGDataProviderReleaseDataCallback
     ) { fatalError() }
 }
-public enum CGImageAlphaInfo: UInt32, Sendable { case none, noneSkipLast }
+public enum CGImageAlphaInfo: UInt32, Sendable { case none, noneSkipLast, noneSkipFirst }
 public struct CGBitmapInfo: OptionSet, Sendable {
     public let rawValue: UInt32
     public init(rawValue: UInt32) { self.rawValue = rawValue }
+    public static let byteOrder32Little = CGBitmapInfo(rawValue: 2 << 12)
 }
 public enum CGColorRenderingIntent: Int32, Sendable { case defaultIntent }
 public final class CGImage: @unchecked Sendable {

@@ -54,18 +54,16 @@ int main(int count, char **arguments) {
                                .height = depth.height,
                                .plane = {depths, PNG_IMAGE_SIZE(depth), depth.width, 1}}};
     PfHologram *hologram = NULL;
-    PfImage *levels = NULL;
-    PfImageInfo info;
     ok(pf_session_process(session, &frame, &hologram));
-    ok(pf_hologram_output(hologram, &(PfPlacement){.layout = PF_LAYOUT_RGB}, 0, &levels));
-    ok(pf_image_info(levels, &info));
-    png_image image = {.version = PNG_IMAGE_VERSION, .width = info.width, .height = info.height, .format = PNG_FORMAT_RGB};
-    if (!png_image_write_to_file(&image, arguments[3], 0, info.data, 0, NULL)) {
+    // The image of the levels has the size of the colour image, whose memory is free now.
+    PfMemory memory = {colours, PNG_IMAGE_SIZE(colour), colour.width * 3};
+    ok(pf_hologram_write_output(hologram, &(PfPlacement){.layout = PF_LAYOUT_RGB}, 0, memory));
+    png_image image = {.version = PNG_IMAGE_VERSION, .width = colour.width, .height = colour.height, .format = PNG_FORMAT_RGB};
+    if (!png_image_write_to_file(&image, arguments[3], 0, colours, 0, NULL)) {
         fprintf(stderr, "%s: %s\n", arguments[3], image.message);
         return 1;
     }
 
-    pf_image_free(levels);
     pf_hologram_free(hologram);
     pf_session_free(session);
     pf_options_free(options);

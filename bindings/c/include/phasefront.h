@@ -197,13 +197,17 @@ typedef enum PfLayout {
   PF_LAYOUT_BGRA = 2,
   // One image for each colour in the order red, green, blue, with one byte for each pixel.
   PF_LAYOUT_GREY = 3,
+  // One image with 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3.
+  PF_LAYOUT_RGB10 = 4,
+  // One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
+  PF_LAYOUT_GREY16 = 5,
 } PfLayout;
 
 // The hologram of one frame: modulator levels of its colours.
 typedef struct PfHologram PfHologram;
 
-// An image without gaps between rows.
-typedef struct PfImage PfImage;
+// A modulator: its display, the phases of its levels, and the images that its input takes.
+typedef struct PfModulator PfModulator;
 
 // A hologram network or a pre-filter. It is immutable and can be used by several sessions.
 typedef struct PfNetwork PfNetwork;
@@ -261,6 +265,16 @@ typedef struct PfHologramInfo {
   struct PfFrameTimes times;
 } PfHologramInfo;
 
+// The caller's memory for an image.
+typedef struct PfMemory {
+  // The first byte.
+  uint8_t *data;
+  // The number of bytes.
+  size_t length;
+  // The number of bytes from one row to the next.
+  uint32_t row_stride;
+} PfMemory;
+
 // The memory and size of planes.
 typedef struct PfPlanesInfo {
   // The first number of the first plane. There are no gaps between rows, and the planes of the other colours follow.
@@ -278,6 +292,18 @@ typedef struct PfPlanesInfo {
   uint32_t numbers;
 } PfPlanesInfo;
 
+// The images that a modulator's input takes of a hologram.
+typedef struct PfOutputSize {
+  // The width of an image in pixels.
+  uint32_t width;
+  // The height of an image in pixels.
+  uint32_t height;
+  // The number of bytes of a pixel.
+  uint32_t pixel_bytes;
+  // The number of images: one, or one for each colour.
+  uint32_t images;
+} PfOutputSize;
+
 // The placement of a hologram on its modulator.
 typedef struct PfPlacement {
   // The arrangement of colours in images, a PfLayout.
@@ -291,20 +317,6 @@ typedef struct PfPlacement {
   // The hologram's shift below the middle in pixels, before flips.
   int32_t shift_y;
 } PfPlacement;
-
-// The memory and size of an image.
-typedef struct PfImageInfo {
-  // The first byte. It is valid until pf_image_free.
-  const uint8_t *data;
-  // The number of bytes.
-  size_t length;
-  // The width in pixels.
-  uint32_t width;
-  // The height in pixels.
-  uint32_t height;
-  // The number of bytes of a pixel.
-  uint32_t pixel_bytes;
-} PfImageInfo;
 
 // A receiver of log messages, which is called on any thread. The message is valid during the call. The receiver may
 // call the library. On a thread that computes for a session it cannot wait for a frame: pf_session_process,
@@ -500,12 +512,14 @@ enum PfStatus pf_hologram_levels(const struct PfHologram *hologram,
 // Coordinates run from 0 to 1 from the upper left corner.
 enum PfStatus pf_hologram_z_at(const struct PfHologram *hologram, double x, double y, double *z_mm);
 
-// Creates the view of an eye focused at z, with 4 bytes for each pixel: red, green, blue, 255.
-enum PfStatus pf_hologram_preview(const struct PfHologram *hologram,
-                                  double z_mm,
-                                  uint32_t width,
-                                  uint32_t height,
-                                  struct PfImage **image);
+// Writes the view of an eye focused at z into memory: an image of width x height pixels in `layout`, PF_LAYOUT_RGB,
+// PF_LAYOUT_RGBA or PF_LAYOUT_BGRA.
+enum PfStatus pf_hologram_write_preview(const struct PfHologram *hologram,
+                                        double z_mm,
+                                        uint32_t width,
+                                        uint32_t height,
+                                        uint32_t layout,
+                                        struct PfMemory memory);
 
 // Creates the view of an eye focused at z at full resolution, as amplitudes where 1 is white. This transforms the
 // whole hologram; do not use it for every frame. A z too far away is refused.
@@ -522,26 +536,44 @@ enum PfStatus pf_planes_info(const struct PfPlanes *planes, struct PfPlanesInfo 
 // Frees planes.
 void pf_planes_free(struct PfPlanes *planes);
 
-// Creates image `number` of those that the modulator's driver takes, at the modulator's resolution. It contains the
-// levels in the upper bits of a byte; `placement` positions the hologram.
-enum PfStatus pf_hologram_output(const struct PfHologram *hologram,
-                                 const struct PfPlacement *placement,
-                                 uint32_t number,
-                                 struct PfImage **image);
+// Returns the size of the images of `layout`, a PfLayout, for the modulator.
+enum PfStatus pf_hologram_output_size(const struct PfHologram *hologram, uint32_t layout, struct PfOutputSize *size);
+
+// Writes image `number` of those that the modulator's driver takes into memory, at the modulator's resolution. Levels
+// with fewer bits than their place use its upper bits; `placement` positions the hologram.
+enum PfStatus pf_hologram_write_output(const struct PfHologram *hologram,
+                                       const struct PfPlacement *placement,
+                                       uint32_t number,
+                                       struct PfMemory memory);
 
 // Frees a hologram. Its memory returns to its session.
 void pf_hologram_free(struct PfHologram *hologram);
-
-// Returns the memory and size of an image.
-enum PfStatus pf_image_info(const struct PfImage *image, struct PfImageInfo *info);
-
-// Frees an image.
-void pf_image_free(struct PfImage *image);
 
 // Sends messages of `level`, a PfLogLevel, and above to `on_log`. With NULL, no messages are sent. A call on another
 // thread that is in progress when this returns still uses the previous `context`, so each context must live as long as
 // the process.
 enum PfStatus pf_set_log_listener(uint32_t level, PfOnLog on_log, void *context);
+
+// Creates a modulator that the command `phasefront devices` lists, such as "holoeye-pluto".
+enum PfStatus pf_modulator_named(const char *name, struct PfModulator **modulator);
+
+// Creates a modulator of the text of its file, with keys such as packing and levels_turns.
+enum PfStatus pf_modulator_from_toml(const char *toml, struct PfModulator **modulator);
+
+// Creates the target of holograms for a modulator.
+enum PfStatus pf_modulator_target(const struct PfModulator *modulator, struct PfTarget **target);
+
+// Returns the size of the images that a modulator's input takes.
+enum PfStatus pf_modulator_output_size(const struct PfModulator *modulator, struct PfOutputSize *size);
+
+// Writes image `number` of those that a modulator's input takes of a hologram into memory.
+enum PfStatus pf_modulator_write_output(const struct PfModulator *modulator,
+                                        const struct PfHologram *hologram,
+                                        uint32_t number,
+                                        struct PfMemory memory);
+
+// Frees a modulator. Targets that it created are not affected.
+void pf_modulator_free(struct PfModulator *modulator);
 
 // Creates the bundled int8 network of a name, such as "rgbd-8".
 enum PfStatus pf_network_built_in(const char *name, struct PfNetwork **network);

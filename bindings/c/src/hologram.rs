@@ -2,7 +2,7 @@
 
 use crate::pointer::{free, give, object, pick, read};
 use crate::status::{PfStatus, call};
-use phasefront_ffi::{FrameTimes, Layout, Placement, RawHologram, RawImage, RawPlanes};
+use phasefront_ffi::{FrameTimes, Layout, OutputSize, Placement, RawHologram, RawMemory, RawPlanes};
 use std::sync::Arc;
 
 /// The hologram of one frame: modulator levels of its colours.
@@ -77,9 +77,20 @@ pub enum PfLayout {
     Bgra = 2,
     /// One image for each colour in the order red, green, blue, with one byte for each pixel.
     Grey = 3,
+    /// One image with 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3.
+    Rgb10 = 4,
+    /// One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
+    Grey16 = 5,
 }
 
-const LAYOUTS: [Layout; 4] = [Layout::Rgb, Layout::Rgba, Layout::Bgra, Layout::Grey];
+const LAYOUTS: [Layout; 6] = [
+    Layout::Rgb,
+    Layout::Rgba,
+    Layout::Bgra,
+    Layout::Grey,
+    Layout::Rgb10,
+    Layout::Grey16,
+];
 
 /// The placement of a hologram on its modulator.
 #[repr(C)]
@@ -97,23 +108,51 @@ pub struct PfPlacement {
     pub shift_y: i32,
 }
 
-/// An image without gaps between rows.
-pub struct PfImage(Arc<RawImage>);
-
-/// The memory and size of an image.
+/// The images that a modulator's input takes of a hologram.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct PfImageInfo {
-    /// The first byte. It is valid until pf_image_free.
-    pub data: *const u8,
-    /// The number of bytes.
-    pub length: usize,
-    /// The width in pixels.
+pub struct PfOutputSize {
+    /// The width of an image in pixels.
     pub width: u32,
-    /// The height in pixels.
+    /// The height of an image in pixels.
     pub height: u32,
     /// The number of bytes of a pixel.
     pub pixel_bytes: u32,
+    /// The number of images: one, or one for each colour.
+    pub images: u32,
+}
+
+impl From<OutputSize> for PfOutputSize {
+    fn from(size: OutputSize) -> Self {
+        PfOutputSize {
+            width: size.width as u32,
+            height: size.height as u32,
+            pixel_bytes: size.pixel_bytes as u32,
+            images: size.images as u32,
+        }
+    }
+}
+
+/// The caller's memory for an image.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct PfMemory {
+    /// The first byte.
+    pub data: *mut u8,
+    /// The number of bytes.
+    pub length: usize,
+    /// The number of bytes from one row to the next.
+    pub row_stride: u32,
+}
+
+impl From<PfMemory> for RawMemory {
+    fn from(memory: PfMemory) -> Self {
+        RawMemory {
+            address: memory.data as u64,
+            length: memory.length as u64,
+            row_stride: memory.row_stride as usize,
+        }
+    }
 }
 
 /// Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
@@ -189,25 +228,22 @@ pub unsafe extern "C" fn pf_hologram_z_at(hologram: *const PfHologram, x: f64, y
     call(|| unsafe { give(z_mm, "z_mm", || Ok(read(hologram, "hologram")?.0.z_at(x, y))) })
 }
 
-/// Creates the view of an eye focused at z, with 4 bytes for each pixel: red, green, blue, 255.
+/// Writes the view of an eye focused at z into memory: an image of width x height pixels in `layout`, PF_LAYOUT_RGB,
+/// PF_LAYOUT_RGBA or PF_LAYOUT_BGRA.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_hologram_preview(
+pub unsafe extern "C" fn pf_hologram_write_preview(
     hologram: *const PfHologram,
     z_mm: f64,
     width: u32,
     height: u32,
-    image: *mut *mut PfImage,
+    layout: u32,
+    memory: PfMemory,
 ) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe {
-        give(image, "image", || {
-            let hologram = &read(hologram, "hologram")?.0;
-            Ok(object(PfImage(hologram.preview(
-                z_mm,
-                width as usize,
-                height as usize,
-            )?)))
-        })
+        let layout = pick(&LAYOUTS, layout, "layout")?;
+        let hologram = &read(hologram, "hologram")?.0;
+        hologram.write_preview(z_mm, width as usize, height as usize, layout, memory.into())
     })
 }
 
@@ -272,29 +308,43 @@ pub unsafe extern "C" fn pf_planes_free(planes: *mut PfPlanes) {
     unsafe { free(planes) };
 }
 
-/// Creates image `number` of those that the modulator's driver takes, at the modulator's resolution. It contains the
-/// levels in the upper bits of a byte; `placement` positions the hologram.
+/// Returns the size of the images of `layout`, a PfLayout, for the modulator.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_hologram_output(
+pub unsafe extern "C" fn pf_hologram_output_size(
     hologram: *const PfHologram,
-    placement: *const PfPlacement,
-    number: u32,
-    image: *mut *mut PfImage,
+    layout: u32,
+    size: *mut PfOutputSize,
 ) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe {
-        give(image, "image", || {
-            let placement = read(placement, "placement")?;
-            let placement = Placement {
-                layout: pick(&LAYOUTS, placement.layout, "layout")?,
-                flip_x: placement.flip_x,
-                flip_y: placement.flip_y,
-                shift_x: placement.shift_x,
-                shift_y: placement.shift_y,
-            };
-            let hologram = &read(hologram, "hologram")?.0;
-            Ok(object(PfImage(hologram.output(placement, number as usize)?)))
+        give(size, "size", || {
+            let layout = pick(&LAYOUTS, layout, "layout")?;
+            Ok(read(hologram, "hologram")?.0.output_size(layout).into())
         })
+    })
+}
+
+/// Writes image `number` of those that the modulator's driver takes into memory, at the modulator's resolution. Levels
+/// with fewer bits than their place use its upper bits; `placement` positions the hologram.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_hologram_write_output(
+    hologram: *const PfHologram,
+    placement: *const PfPlacement,
+    number: u32,
+    memory: PfMemory,
+) -> PfStatus {
+    // SAFETY: the rules of this border.
+    call(|| unsafe {
+        let placement = read(placement, "placement")?;
+        let placement = Placement {
+            layout: pick(&LAYOUTS, placement.layout, "layout")?,
+            flip_x: placement.flip_x,
+            flip_y: placement.flip_y,
+            shift_x: placement.shift_x,
+            shift_y: placement.shift_y,
+        };
+        let hologram = &read(hologram, "hologram")?.0;
+        hologram.write_output(placement, number as usize, memory.into())
     })
 }
 
@@ -303,29 +353,4 @@ pub unsafe extern "C" fn pf_hologram_output(
 pub unsafe extern "C" fn pf_hologram_free(hologram: *mut PfHologram) {
     // SAFETY: the rules of this border.
     unsafe { free(hologram) };
-}
-
-/// Returns the memory and size of an image.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_image_info(image: *const PfImage, info: *mut PfImageInfo) -> PfStatus {
-    // SAFETY: the rules of this border.
-    call(|| unsafe {
-        give(info, "info", || {
-            let image = &read(image, "image")?.0;
-            Ok(PfImageInfo {
-                data: image.address() as usize as *const u8,
-                length: image.byte_len() as usize,
-                width: image.width() as u32,
-                height: image.height() as u32,
-                pixel_bytes: image.pixel_bytes() as u32,
-            })
-        })
-    })
-}
-
-/// Frees an image.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_image_free(image: *mut PfImage) {
-    // SAFETY: the rules of this border.
-    unsafe { free(image) };
 }

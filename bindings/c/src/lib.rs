@@ -10,6 +10,7 @@
 mod frame;
 mod hologram;
 mod log;
+mod modulator;
 mod network;
 mod options;
 mod pointer;
@@ -22,11 +23,16 @@ pub use frame::{
     PfIntrinsics, PfPlane, PfRotation, PfYuvMatrix,
 };
 pub use hologram::{
-    PfFrameTimes, PfHologram, PfHologramInfo, PfImage, PfImageInfo, PfLayout, PfPlacement, PfPlanes, PfPlanesInfo,
-    pf_hologram_field, pf_hologram_free, pf_hologram_info, pf_hologram_levels, pf_hologram_output, pf_hologram_preview,
-    pf_hologram_refocus, pf_hologram_z_at, pf_image_free, pf_image_info, pf_planes_free, pf_planes_info,
+    PfFrameTimes, PfHologram, PfHologramInfo, PfLayout, PfMemory, PfOutputSize, PfPlacement, PfPlanes, PfPlanesInfo,
+    pf_hologram_field, pf_hologram_free, pf_hologram_info, pf_hologram_levels, pf_hologram_output_size,
+    pf_hologram_refocus, pf_hologram_write_output, pf_hologram_write_preview, pf_hologram_z_at, pf_planes_free,
+    pf_planes_info,
 };
 pub use log::{PfLogLevel, PfOnLog, pf_set_log_listener};
+pub use modulator::{
+    PfModulator, pf_modulator_free, pf_modulator_from_toml, pf_modulator_named, pf_modulator_output_size,
+    pf_modulator_target, pf_modulator_write_output,
+};
 pub use network::{PfNetwork, pf_network_built_in, pf_network_free, pf_network_from_bytes, pf_network_from_file};
 pub use options::{
     PfBackend, PfMethod, PfOptions, PfQualityLevel, pf_options_clear_quality_levels, pf_options_free, pf_options_new,

@@ -101,7 +101,7 @@ static void mistakes(PfTarget *target, PfOptions *options) {
     pf_options_free(NULL);
     pf_session_free(NULL);
     pf_hologram_free(NULL);
-    pf_image_free(NULL);
+    pf_modulator_free(NULL);
 }
 
 static void stills(const PfOptions *options) {
@@ -123,20 +123,32 @@ static void stills(const PfOptions *options) {
     pf_session_free(session);
     double z_mm = 0;
     ok(pf_hologram_z_at(hologram, 0.5, 0.5, &z_mm));
-    PfImage *seen = NULL, *driven = NULL;
-    ok(pf_hologram_preview(hologram, z_mm, 24, 18, &seen));
-    PfImageInfo info;
-    ok(pf_image_info(seen, &info));
-    assert(info.width == 24 && info.height == 18 && info.length == 24 * 18 * 4 && info.data[3] == 255);
+    static uint8_t bytes[2 * WIDTH * HEIGHT];
+    // Rows of a preview with gaps, which stay as they are.
+    memset(bytes, 7, sizeof bytes);
+    PfMemory memory = {bytes, sizeof bytes, 24 * 4 + 5};
+    ok(pf_hologram_write_preview(hologram, z_mm, 24, 18, PF_LAYOUT_BGRA, memory));
+    assert(bytes[3] == 255 && bytes[24 * 4] == 7 && bytes[24 * 4 + 5 + 3] == 255);
+    refused(pf_hologram_write_preview(hologram, z_mm, 24, 18, PF_LAYOUT_GREY, memory), PF_STATUS_SETTING, "Grey");
+    memory.row_stride = 24 * 4 - 1;
+    refused(pf_hologram_write_preview(hologram, z_mm, 24, 18, PF_LAYOUT_BGRA, memory), PF_STATUS_SETTING, "18 rows");
+    PfOutputSize size;
+    ok(pf_hologram_output_size(hologram, PF_LAYOUT_GREY16, &size));
+    assert(size.width == WIDTH && size.height == HEIGHT && size.pixel_bytes == 2 && size.images == 3);
     PfPlacement placement = {.layout = PF_LAYOUT_GREY, .flip_x = true};
-    ok(pf_hologram_output(hologram, &placement, 2, &driven));
-    ok(pf_image_info(driven, &info));
+    memory.row_stride = WIDTH;
+    ok(pf_hologram_write_output(hologram, &placement, 2, memory));
     const uint8_t *blue = NULL;
     size_t length = 0;
     ok(pf_hologram_levels(hologram, 2, &blue, &length));
-    assert(info.length == WIDTH * HEIGHT && length == info.length);
-    for (int x = 0; x < WIDTH; x++) assert(info.data[x] == blue[WIDTH - 1 - x]);
-    refused(pf_hologram_output(hologram, &placement, 3, &driven), PF_STATUS_SETTING, "no image 3");
+    assert(length == WIDTH * HEIGHT);
+    for (int x = 0; x < WIDTH; x++) assert(bytes[x] == blue[WIDTH - 1 - x]);
+    refused(pf_hologram_write_output(hologram, &placement, 3, memory), PF_STATUS_SETTING, "no image 3");
+    refused(pf_hologram_write_output(hologram, &placement, 2, (PfMemory){NULL, 9, 9}), PF_STATUS_SETTING, "no memory");
+    placement.layout = PF_LAYOUT_GREY16;
+    memory.row_stride = 2 * WIDTH;
+    ok(pf_hologram_write_output(hologram, &placement, 2, memory));
+    for (int x = 0; x < WIDTH; x++) assert(bytes[2 * x] == 0 && bytes[2 * x + 1] == blue[WIDTH - 1 - x]);
     refused(pf_hologram_levels(hologram, 3, &blue, &length), PF_STATUS_SETTING, "no plane 3");
     PfPlanes *planes = NULL;
     PfPlanesInfo numbers;
@@ -148,9 +160,39 @@ static void stills(const PfOptions *options) {
     assert(numbers.length == 3 * 2 * WIDTH * HEIGHT && numbers.data[0] == numbers.data[0]);
     pf_planes_free(planes);
     pf_planes_free(NULL);
-    pf_image_free(seen);
-    pf_image_free(driven);
     pf_hologram_free(hologram);
+}
+
+static void modulators(void) {
+    PfModulator *modulator = NULL;
+    refused(pf_modulator_named("pluto", &modulator), PF_STATUS_DISPLAY, "holoeye-pluto");
+    refused(pf_modulator_from_toml("width = ", &modulator), PF_STATUS_DISPLAY, "expected");
+    assert(modulator == NULL);
+    PfTarget *target = NULL;
+    PfOptions *options = NULL;
+    PfSession *session = NULL;
+    PfHologram *hologram = NULL;
+    ok(pf_modulator_named("ti-plm-p47", &modulator));
+    ok(pf_modulator_target(modulator, &target));
+    ok(pf_options_new(target, PF_METHOD_SWEEP, NULL, &options));
+    ok(pf_session_new(options, PF_RUNNING_MODE_IMAGE, NULL, &session));
+    PfFrame frame = frame_at(1);
+    ok(pf_session_process(session, &frame, &hologram));
+    PfOutputSize size;
+    ok(pf_modulator_output_size(modulator, &size));
+    assert(size.width == 1920 && size.height == 1080 && size.pixel_bytes == 3 && size.images == 1);
+    PfMemory memory = {calloc(1920 * 1080, 3), 1920 * 1080 * 3, 1920 * 3};
+    ok(pf_modulator_write_output(modulator, hologram, 0, memory));
+    size_t set = 0;
+    for (size_t at = 0; at < memory.length; at++) set += memory.data[at] != 0;
+    assert(set > memory.length / 10);
+    refused(pf_modulator_write_output(modulator, hologram, 1, memory), PF_STATUS_SETTING, "no image 1");
+    free(memory.data);
+    pf_hologram_free(hologram);
+    pf_session_free(session);
+    pf_options_free(options);
+    pf_target_free(target);
+    pf_modulator_free(modulator);
 }
 
 static void live(const PfOptions *options) {
@@ -247,6 +289,7 @@ int main(void) {
     mistakes(target, options);
     pf_target_free(target);
     stills(options);
+    modulators();
     live(options);
     for (int i = 0; i < 4; i++) ended_by_its_listener(options);
     pf_options_free(options);

@@ -8,8 +8,8 @@
 >>> session.process(phasefront.Frame(colour, metres)).levels.shape
 (3, 48, 64)
 
-The buffer protocol passes arrays in and out without a copy. Every error is a `PhasefrontError`, whose message is one
-line that names the problem and the remedy.
+The buffer protocol passes arrays in and out without a copy. Every error is a `PhasefrontError` of some kind, such as
+`FrameError`, whose message is one line that names the problem and the remedy.
 """
 
 from ._ffi import (
@@ -22,16 +22,21 @@ from ._ffi import (
     DepthFormat,
     DepthRange,
     Display,
+    DisplayError,
     DropReason,
     Drops,
     Encoding,
+    FileError,
+    FrameError,
     FrameTimes,
     HologramInfo,
+    InternalError,
     Intrinsics,
     Layout,
     LogLevel,
     Method,
     Network,
+    NetworkError,
     NetworkInfo,
     Orientation,
     PhasefrontError,
@@ -43,13 +48,17 @@ from ._ffi import (
     QualityReason,
     Rotation,
     RunningMode,
+    SessionError,
     SessionOptions,
+    SettingError,
     Stage,
     Statistics,
     Thermal,
+    TimestampError,
     YuvMatrix,
     built_in_pair,
     display_from_toml,
+    modulator_names,
     version,
 )
 from ._encode import Modulator, encode
@@ -59,12 +68,14 @@ from ._session import Dropped, Event, Failed, Processed, QualityChanged, Session
 from ._target import Target
 
 __all__ = [
-    "Backend", "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange", "Display",
-    "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo",
-    "Intrinsics", "Layout", "LogLevel", "Method", "Modulator", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
-    "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "Rotation", "RunningMode",
-    "Session", "SessionOptions", "Stage", "Statistics", "Target", "Thermal", "YuvMatrix", "__version__", "built_in_pair",
-    "display_from_toml", "encode", "send_log", "send_stages", "session_options", "version",
+    "Backend", "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange",
+    "Display", "DisplayError", "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "FileError", "Frame",
+    "FrameError", "FrameTimes", "Hologram", "HologramInfo", "InternalError", "Intrinsics", "Layout", "LogLevel",
+    "Method", "Modulator", "Network", "NetworkError", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
+    "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "Rotation",
+    "RunningMode", "Session", "SessionError", "SessionOptions", "SettingError", "Stage", "Statistics", "Target",
+    "Thermal", "TimestampError", "YuvMatrix", "__version__", "built_in_pair", "display_from_toml", "encode",
+    "modulator_names", "send_log", "send_stages", "session_options", "version",
 ]  # fmt: skip
 
 #: The version of the library.

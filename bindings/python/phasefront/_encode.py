@@ -9,9 +9,9 @@ import numpy
 from numpy.typing import ArrayLike, NDArray
 
 from . import _ffi
-from ._ffi import Brightness, Display, EncoderOptions, Encoding, PhasefrontError
+from ._ffi import Brightness, Display, EncoderOptions, Encoding, FrameError, RawMemory, SettingError
 from ._hologram import Hologram, Purpose
-from ._memory import MOST_BYTES, Memory, array_at
+from ._memory import MOST_BYTES, Memory, image
 from ._target import Target
 
 
@@ -28,12 +28,13 @@ class Modulator:
     def __init__(self, raw: _ffi.RawModulator):
         self._raw = raw
         self.target = raw.target()
+        self._size = raw.output_size()
 
     @classmethod
     def named(cls, name: str) -> Modulator:
-        """Returns a modulator that the command `phasefront devices` lists, for example ti-plm-p47.
+        """Returns one of the modulators that `modulator_names` lists, for example ti-plm-p47.
 
-        Raises `PhasefrontError.Display` for any other name.
+        Raises `DisplayError` for any other name.
         """
         return cls(_ffi.RawModulator.named(name))
 
@@ -41,37 +42,50 @@ class Modulator:
     def from_toml(cls, text: str) -> Modulator:
         """Reads the text of a modulator's file, with keys such as packing and levels_turns.
 
-        Raises `PhasefrontError.Display` for text that is not TOML, an unknown key, or a value out of its range.
+        Raises `DisplayError` for text that is not TOML, an unknown key, or a value out of its range.
         """
         return cls(_ffi.RawModulator.from_toml(text))
 
-    def pack(self, hologram: Hologram) -> list[NDArray[numpy.uint8]]:
+    def pack(self, hologram: Hologram, *, out: Sequence[NDArray[numpy.uint8]] | None = None) -> list[NDArray[numpy.uint8]]:
         """Returns the images that the modulator's input takes, uint8, (H, W, bytes per pixel): one, or one for each
-        colour. Read only.
+        colour.
 
-        Raises `PhasefrontError.Setting` for a hologram that does not fit the modulator.
+        Args:
+            hologram: The hologram.
+            out: The arrays to write into and to return, for example those of the previous frame.
+
+        Raises `SettingError` for a hologram that does not fit the modulator, or if `out` does not fit.
         """
-        images = self._raw.pack(hologram._raw)
-        return [array_at(image, image.address(), (image.height(), image.width(), image.pixel_bytes()), numpy.uint8) for image in images]
+        size = self._size
+        if out is not None and len(out) != size.images:
+            raise SettingError(f"out has {len(out)} arrays; the modulator takes {size.images}")
+        images = []
+        for n in range(size.images):
+            array, memory = image(out[n] if out else None, (size.height, size.width, size.pixel_bytes), numpy.uint8)
+            self._raw.write_output(hologram._raw, n, memory)
+            images.append(array)
+        return images
 
     def unpack(self, images: Sequence[ArrayLike], shape: tuple[int, int] | None = None) -> NDArray[numpy.uint16]:
-        """Returns the levels in `images`, uint16, (C, H, W): the inverse of `pack`. Read only.
+        """Returns the levels in `images`, uint16, (C, H, W): the inverse of `pack`.
 
         Args:
             images: What `pack` returned, uint8.
             shape: (H, W) of the hologram in the middle of the modulator. By default it has the modulator's size.
 
-        Raises `PhasefrontError.Setting` for images of another type or size.
+        Raises `SettingError` for images of another type or size.
         """
-        arrays = [numpy.asarray(image) for image in images]
+        arrays = [numpy.asarray(given) for given in images]
         if any(array.dtype != numpy.uint8 for array in arrays):
-            raise PhasefrontError.Setting("images hold bytes, uint8, as pack returns them")
+            raise SettingError("images hold bytes, uint8, as pack returns them")
         display = self.target.display()
         height, width = shape or (display.height, display.width)
         values = numpy.concatenate([array.ravel() for array in arrays]) if arrays else numpy.zeros(0, numpy.uint8)
-        memory: Any = Memory(values)
-        levels = self._raw.unpack(memory, width, height)
-        return array_at(levels, levels.address(), (levels.height() // height, height, width), numpy.uint16)
+        given: Any = Memory(values)
+        colours = 3 if display.laser_nm is None else 1
+        levels = numpy.empty((colours, height, width), numpy.uint16)
+        self._raw.read(given, width, height, RawMemory(address=levels.ctypes.data, length=levels.nbytes, row_stride=2 * width))
+        return levels
 
 
 def encode(
@@ -98,8 +112,8 @@ def encode(
         local_steps: See `SessionOptions`.
         midpoint_steps: See `SessionOptions`.
 
-    The result's depth is not known: its `z_at` returns 0. Raises `PhasefrontError.Frame` for a field of another type or
-    shape, or with values that are NaN or infinite, and `PhasefrontError.Setting` for an option out of its range.
+    The result's depth is not known: its `z_at` returns 0. Raises `FrameError` for a field of another type or
+    shape, or with values that are NaN or infinite, and `SettingError` for an option out of its range.
     """
     if isinstance(target, Modulator):
         target = target.target
@@ -107,8 +121,8 @@ def encode(
         target = Target.of_display(Display() if target is None else target)
     array = _field(field, 3 if target.display().laser_nm is None else 1)
     options = EncoderOptions(
-        encoding=encoding or Encoding.ANTI_ALIAS(sigma=0.7, width=3),
-        brightness=Brightness.FRAME_MAX() if scale is None else Brightness.FIXED(scale=scale),
+        encoding=encoding or Encoding.anti_alias(sigma=0.7, width=3),
+        brightness=Brightness.frame_max() if scale is None else Brightness.fixed(scale=scale),
         dark_threshold=dark_threshold,
         local_steps=local_steps,
         midpoint_steps=midpoint_steps,
@@ -123,12 +137,12 @@ def _field(field: ArrayLike, colours: int) -> NDArray[numpy.complex64]:
     """Returns a field as complex64, (C, H, W), without gaps."""
     given: numpy.ndarray[Any, Any] = numpy.asarray(field)
     if given.dtype.kind != "c":
-        raise PhasefrontError.Frame(f"the field holds {given.dtype}; it must be complex: field.astype(numpy.complex64)")
+        raise FrameError(f"the field holds {given.dtype}; it must be complex: field.astype(numpy.complex64)")
     array = given[numpy.newaxis] if given.ndim == 2 else given
     if array.ndim != 3 or array.shape[0] != colours:
         right = "(H, W) of one laser" if colours == 1 else f"({colours}, H, W), red first,"
-        raise PhasefrontError.Frame(f"the field is {given.shape}; {right} is right")
+        raise FrameError(f"the field is {given.shape}; {right} is right")
     if array.size * 8 > MOST_BYTES:
-        raise PhasefrontError.Frame(f"the field is {given.shape}; {MOST_BYTES} bytes of complex64 are the most")
+        raise FrameError(f"the field is {given.shape}; {MOST_BYTES} bytes of complex64 are the most")
     with numpy.errstate(over="ignore"):
         return numpy.ascontiguousarray(array, numpy.complex64)

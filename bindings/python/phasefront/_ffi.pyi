@@ -65,15 +65,15 @@ class Encoding:
     """The conversion of a field to phases.
 
     One of:
-        DOUBLE_PHASE: Double phase of the unchanged field.
-        ANTI_ALIAS: Double phase after a small Gaussian blur (AA-DPM).
-        BAND_LIMIT: Double phase after a filter that removes high diagonal frequencies (BL-DPM).
-        DEEP: Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the offset of the display.
+        double_phase: Double phase of the unchanged field.
+        anti_alias: Double phase after a small Gaussian blur (AA-DPM).
+        band_limit: Double phase after a filter that removes high diagonal frequencies (BL-DPM).
+        deep: Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the offset of the display.
     """
-    class DOUBLE_PHASE(Encoding):
+    class double_phase(Encoding):
         """Double phase of the unchanged field."""
         def __init__(self) -> None: ...
-    class ANTI_ALIAS(Encoding):
+    class anti_alias(Encoding):
         """Double phase after a small Gaussian blur (AA-DPM).
 
         Fields:
@@ -83,7 +83,7 @@ class Encoding:
         sigma: float
         width: int
         def __init__(self, sigma: float, width: int) -> None: ...
-    class BAND_LIMIT(Encoding):
+    class band_limit(Encoding):
         """Double phase after a filter that removes high diagonal frequencies (BL-DPM).
 
         Fields:
@@ -91,7 +91,7 @@ class Encoding:
         """
         k: float
         def __init__(self, k: float) -> None: ...
-    class DEEP(Encoding):
+    class deep(Encoding):
         """Double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
         offset of the display.
 
@@ -100,27 +100,23 @@ class Encoding:
         """
         prefilter: Network
         def __init__(self, prefilter: Network) -> None: ...
-    def is_DOUBLE_PHASE(self) -> bool: ...
     def is_double_phase(self) -> bool: ...
-    def is_ANTI_ALIAS(self) -> bool: ...
     def is_anti_alias(self) -> bool: ...
-    def is_BAND_LIMIT(self) -> bool: ...
     def is_band_limit(self) -> bool: ...
-    def is_DEEP(self) -> bool: ...
     def is_deep(self) -> bool: ...
 
 class Brightness:
     """The amplitude that maps to full light.
 
     One of:
-        SMOOTHED: An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
-        FIXED: A fixed amplitude. Larger amplitudes are clipped.
-        FRAME_MAX: The largest amplitude of the frame.
+        smoothed: An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker.
+        fixed: A fixed amplitude. Larger amplitudes are clipped.
+        frame_max: The largest amplitude of the frame.
     """
-    class SMOOTHED(Brightness):
+    class smoothed(Brightness):
         """An amplitude near the frame's largest that changes smoothly from frame to frame, so that video does not flicker."""
         def __init__(self) -> None: ...
-    class FIXED(Brightness):
+    class fixed(Brightness):
         """A fixed amplitude. Larger amplitudes are clipped.
 
         Fields:
@@ -128,14 +124,11 @@ class Brightness:
         """
         scale: float
         def __init__(self, scale: float) -> None: ...
-    class FRAME_MAX(Brightness):
+    class frame_max(Brightness):
         """The largest amplitude of the frame."""
         def __init__(self) -> None: ...
-    def is_SMOOTHED(self) -> bool: ...
     def is_smoothed(self) -> bool: ...
-    def is_FIXED(self) -> bool: ...
     def is_fixed(self) -> bool: ...
-    def is_FRAME_MAX(self) -> bool: ...
     def is_frame_max(self) -> bool: ...
 
 class Rotation(enum.Enum):
@@ -159,12 +152,16 @@ class Layout(enum.Enum):
         RGB: One image with bytes red, green, blue.
         RGBA: One image with bytes red, green, blue, alpha 255.
         BGRA: One image with bytes blue, green, red, alpha 255.
+        RGB10: One image with 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's RGBA_1010102, Metal's rgb10a2.
         GREY: One image for each colour in the order red, green, blue, with one byte for each pixel.
+        GREY16: One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
     """
     RGB = 0
     RGBA = 1
     BGRA = 2
-    GREY = 3
+    RGB10 = 3
+    GREY = 4
+    GREY16 = 5
 
 class QualityReason(enum.Enum):
     """The reason why a session changed its quality level.
@@ -188,11 +185,11 @@ class Method:
     """The method that computes holograms.
 
     One of:
-        TRAINED: A trained network.
-        SWEEP: The plane sweep, which suits any display. It is slower and needs no training.
-        AUTO: The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with noisy or incomplete depth, such as depth from sensors.
+        trained: A trained network.
+        sweep: The plane sweep, which suits any display. It is slower and needs no training.
+        auto: The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with noisy or incomplete depth, such as depth from sensors.
     """
-    class TRAINED(Method):
+    class trained(Method):
         """A trained network.
 
         Fields:
@@ -200,10 +197,10 @@ class Method:
         """
         network: Network
         def __init__(self, network: Network) -> None: ...
-    class SWEEP(Method):
+    class sweep(Method):
         """The plane sweep, which suits any display. It is slower and needs no training."""
         def __init__(self) -> None: ...
-    class AUTO(Method):
+    class auto(Method):
         """The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
         noisy or incomplete depth, such as depth from sensors.
 
@@ -212,26 +209,23 @@ class Method:
         """
         network: Network
         def __init__(self, network: Network) -> None: ...
-    def is_TRAINED(self) -> bool: ...
     def is_trained(self) -> bool: ...
-    def is_SWEEP(self) -> bool: ...
     def is_sweep(self) -> bool: ...
-    def is_AUTO(self) -> bool: ...
     def is_auto(self) -> bool: ...
 
 class Quality:
     """Determines whether a session may change its quality level.
 
     One of:
-        ADAPTIVE: The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and raises it if there is time left.
-        FIXED: The session stays at this quality level.
+        adaptive: The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and raises it if there is time left.
+        fixed: The session stays at this quality level.
     """
-    class ADAPTIVE(Quality):
+    class adaptive(Quality):
         """The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and
         raises it if there is time left.
         """
         def __init__(self) -> None: ...
-    class FIXED(Quality):
+    class fixed(Quality):
         """The session stays at this quality level.
 
         Fields:
@@ -239,22 +233,20 @@ class Quality:
         """
         quality_level: int
         def __init__(self, quality_level: int) -> None: ...
-    def is_ADAPTIVE(self) -> bool: ...
     def is_adaptive(self) -> bool: ...
-    def is_FIXED(self) -> bool: ...
     def is_fixed(self) -> bool: ...
 
 class DepthRange:
     """The distances that map to the ends of the volume.
 
     One of:
-        PERCENTILES: The 1st and 99th percentile of the readings, smoothed over time in video.
-        FIXED: Fixed distances.
+        percentiles: The 1st and 99th percentile of the readings, smoothed over time in video.
+        fixed: Fixed distances.
     """
-    class PERCENTILES(DepthRange):
+    class percentiles(DepthRange):
         """The 1st and 99th percentile of the readings, smoothed over time in video."""
         def __init__(self) -> None: ...
-    class FIXED(DepthRange):
+    class fixed(DepthRange):
         """Fixed distances.
 
         Fields:
@@ -264,9 +256,7 @@ class DepthRange:
         near_m: float
         far_m: float
         def __init__(self, near_m: float, far_m: float) -> None: ...
-    def is_PERCENTILES(self) -> bool: ...
     def is_percentiles(self) -> bool: ...
-    def is_FIXED(self) -> bool: ...
     def is_fixed(self) -> bool: ...
 
 class Backend(enum.Enum):
@@ -317,31 +307,39 @@ class PhasefrontError(Exception):
     """The error of a call. The message is one line that names what is wrong and what would be right.
 
     Kinds:
-        Display: The physics of a display is impossible or out of range.
-        Frame: A frame, plane or image has the wrong shape or unusable values.
-        Timestamp: A frame is not later than the previous one. It is refused; later frames are not affected.
-        Setting: A setting or an argument is invalid or cannot be planned.
-        Network: A file is not a hologram network, or the network is for another display.
-        File: A file cannot be read.
-        Session: A session cannot answer the call in its mode or state.
-        Internal: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
+        DisplayError: The physics of a display is impossible or out of range.
+        FrameError: A frame, plane or image has the wrong shape or unusable values.
+        TimestampError: A frame is not later than the previous one. It is refused; later frames are not affected.
+        SettingError: A setting or an argument is invalid or cannot be planned.
+        NetworkError: A file is not a hologram network, or the network is for another display.
+        FileError: A file cannot be read.
+        SessionError: A session cannot answer the call in its mode or state.
+        InternalError: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
     """
-    class Display(PhasefrontError):
-        """The physics of a display is impossible or out of range."""
-    class Frame(PhasefrontError):
-        """A frame, plane or image has the wrong shape or unusable values."""
-    class Timestamp(PhasefrontError):
-        """A frame is not later than the previous one. It is refused; later frames are not affected."""
-    class Setting(PhasefrontError):
-        """A setting or an argument is invalid or cannot be planned."""
-    class Network(PhasefrontError):
-        """A file is not a hologram network, or the network is for another display."""
-    class File(PhasefrontError):
-        """A file cannot be read."""
-    class Session(PhasefrontError):
-        """A session cannot answer the call in its mode or state."""
-    class Internal(PhasefrontError):
-        """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
+
+class DisplayError(PhasefrontError):
+    """The physics of a display is impossible or out of range."""
+
+class FrameError(PhasefrontError):
+    """A frame, plane or image has the wrong shape or unusable values."""
+
+class TimestampError(PhasefrontError):
+    """A frame is not later than the previous one. It is refused; later frames are not affected."""
+
+class SettingError(PhasefrontError):
+    """A setting or an argument is invalid or cannot be planned."""
+
+class NetworkError(PhasefrontError):
+    """A file is not a hologram network, or the network is for another display."""
+
+class FileError(PhasefrontError):
+    """A file cannot be read."""
+
+class SessionError(PhasefrontError):
+    """A session cannot answer the call in its mode or state."""
+
+class InternalError(PhasefrontError):
+    """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
 
 class RunningMode(enum.Enum):
     """The running mode of a session. It is fixed when the session is created.
@@ -665,6 +663,21 @@ class HologramInfo:
     times: FrameTimes
     def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, quality_level: int, times: FrameTimes) -> None: ...
 
+class OutputSize:
+    """The images that a modulator's input takes of a hologram.
+
+    Fields:
+        width: The width of an image in pixels.
+        height: The height of an image in pixels.
+        pixel_bytes: The number of bytes of a pixel.
+        images: The number of images: one, or one for each colour.
+    """
+    width: int
+    height: int
+    pixel_bytes: int
+    images: int
+    def __init__(self, *, width: int, height: int, pixel_bytes: int, images: int) -> None: ...
+
 class Placement:
     """The placement of a hologram on its modulator.
 
@@ -712,6 +725,20 @@ class QualityLevel:
     local_steps: int | None
     midpoint_steps: int | None
     def __init__(self, *, method: Method, width: int, height: int, local_steps: int | None = ..., midpoint_steps: int | None = ...) -> None: ...
+
+class RawMemory:
+    """The caller's memory for an image. The layers written by hand promise that it stays valid during the call and that
+    nobody else uses it.
+
+    Fields:
+        address: The address of the first byte.
+        length: The number of bytes.
+        row_stride: The number of bytes from one row to the next.
+    """
+    address: int
+    length: int
+    row_stride: int
+    def __init__(self, *, address: int, length: int, row_stride: int) -> None: ...
 
 class SessionOptions:
     """The options of a session. `session_options` returns the defaults.
@@ -790,6 +817,15 @@ def display_from_toml(text: str) -> Display:
     """Reads a display from its TOML form. Missing keys have default values.
 
     Errors: Returns an error if the text is not TOML, a key is unknown, or a value is out of its range.
+    """
+
+def modulator_names() -> list[str]:
+    """Returns the names of the modulators that the library knows."""
+
+def phone_options(target: Target, rate_hz: float = 30.0, method: Method | None = ...) -> SessionOptions:
+    """Returns options for a live session on a phone: the defaults of `session_options` with a target rate and three
+    quality levels, at the modulator's resolution and at three quarters and half of it along each side. The session
+    lowers the level when frames are too slow for the rate or the device is hot, and raises it when there is time left.
     """
 
 def session_options(target: Target, method: Method | None = ...) -> SessionOptions:
@@ -903,22 +939,6 @@ class RawPlanes:
     def width(self) -> int:
         """Returns the width in pixels."""
 
-class RawImage:
-    """An image without gaps between rows. The layers written by hand read it."""
-    def __init__(self, *args: object, **kwargs: object) -> None: ...
-    def address(self) -> int:
-        """Returns the address of the bytes. It is valid as long as this object."""
-    def byte_len(self) -> int:
-        """Returns the number of bytes."""
-    def height(self) -> int:
-        """Returns the height in pixels."""
-    def pixel_bytes(self) -> int:
-        """Returns the number of bytes of a pixel."""
-    def share(self) -> RawImage:
-        """Returns another handle to the same image. Each reader of its memory holds one."""
-    def width(self) -> int:
-        """Returns the width in pixels."""
-
 class RawHologram:
     """The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
     planes are read.
@@ -941,12 +961,8 @@ class RawHologram:
         """
     def info(self) -> HologramInfo:
         """Returns the properties of the hologram."""
-    def output(self, placement: Placement, image: int) -> RawImage:
-        """Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
-        levels in the upper bits of a byte; `placement` positions the hologram.
-
-        Errors: Returns an error if the layout does not have this image.
-        """
+    def output_size(self, layout: Layout) -> OutputSize:
+        """Returns the size of the images of `layout` for the modulator."""
     def plane_address(self, colour: int) -> int:
         """Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
         byte; there are no gaps between rows or between colours. The address is valid as long as this object.
@@ -955,11 +971,6 @@ class RawHologram:
         """
     def plane_len(self) -> int:
         """Returns the number of bytes of a plane."""
-    def preview(self, z_mm: float, width: int, height: int) -> RawImage:
-        """Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
-
-        Errors: Returns an error if the image is empty or z is too far away.
-        """
     def refocus(self, z_mm: float) -> RawPlanes:
         """Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
 
@@ -967,42 +978,55 @@ class RawHologram:
         """
     def share(self) -> RawHologram:
         """Returns another handle to the same hologram. Each reader of its memory holds one."""
+    def write_output(self, placement: Placement, image: int, to: RawMemory) -> None:
+        """Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
+        fewer bits than their place use its upper bits; `placement` positions the hologram.
+
+        Errors: Returns an error if the layout does not have this image or the image does not fit.
+        """
+    def write_preview(self, z_mm: float, width: int, height: int, layout: Layout, to: RawMemory) -> None:
+        """Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+
+        Errors: Returns an error if the image is empty or does not fit, or z is too far away.
+        """
     def z_at(self, x: float, y: float) -> float:
         """Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
         Coordinates run from 0 to 1 from the upper left corner.
         """
 
 class RawModulator:
-    """A modulator: its display, the phases of its levels, and the frames that its input takes. For the layers by hand."""
+    """A modulator: its display, the phases of its levels, and the images that its input takes. The layers written by hand
+    use it.
+    """
     @classmethod
     def from_toml(cls, text: str) -> RawModulator:
         """Reads a modulator's file.
 
-        Errors: Text that is not TOML, an unknown key, or a value out of its range.
+        Errors: Returns an error if the text is not TOML, a key is unknown, a value is out of its range, or levels of more than
+        8 bits are not evenly spaced.
         """
     @classmethod
     def named(cls, name: str) -> RawModulator:
-        """A modulator that `phasefront devices` lists.
+        """Returns the modulator called `name`, one of `modulator_names`.
 
-        Errors: Another name.
+        Errors: Returns an error for another name.
         """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
-    def pack(self, hologram: RawHologram) -> list[RawImage]:
-        """The images that its input takes of `hologram`, one, or one for each colour.
+    def output_size(self) -> OutputSize:
+        """Returns the size of the images that its input takes."""
+    def read(self, images: bytes, width: int, height: int, to: RawMemory) -> None:
+        """Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
+        without gaps. Writes 2 bytes a level, planes of colours one after another without gaps.
 
-        Errors: A hologram that is larger than the modulator or for another number of lasers or bits; with bit planes, one of
-        another size.
+        Errors: Returns an error for another number of bytes, or for cells that are those of no level.
         """
     def target(self) -> Target:
-        """What holograms for it are made for.
+        """Returns the target of holograms for the modulator."""
+    def write_output(self, hologram: RawHologram, image: int, to: RawMemory) -> None:
+        """Writes image `image` of those that its input takes of `hologram`.
 
-        Errors: Levels of more than 8 bits that are not evenly spaced.
-        """
-    def unpack(self, images: bytes, width: int, height: int) -> RawImage:
-        """Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
-        without gaps. The result has 2 bytes a level, planes of colours one after another.
-
-        Errors: Another number of bytes, or cells that are those of no level.
+        Errors: Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for
+        another number of lasers or bits; with bit planes, also if it has another size.
         """
 
 class RawSession:

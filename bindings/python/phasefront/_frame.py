@@ -8,7 +8,7 @@ import numpy
 from numpy.typing import ArrayLike
 
 from . import _ffi
-from ._ffi import Cameras, ColourFormat, ConfidenceFormat, DepthFormat, Orientation, PhasefrontError, Rotation, YuvMatrix
+from ._ffi import Cameras, ColourFormat, ConfidenceFormat, DepthFormat, FrameError, Orientation, Rotation, YuvMatrix
 from ._memory import MOST_BYTES, Memory
 
 _Array = numpy.ndarray[Any, Any]
@@ -42,17 +42,17 @@ def _array(what: str, values: ArrayLike) -> _Array:
     try:
         return numpy.asarray(values)
     except (TypeError, ValueError) as error:
-        raise PhasefrontError.Frame(f"frame: {what} is no array: {error}") from None
+        raise FrameError(f"frame: {what} is no array: {error}") from None
 
 
 def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _ffi.PlaneInfo, int, int]:
     """Returns the memory, strides, width and height of an image of (H, W) or (H, W, pixel) values."""
     if array.dtype != dtype or array.dtype.byteorder == ">":
-        raise PhasefrontError.Frame(f"frame: {what} holds {array.dtype}; {dtype} is needed{_remedy(what, array, dtype)}")
+        raise FrameError(f"frame: {what} holds {array.dtype}; {dtype} is needed{_remedy(what, array, dtype)}")
     dimensions = 2 if pixel == 1 else 3
     if array.ndim != dimensions or (pixel > 1 and array.shape[2] != pixel):
         right = "(H, W)" if pixel == 1 else f"(H, W, {pixel})"
-        raise PhasefrontError.Frame(f"frame: {what} is {array.shape}; {right} is right")
+        raise FrameError(f"frame: {what} is {array.shape}; {right} is right")
     # The library reads images row by row, as from cameras. Rotated or mirrored arrays are copied.
     rows, pixels = array.strides[:2]
     value = pixel * array.itemsize
@@ -61,8 +61,8 @@ def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _f
         array = numpy.ascontiguousarray(array)
         rows, pixels = array.strides[:2]
     memory = Memory(array)
-    if memory.size > MOST_BYTES or rows >= 2**32:
-        raise PhasefrontError.Frame(
+    if memory.size > MOST_BYTES or rows >= 2**31:
+        raise FrameError(
             f"frame: {what} is {array.shape} over {memory.size} bytes; {MOST_BYTES} bytes are the most"
         )
     return memory, _ffi.PlaneInfo(row_stride=rows, pixel_stride=pixels), array.shape[1], array.shape[0]
@@ -81,7 +81,7 @@ def _colour(colour: ArrayLike, colour_format: ColourFormat | None) -> tuple[list
     """Returns the planes of a colour image and their format."""
     planar = isinstance(colour, (tuple, list))
     if planar and colour_format is None:
-        raise PhasefrontError.Frame("frame: colour comes in planes; say whether it is ColourFormat.NV12 or YUV420")
+        raise FrameError("frame: colour comes in planes; say whether it is ColourFormat.NV12 or YUV420")
     images = [_array("colour", plane) for plane in colour] if isinstance(colour, (tuple, list)) else [_array("colour", colour)]
     if colour_format is None:
         grey = images[0].ndim == 2
@@ -91,7 +91,7 @@ def _colour(colour: ArrayLike, colour_format: ColourFormat | None) -> tuple[list
         colour_format = ColourFormat.RGB if rgb else ColourFormat.RGBA
     if len(images) != len(_CHANNELS[colour_format]):
         needed = len(_CHANNELS[colour_format])
-        raise PhasefrontError.Frame(f"frame: {len(images)} colour planes are given; {colour_format.name} has {needed}")
+        raise FrameError(f"frame: {len(images)} colour planes are given; {colour_format.name} has {needed}")
     return images, colour_format
 
 
@@ -104,7 +104,7 @@ def _depth(depth: ArrayLike, depth_format: DepthFormat | None) -> tuple[_Array, 
     if depth_format is None:
         depth_format = _DEPTH_FORMATS.get(str(array.dtype))
     if depth_format is None:
-        raise PhasefrontError.Frame(
+        raise FrameError(
             f"frame: depth holds {array.dtype}; metres are float32, float16 or float64: depth.astype(numpy.float32); "
             "millimetres are uint16: depth.astype(numpy.uint16)"
         )
@@ -131,7 +131,7 @@ class Frame:
         cameras: The colour camera and the depth camera, if they are apart.
 
     A session reads the arrays in place, during the call that takes the frame. Grey images, float64 depth and rotated or
-    mirrored arrays are copied. Raises `PhasefrontError.Frame` for arrays of other types or shapes.
+    mirrored arrays are copied. Raises `FrameError` for arrays of other types or shapes.
     """
 
     def __init__(

@@ -6,14 +6,14 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy
 from numpy.typing import NDArray
 
 from . import _ffi, _png
-from ._ffi import Display, Encoding, HologramInfo, Layout, PhasefrontError, Placement
-from ._memory import array_at
+from ._ffi import Display, Encoding, FileError, HologramInfo, Layout, Placement, SettingError
+from ._memory import array_at, image
 from ._target import Target
 
 Number = TypeVar("Number", numpy.float32, numpy.complex64)
@@ -48,7 +48,7 @@ def _display(display: Display) -> dict[str, object]:
 
 def _encoder(encoding: Encoding) -> str:
     """Returns the name of an encoding on the command line."""
-    names = [("double", Encoding.DOUBLE_PHASE), ("anti-alias", Encoding.ANTI_ALIAS), ("band-limit", Encoding.BAND_LIMIT)]
+    names = [("double", Encoding.double_phase), ("anti-alias", Encoding.anti_alias), ("band-limit", Encoding.band_limit)]
     return next((name for name, kind in names if isinstance(encoding, kind)), "deep")
 
 
@@ -73,22 +73,38 @@ class Hologram:
         """Returns the z in mm of the scene point at (x, y) of the image, each 0 to 1 from the upper left corner."""
         return self._raw.z_at(x, y)
 
-    def preview(self, z_mm: float, width: int, height: int) -> NDArray[numpy.uint8]:
-        """Returns the displayed image for an eye focused at `z_mm`: red, green, blue, alpha, uint8, (height, width, 4).
-        Read only.
+    def preview(
+        self,
+        z_mm: float,
+        width: int,
+        height: int,
+        *,
+        layout: Layout = Layout.RGB,
+        out: NDArray[numpy.uint8] | None = None,
+    ) -> NDArray[numpy.uint8]:
+        """Returns the displayed image for an eye focused at `z_mm`: red, green, blue, uint8, (height, width, 3).
 
-        Raises `PhasefrontError.Setting` if the image is empty or too large, or if z is too far away.
+        Args:
+            z_mm: The z of the focus.
+            width: The width in pixels.
+            height: The height in pixels.
+            layout: RGB, or RGBA or BGRA with (height, width, 4).
+            out: The array to write into and to return, for example one for all frames. Its rows may have gaps.
+
+        Raises `SettingError` if the image is empty or too large, if z is too far away, or if `out` does not
+        fit.
         """
         if width < 1 or height < 1:
-            raise PhasefrontError.Setting(f"a preview of {width}×{height} is empty; each side must be at least 1")
-        image = self._raw.preview(z_mm, width, height)
-        return array_at(image, image.address(), (height, width, 4), numpy.uint8)
+            raise SettingError(f"a preview of {width}×{height} is empty; each side must be at least 1")
+        array, memory = image(out, (height, width, 3 if layout == Layout.RGB else 4), numpy.uint8)
+        self._raw.write_preview(z_mm, width, height, layout, memory)
+        return array
 
     def refocus(self, z_mm: float) -> NDArray[numpy.float32]:
         """Returns the displayed image of the whole hologram for an eye focused at `z_mm`, as amplitudes; 1 is white,
         float32, (C, H, W). Read only.
 
-        Raises `PhasefrontError.Setting` if z is too far away.
+        Raises `SettingError` if z is too far away.
         """
         return self._numbers(self._raw.refocus(z_mm), numpy.float32)
 
@@ -96,7 +112,7 @@ class Hologram:
         """Returns the complex field of the levels behind the aperture at `z_mm` (0 is the midpoint), complex64,
         (C, H, W), without the carrier exp(i2πz/λ). Read only.
 
-        Raises `PhasefrontError.Setting` if z is too far away.
+        Raises `SettingError` if z is too far away.
         """
         return self._numbers(self._raw.field(z_mm), numpy.complex64)
 
@@ -104,29 +120,40 @@ class Hologram:
         """Returns planes as an array of this type."""
         return array_at(planes, planes.plane_address(0), self._shape, kind)
 
-    def output(self, placement: Placement | None = None, image: int = 0) -> NDArray[numpy.uint8]:
-        """Returns image `image` of the images for the modulator's driver, at the modulator's resolution, with unchanged
-        levels, uint8, (H, W, bytes per pixel). All layouts except grey have one image. RGB is the default. Read only.
+    def output(
+        self, placement: Placement | None = None, index: int = 0, *, out: NDArray[Any] | None = None
+    ) -> NDArray[Any]:
+        """Returns one of the images for the modulator's driver, at the modulator's resolution, with unchanged levels:
+        uint8, (H, W, bytes per pixel), but uint16, (H, W, 1), for GREY16 and uint32, (H, W, 1), for RGB10.
 
-        Raises `PhasefrontError.Setting` if the layout has no such image.
+        Args:
+            placement: The layout, flips and shifts. By default RGB in the middle.
+            index: The index of the image: all layouts except GREY and GREY16 have one.
+            out: The array to write into and to return, for example one for all frames. Its rows may have gaps.
+
+        Raises `SettingError` if the layout has no such image or `out` does not fit.
         """
-        output = self._raw.output(placement or Placement(layout=Layout.RGB), image)
-        return array_at(output, output.address(), (output.height(), output.width(), output.pixel_bytes()), numpy.uint8)
+        placement = placement or Placement(layout=Layout.RGB)
+        size = self._raw.output_size(placement.layout)
+        kind: type[Any] = {Layout.GREY16: numpy.uint16, Layout.RGB10: numpy.uint32}.get(placement.layout, numpy.uint8)
+        array, memory = image(out, (size.height, size.width, size.pixel_bytes // numpy.dtype(kind).itemsize), kind)
+        self._raw.write_output(placement, index, memory)
+        return array
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the levels and their metadata as a PNG, like the command `phasefront hologram`. `phasefront refocus`
         and `phasefront view` read it. If the target is a calibration file, these commands need its `--display`.
 
-        Raises `PhasefrontError.File` if the file cannot be written or its name does not end in .png, and
-        `PhasefrontError.Setting` if the display has more than 8 bits, because a byte cannot hold its levels.
+        Raises `FileError` if the file cannot be written or its name does not end in .png, and
+        `SettingError` if the display has more than 8 bits, because a byte cannot hold its levels.
         """
         file = Path(path)
         if file.suffix.lower() != ".png":
-            raise PhasefrontError.File(f"{file}: the name must end in .png")
+            raise FileError(f"{file}: the name must end in .png")
         bits = self._purpose.target.display().bits
         if bits > 8:
-            raise PhasefrontError.Setting(f"save writes levels of up to 8 bits; the display has {bits}; take output()")
+            raise SettingError(f"save writes levels of up to 8 bits; the display has {bits}; take output()")
         try:
             _png.write(file, self.levels.transpose(1, 2, 0), "phasefront", self._purpose.told(self.info.scale))
         except OSError as error:
-            raise PhasefrontError.File(f"{file}: cannot be written: {error.strerror}") from None
+            raise FileError(f"{file}: cannot be written: {error.strerror}") from None

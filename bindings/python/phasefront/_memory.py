@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy
 
-from ._ffi import PhasefrontError
+from ._ffi import RawMemory, SettingError
 from .ffi import phasefront_ffi as _generated
 
 Kind = TypeVar("Kind", bound=numpy.generic)
@@ -41,7 +41,7 @@ class _ByRefBytes:
         if isinstance(value, bytes):
             value = Memory(numpy.frombuffer(value, numpy.uint8))
         if value.size > MOST_BYTES:
-            raise PhasefrontError.Setting(f"{value.size} bytes are too many; {MOST_BYTES} are the most")
+            raise SettingError(f"{value.size} bytes are too many; {MOST_BYTES} are the most")
         to.len = value.size
         if value.size > 0:
             to.data = ctypes.cast(value.address, ctypes.POINTER(ctypes.c_char))
@@ -50,6 +50,20 @@ class _ByRefBytes:
 
 
 _generated._UniffiFfiConverterByRefBytes = _ByRefBytes
+
+
+def image(out: numpy.ndarray[Any, Any] | None, shape: tuple[int, int, int], kind: type[Kind]) -> tuple[numpy.typing.NDArray[Kind], RawMemory]:
+    """Returns the array that an image is written into, `out` or a new one, and its memory.
+
+    Raises `SettingError` if `out` has another type or shape, gaps inside rows, or is read only.
+    """
+    array = numpy.empty(shape, kind) if out is None else out
+    _, width, values = shape
+    packed = array.itemsize * values, array.itemsize
+    if array.dtype != kind or array.shape != shape or not array.flags.writeable or array.strides[1:] != packed or array.strides[0] < width * packed[0]:
+        raise SettingError(f"out must be a writable array of {numpy.dtype(kind)}, {shape}, without gaps inside rows")
+    length = (shape[0] - 1) * array.strides[0] + width * packed[0]
+    return array, RawMemory(address=array.ctypes.data, length=length, row_stride=array.strides[0])
 
 
 def array_at(owner: object, address: int, shape: tuple[int, ...], kind: type[Kind]) -> numpy.typing.NDArray[Kind]:

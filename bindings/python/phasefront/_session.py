@@ -136,12 +136,12 @@ def session_options(
         target: A display or a calibrated target. By default the display of 1920×1080. Holograms have its resolution.
         changes: Fields of `SessionOptions`, which documents each of them.
 
-    Raises `PhasefrontError.Display` for an impossible display.
+    Raises `DisplayError` for an impossible display.
     """
     if not isinstance(target, _ffi.Target):
         target = Target.of_display(Display() if target is None else target)
     if isinstance(method, Network):
-        method = Method.TRAINED(network=method)
+        method = Method.trained(network=method)
     fields: dict[str, Any] = vars(_ffi.session_options(target, method)) | {"target": target} | changes
     return SessionOptions(**fields)
 
@@ -176,8 +176,8 @@ class Session:
         """Returns the hologram of `frame`, in an image or a video session. Blocks until it is done; other Python
         threads run meanwhile.
 
-        Raises `PhasefrontError.Frame` if the frame is unusable, `.Timestamp` if it is not later than the previous frame
-        of a video, and `.Session` if the session is live, paused or closed. Later frames are not affected.
+        Raises `FrameError` if the frame is unusable, `TimestampError` if it is not later than the previous frame
+        of a video, and `SessionError` if the session is live, paused or closed. Later frames are not affected.
         """
         return Hologram(self._raw.process(*frame._arguments()), self._purpose)
 
@@ -213,7 +213,7 @@ class Session:
     def set_quality(self, quality: Quality) -> None:
         """Sets whether the session may change its quality level.
 
-        Raises `PhasefrontError.Setting` for a level that the session does not have.
+        Raises `SettingError` for a level that the session does not have.
         """
         self._raw.set_quality(quality)
 

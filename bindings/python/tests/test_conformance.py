@@ -41,9 +41,9 @@ DEPTH = {
 }
 TURN = {0: Rotation.UPRIGHT, 90: Rotation.CLOCKWISE90, 180: Rotation.HALF, 270: Rotation.CLOCKWISE270}
 ENCODING = {
-    "double-phase": Encoding.DOUBLE_PHASE(),
-    "anti-alias": Encoding.ANTI_ALIAS(sigma=0.7, width=3),
-    "band-limit": Encoding.BAND_LIMIT(k=1.0),
+    "double-phase": Encoding.double_phase(),
+    "anti-alias": Encoding.anti_alias(sigma=0.7, width=3),
+    "band-limit": Encoding.band_limit(k=1.0),
 }
 
 
@@ -97,12 +97,12 @@ def target_of(case):
 def made_of(case, memory, network):
     """Returns the levels of a case's frames and their displayed images."""
     encoding = case["encoding"]
-    changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.DEEP(prefilter=model(encoding))}
+    changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.deep(prefilter=model(encoding))}
     if case["brightness"] is not None:
-        changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
+        changes["brightness"] = Brightness.fixed(scale=case["brightness"])
     if case["range"] is not None:
-        changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
-    methods = {"network": network, "sweep": Method.SWEEP(), "auto": Method.AUTO(network=network)}
+        changes["depth_range"] = DepthRange.fixed(near_m=case["range"][0], far_m=case["range"][1])
+    methods = {"network": network, "sweep": Method.sweep(), "auto": Method.auto(network=network)}
     method = methods[case["method"]] if case["method"] in methods else model(case["method"])
     options = session_options(method, target_of(case), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]

@@ -59,33 +59,65 @@ namespace Phasefront
         Bgra = 2,
         /// <summary>One image per colour, one byte per pixel.</summary>
         Grey = 3,
+        /// <summary>One image of 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha
+        /// 3.</summary>
+        Rgb10 = 4,
+        /// <summary>One image per colour, one 16-bit little-endian word per pixel.</summary>
+        Grey16 = 5,
     }
 
-    /// <summary>An image whose rows have no gaps.</summary>
-    public sealed class PixelImage
+    /// <summary>The images that a modulator's input takes of a hologram.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct OutputSize
     {
-        /// <summary>The bytes of the image.</summary>
-        public byte[] Bytes { get; }
-        /// <summary>The width in pixels.</summary>
-        public int Width { get; }
-        /// <summary>The height in pixels.</summary>
-        public int Height { get; }
+        /// <summary>The width of an image in pixels.</summary>
+        public uint Width;
+        /// <summary>The height of an image in pixels.</summary>
+        public uint Height;
         /// <summary>The number of bytes per pixel.</summary>
-        public int PixelBytes { get; }
+        public uint PixelBytes;
+        /// <summary>The number of images: one, or one for each colour.</summary>
+        public uint Images;
+    }
 
-        // Copies an image of the C interface and frees it.
-        internal PixelImage(IntPtr image)
+    /// <summary>The memory that an image is written into: an array, or native memory, for example of a NativeArray, that
+    /// stays valid during the call. Rows are the row stride apart, in bytes.</summary>
+    public struct ImageMemory
+    {
+        private readonly byte[] bytes;
+        private NativeMemory memory;
+
+        /// <summary>Creates memory of an array.</summary>
+        public ImageMemory(byte[] bytes, int rowStride)
         {
+            this.bytes = bytes ?? throw new ArgumentNullException(nameof(bytes));
+            memory = new NativeMemory { Length = (UIntPtr)(ulong)bytes.Length, RowStride = checked((uint)rowStride) };
+        }
+
+        /// <summary>Creates memory of <paramref name="length"/> bytes at an address.</summary>
+        public ImageMemory(IntPtr data, long length, int rowStride)
+        {
+            bytes = null;
+            memory = new NativeMemory { Data = data, Length = (UIntPtr)checked((ulong)length), RowStride = checked((uint)rowStride) };
+        }
+
+        // Calls `call` with the memory, which stays in its place meanwhile.
+        internal void Lend(Func<NativeMemory, Status> call)
+        {
+            if (bytes == null)
+            {
+                Check(call(memory));
+                return;
+            }
+            var pin = GCHandle.Alloc(bytes, GCHandleType.Pinned);
             try
             {
-                Check(Native.pf_image_info(image, out var info));
-                Bytes = new byte[checked((int)info.Length)];
-                Marshal.Copy(info.Data, Bytes, 0, Bytes.Length);
-                (Width, Height, PixelBytes) = ((int)info.Width, (int)info.Height, (int)info.PixelBytes);
+                memory.Data = pin.AddrOfPinnedObject();
+                Check(call(memory));
             }
             finally
             {
-                Native.pf_image_free(image);
+                pin.Free();
             }
         }
     }
@@ -156,12 +188,10 @@ namespace Phasefront
             return zMm;
         }
 
-        /// <summary>Returns the displayed image for an eye focused at z: red, green, blue, 255.</summary>
-        public PixelImage Preview(double zMm, int width, int height)
-        {
-            Check(Native.pf_hologram_preview(this, zMm, checked((uint)width), checked((uint)height), out var image));
-            return new PixelImage(image);
-        }
+        /// <summary>Writes the displayed image for an eye focused at z: pixels of Rgb, Rgba or Bgra. Allocates no
+        /// image.</summary>
+        public void WritePreview(double zMm, int width, int height, ModulatorLayout layout, ImageMemory to) =>
+            to.Lend(memory => Native.pf_hologram_write_preview(this, zMm, checked((uint)width), checked((uint)height), (uint)layout, memory));
 
         /// <summary>Returns the displayed image of the whole hologram for an eye focused at z, as amplitudes; 1 is
         /// white. Too slow for every frame.</summary>
@@ -179,8 +209,17 @@ namespace Phasefront
             return new Planes(planes);
         }
 
-        /// <summary>Returns image <paramref name="number"/> of the images for the modulator's driver.</summary>
-        public PixelImage Output(ModulatorLayout layout, int number = 0, bool flipX = false, bool flipY = false, int shiftX = 0, int shiftY = 0)
+        /// <summary>Returns the size of the images of a layout for the modulator.</summary>
+        public OutputSize OutputSize(ModulatorLayout layout)
+        {
+            Check(Native.pf_hologram_output_size(this, (uint)layout, out var size));
+            return size;
+        }
+
+        /// <summary>Writes image <paramref name="number"/> of the images for the modulator's driver. Allocates no
+        /// image.</summary>
+        public void WriteOutput(
+            ModulatorLayout layout, ImageMemory to, int number = 0, bool flipX = false, bool flipY = false, int shiftX = 0, int shiftY = 0)
         {
             var placement = new NativePlacement
             {
@@ -190,14 +229,62 @@ namespace Phasefront
                 ShiftX = shiftX,
                 ShiftY = shiftY,
             };
-            Check(Native.pf_hologram_output(this, ref placement, checked((uint)number), out var image));
-            return new PixelImage(image);
+            to.Lend(memory => Native.pf_hologram_write_output(this, ref placement, checked((uint)number), memory));
         }
 
         /// <summary>Frees the hologram.</summary>
         protected override bool ReleaseHandle()
         {
             Native.pf_hologram_free(handle);
+            return true;
+        }
+    }
+
+    /// <summary>A modulator: its display, the phases of its levels, and the images that its input takes.</summary>
+    public sealed class Modulator : NativeObject
+    {
+        private Modulator(IntPtr handle) : base(handle) { }
+
+        /// <summary>Returns a modulator that the command `phasefront devices` lists, for example
+        /// holoeye-pluto.</summary>
+        public static Modulator Named(string name)
+        {
+            Check(Native.pf_modulator_named(Text.Write(name), out var modulator));
+            return new Modulator(modulator);
+        }
+
+        /// <summary>Reads the text of a modulator's file, with keys such as packing and levels_turns.</summary>
+        public static Modulator FromToml(string toml)
+        {
+            Check(Native.pf_modulator_from_toml(Text.Write(toml), out var modulator));
+            return new Modulator(modulator);
+        }
+
+        /// <summary>Returns the target of holograms for the modulator.</summary>
+        public HologramTarget Target()
+        {
+            Check(Native.pf_modulator_target(this, out var target));
+            return new HologramTarget(target);
+        }
+
+        /// <summary>The size of the images that its input takes.</summary>
+        public OutputSize OutputSize
+        {
+            get
+            {
+                Check(Native.pf_modulator_output_size(this, out var size));
+                return size;
+            }
+        }
+
+        /// <summary>Writes image <paramref name="number"/> of the images that its input takes of a hologram.</summary>
+        public void WriteOutput(Hologram hologram, ImageMemory to, int number = 0) =>
+            to.Lend(memory => Native.pf_modulator_write_output(this, hologram, checked((uint)number), memory));
+
+        /// <summary>Frees the modulator.</summary>
+        protected override bool ReleaseHandle()
+        {
+            Native.pf_modulator_free(handle);
             return true;
         }
     }

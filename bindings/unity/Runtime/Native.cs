@@ -70,13 +70,11 @@ namespace Phasefront
     }
 
     [StructLayout(LayoutKind.Sequential)]
-    internal struct NativeImage
+    internal struct NativeMemory
     {
         public IntPtr Data;
         public UIntPtr Length;
-        public uint Width;
-        public uint Height;
-        public uint PixelBytes;
+        public uint RowStride;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -173,14 +171,20 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_info(Hologram hologram, out HologramInfo info);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_levels(Hologram hologram, uint colour, out IntPtr levels, out UIntPtr length);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_z_at(Hologram hologram, double x, double y, out double zMm);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_preview(Hologram hologram, double zMm, uint width, uint height, out IntPtr image);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_write_preview(Hologram hologram, double zMm, uint width, uint height, uint layout, NativeMemory memory);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_refocus(Hologram hologram, double zMm, out IntPtr planes);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_field(Hologram hologram, double zMm, out IntPtr planes);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_planes_info(IntPtr planes, out NativePlanes info);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_planes_free(IntPtr planes);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_output(Hologram hologram, ref NativePlacement placement, uint number, out IntPtr image);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_output_size(Hologram hologram, uint layout, out OutputSize size);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_write_output(Hologram hologram, ref NativePlacement placement, uint number, NativeMemory memory);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_hologram_free(IntPtr hologram);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_image_info(IntPtr image, out NativeImage info);
-        [DllImport(Library, CallingConvention = C)] public static extern void pf_image_free(IntPtr image);
+
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_named(byte[] name, out IntPtr modulator);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_from_toml(byte[] toml, out IntPtr modulator);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_target(Modulator modulator, out IntPtr target);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_output_size(Modulator modulator, out OutputSize size);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_write_output(Modulator modulator, Hologram hologram, uint number, NativeMemory memory);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_modulator_free(IntPtr modulator);
     }
 }

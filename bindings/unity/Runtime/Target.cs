@@ -18,7 +18,7 @@ namespace Phasefront
     /// its lasers and the correction of its optics. Immutable. Many sessions can share it. </summary>
     public sealed class HologramTarget : NativeObject
     {
-        private HologramTarget(IntPtr handle) : base(handle) { }
+        internal HologramTarget(IntPtr handle) : base(handle) { }
 
         /// <summary>Reads a display in TOML, such as "width = 1920\npitch_um = 8.0". Missing keys have default
         /// values.</summary>

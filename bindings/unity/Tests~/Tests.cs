@@ -232,9 +232,23 @@ internal static class Tests
                 using (var hologram = session.Process(frame))
                 {
                     Require(hologram.Info.Width == 48 && float.IsNaN(hologram.Info.NearM), "what is known");
-                    var image = hologram.Output(ModulatorLayout.Rgba);
-                    Require(image.Bytes.Length == 48 * 36 * 4 && image.Bytes[0] == hologram.Levels(0)[0], "its image");
-                    Require(hologram.Preview(hologram.ZAt(0.5, 0.5), 24, 18).Width == 24, "its preview");
+                    var bytes = new byte[48 * 36 * 4];
+                    var size = hologram.OutputSize(ModulatorLayout.Rgba);
+                    Require(size.Width == 48 && size.Height == 36 && size.PixelBytes == 4 && size.Images == 1, "its size");
+                    hologram.WriteOutput(ModulatorLayout.Rgba, new ImageMemory(bytes, 48 * 4));
+                    Require(bytes[0] == hologram.Levels(0)[0] && bytes[3] == 255, "its image");
+                    hologram.WriteOutput(ModulatorLayout.Grey16, new ImageMemory(bytes, 48 * 2), number: 1);
+                    Require(bytes[0] == 0 && bytes[1] == hologram.Levels(1)[0], "its words");
+                    hologram.WritePreview(hologram.ZAt(0.5, 0.5), 24, 18, ModulatorLayout.Bgra, new ImageMemory(bytes, 24 * 4));
+                    Require(bytes[3] == 255, "its preview");
+                    var small = new ImageMemory(new byte[8], 8);
+                    Refused(Status.Setting, "36 rows", () => hologram.WriteOutput(ModulatorLayout.Rgb, small));
+                    using (var modulator = Modulator.Named("ti-plm-p47"))
+                    {
+                        Require(modulator.OutputSize.Width == 1920 && modulator.OutputSize.PixelBytes == 3, "a modulator's size");
+                        using (var own = modulator.Target()) Require(own.Size.Width == 960 && own.Size.Height == 540, "a modulator's target");
+                        Refused(Status.Setting, "lasers", () => modulator.WriteOutput(hologram, small));
+                    }
                     Refused(Status.Setting, "a shorter distance", () => hologram.Refocus(1e5));
                 }
                 Refused(Status.Timestamp, "2", () => session.Process(frame));

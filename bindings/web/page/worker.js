@@ -36,14 +36,17 @@ const answers = {
     const ms = performance.now() - start;
     hologram?.close();
     hologram = made;
-    const { data, width, height } = hologram.output({ layout: "rgba" });
-    return { ms, times: hologram.info.times, backend: session.statistics.backend, width, height, levels: data };
+    const { width, height } = hologram.outputSize("rgba");
+    const levels = new Uint8ClampedArray(4 * width * height);
+    hologram.writeOutput({ layout: "rgba" }, levels);
+    return { ms, times: hologram.info.times, backend: session.statistics.backend, width, height, levels };
   },
 
   view({ zMm }) {
     const { width, height } = hologram.info;
     const start = performance.now();
-    const pixels = hologram.preview(zMm, width, height);
+    const pixels = new Uint8ClampedArray(4 * width * height);
+    hologram.writePreview(zMm, { width, height, data: pixels });
     return { ms: performance.now() - start, width, height, pixels };
   },
 

@@ -1,9 +1,10 @@
-//! Results, which leave the module as copies.
+//! Results, which leave the module as copies, images into the memory of the page.
 
 use crate::error::{Answer, object, of_core, setting};
-use js_sys::{Array, Float32Array, Object, Uint8Array, Uint8ClampedArray};
-use phasefront::output::{Layout, Output, Placement};
+use js_sys::{Array, Float32Array, Object, Uint8Array};
+use phasefront::output::{Layout, Output, OutputSize, Placement};
 use phasefront::session::{FrameTimes, Hologram};
+use std::cell::RefCell;
 use std::time::Duration;
 use wasm_bindgen::prelude::*;
 
@@ -59,15 +60,26 @@ impl RawHologram {
         self.core.z_at(x, y) * 1e3
     }
 
-    /// Returns the view of an eye focused at `z_mm`: rows of red, green, blue and alpha.
+    /// Writes the view of an eye focused at `z_mm` into `to`: pixels in `layout`, `rgb`, `rgba` or `bgra`, whose rows
+    /// begin `row_stride` bytes apart.
     ///
     /// # Errors
-    /// Throws an error of kind `setting` in the cases of [`Hologram::preview`].
-    pub fn preview(&self, z_mm: f64, width: u32, height: u32) -> Answer<Uint8ClampedArray> {
-        let (w, h) = (width as usize, height as usize);
-        let mut rgba = vec![0; Hologram::preview_bytes(h, w).map_err(of_core)?];
-        self.core.preview(z_mm / 1e3, h, w, &mut rgba).map_err(of_core)?;
-        Ok(Uint8ClampedArray::from(&rgba[..]))
+    /// Throws an error of kind `setting` in the cases of [`Hologram::write_preview`].
+    #[wasm_bindgen(js_name = writePreview)]
+    pub fn write_preview(
+        &self,
+        z_mm: f64,
+        width: u32,
+        height: u32,
+        name: &str,
+        to: &Uint8Array,
+        row_stride: u32,
+    ) -> Answer<()> {
+        let (layout, screen) = (layout(name)?, (height as usize, width as usize));
+        let row = layout.pixel_bytes() * screen.1;
+        copied(to, row_stride, (screen.0, row), |bytes| {
+            self.core.write_preview(z_mm / 1e3, screen, layout, bytes, row)
+        })
     }
 
     /// Returns the view of an eye focused at `z_mm` at full resolution: amplitudes where 1 is white, (C, H, W).
@@ -90,44 +102,110 @@ impl RawHologram {
         Ok(Float32Array::from(&parts[..]))
     }
 
-    /// Returns one of the images for the modulator's driver: an object of the form `OutputImage`. `flips` are the flips
-    /// of x and y; `shift` is the offset to the right and down in pixels.
+    /// Returns the size of the images of a layout: an object of the form `OutputSize`.
     ///
     /// # Errors
-    /// Throws an error of kind `setting` if the layout is unknown, if it does not have the image, or if [`Output::new`]
-    /// fails.
-    pub fn output(&self, layout: &str, flips: &[u8], shift: &[i32], image: u32) -> Answer<Object> {
+    /// Throws an error of kind `setting` if the layout is unknown.
+    #[wasm_bindgen(js_name = outputSize)]
+    pub fn output_size(&self, name: &str) -> Answer<Object> {
+        let (height, width) = self.core.target().modulator();
+        let layout = layout(name)?;
+        Ok(size(OutputSize {
+            height,
+            width,
+            pixel_bytes: layout.pixel_bytes(),
+            images: layout.images(self.core.colours()),
+        }))
+    }
+
+    /// Writes one of the images for the modulator's driver into `to`, whose rows begin `row_stride` bytes apart.
+    /// `flips` are the flips of x and y; `shift` is the offset to the right and down in pixels.
+    ///
+    /// # Errors
+    /// Throws an error of kind `setting` if the layout is unknown, if it does not have the image, if the image does not
+    /// fit, or if [`Output::new`] fails.
+    #[wasm_bindgen(js_name = writeOutput)]
+    pub fn write_output(
+        &self,
+        name: &str,
+        flips: &[u8],
+        shift: &[i32],
+        image: u32,
+        to: &Uint8Array,
+        row_stride: u32,
+    ) -> Answer<()> {
         let (&[flip_x, flip_y], &[shift_x, shift_y]) = (flips, shift) else {
             return Err(setting("a placement has two flips and two shifts"));
-        };
-        let layout = match layout {
-            "rgb" => Layout::Rgb,
-            "rgba" => Layout::Rgba,
-            "bgra" => Layout::Bgra,
-            "grey" => Layout::Grey,
-            other => {
-                return Err(setting(&format!(
-                    "there is no layout '{other}'; there are rgb, rgba, bgra, grey"
-                )));
-            }
         };
         let placement = Placement {
             flip_x: flip_x != 0,
             flip_y: flip_y != 0,
             shift_x,
             shift_y,
-            ..Placement::centred(layout)
+            ..Placement::centred(layout(name)?)
         };
         let plan = Output::new(self.core.target(), self.core.shape(), placement).map_err(of_core)?;
-        let mut bytes = vec![0; plan.image_bytes()];
-        plan.write(self.core.output_levels(), image as usize, &mut bytes)
-            .map_err(of_core)?;
-        let (height, width) = plan.shape();
-        Ok(object([
-            ("width", width.into()),
-            ("height", height.into()),
-            ("pixelBytes", layout.pixel_bytes().into()),
-            ("data", Uint8Array::from(&bytes[..]).into()),
-        ]))
+        copied(to, row_stride, (plan.shape().0, plan.row_bytes()), |bytes| {
+            plan.write(self.core.output_levels(), image as usize, bytes, plan.row_bytes())
+        })
     }
+}
+
+fn layout(name: &str) -> Answer<Layout> {
+    Ok(match name {
+        "rgb" => Layout::Rgb,
+        "rgba" => Layout::Rgba,
+        "bgra" => Layout::Bgra,
+        "rgb10" => Layout::Rgb10,
+        "grey" => Layout::Grey,
+        "grey16" => Layout::Grey16,
+        other => {
+            return Err(setting(&format!(
+                "there is no layout '{other}'; there are rgb, rgba, bgra, rgb10, grey, grey16"
+            )));
+        }
+    })
+}
+
+/// Converts a size to an object of the form `OutputSize`.
+pub(crate) fn size(size: OutputSize) -> Object {
+    object([
+        ("width", size.width.into()),
+        ("height", size.height.into()),
+        ("pixelBytes", size.pixel_bytes.into()),
+        ("images", size.images.into()),
+    ])
+}
+
+thread_local! {
+    /// The module's memory for an image on its way out, kept for the next one.
+    static IMAGE: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Lets `write` fill an image of (H, bytes of a row) and copies it into `to`, whose rows begin `row_stride` bytes apart.
+pub(crate) fn copied(
+    to: &Uint8Array,
+    row_stride: u32,
+    (height, row): (usize, usize),
+    write: impl FnOnce(&mut [u8]) -> phasefront::Result<()>,
+) -> Answer<()> {
+    let stride = row_stride as usize;
+    let needed = stride.saturating_mul(height.saturating_sub(1)).saturating_add(row);
+    if stride < row || (to.length() as usize) < needed {
+        return Err(setting(&format!(
+            "{} bytes with rows {stride} bytes apart cannot hold {height} rows of {row} bytes",
+            to.length()
+        )));
+    }
+    IMAGE.with_borrow_mut(|image| {
+        image.resize(height * row, 0);
+        write(image).map_err(of_core)?;
+        // Without gaps, all rows are one.
+        let run = if stride == row { height * row } else { row };
+        for (n, bytes) in image.chunks_exact(run.max(1)).enumerate() {
+            let from = (n * stride) as u32;
+            to.subarray(from, from + run as u32).copy_from(bytes);
+        }
+        Ok(())
+    })
 }

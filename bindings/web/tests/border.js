@@ -1,6 +1,6 @@
 // Tests that the API refuses each fault with its kind and the start of its one-line message, and that later calls still
 // work.
-import { Frame, Network, PhasefrontError, Session, Target, load, version } from "/phasefront/phasefront.js";
+import { Frame, Modulator, Network, PhasefrontError, Session, Target, load, version } from "/phasefront/phasefront.js";
 
 const bytes = (n) => new Uint8Array(n).fill(90);
 const colour = (width = 16, height = 12) => ({ width, height, data: bytes(4 * width * height) });
@@ -60,13 +60,25 @@ export async function run() {
   refused("timestamp", "", () => video.process(new Frame(colour(), depth(), { timestampNs: 8n })));
 
   const hologram = session.process(new Frame(colour(), depth()));
-  refused("setting", "", () => hologram.preview(0, 0, 10));
-  refused("setting", "", () => hologram.preview(1e9, 10, 10));
-  refused("setting", "no layout 'cyan'", () => hologram.output({ layout: "cyan" }));
-  refused("setting", "", () => hologram.output({}, 1));
+  const view = new ImageData(10, 8);
+  refused("setting", "", () => hologram.writePreview(0, { width: 0, height: 8, data: view.data }));
+  refused("setting", "", () => hologram.writePreview(1e9, view));
+  refused("setting", "8 rows", () => hologram.writePreview(0, { width: 10, height: 8, data: new Uint8Array(9) }));
+  hologram.writePreview(0, view);
+  // Blue first, with gaps between rows, which stay as they are.
+  const gaps = new Uint8Array(45 * 8).fill(7);
+  hologram.writePreview(0, { width: 10, height: 8, data: gaps, layout: "bgra", rowStride: 45 });
+  if (gaps[0] !== view.data[2] || gaps[3] !== 255 || gaps[40] !== 7 || gaps[47] !== view.data[40])
+    throw new Error(`${gaps}`);
+  const grey = new Uint8Array(16 * 12);
+  refused("setting", "no layout 'cyan'", () => hologram.writeOutput({ layout: "cyan" }, grey));
+  refused("setting", "12 rows", () => hologram.writeOutput({}, grey));
+  refused("setting", "no image 3", () => hologram.writeOutput({ layout: "grey" }, grey, { image: 3 }));
   const { info, levels } = hologram;
-  const grey = hologram.output({ layout: "grey" }, 1);
-  const same = grey.data.every((level, index) => level === levels[16 * 12 + index]);
+  hologram.writeOutput({ layout: "grey" }, grey, { image: 1 });
+  const words = new Uint16Array(16 * 12);
+  hologram.writeOutput({ layout: "grey16" }, new Uint8Array(words.buffer), { image: 1 });
+  const same = grey.every((level, i) => level === levels[16 * 12 + i] && words[i] === level << 8);
   if (levels.length !== 3 * 16 * 12 || !same || info.rangeM !== null || info.times.totalMs <= 0)
     throw new Error(JSON.stringify(info));
   // The view is the amplitude of the field, where 1 is white.
@@ -77,6 +89,12 @@ export async function run() {
   if (seen.length !== levels.length || field.length !== 2 * levels.length || !(worst < 1e-5))
     throw new Error(`${worst} apart`);
   refused("setting", "", () => hologram.field(1e9));
+  refused("display", "holoeye-pluto", () => Modulator.named("pluto"));
+  const modulator = Modulator.fromToml('width = 16\nheight = 12\npacking = "grey"\nflip_x = true');
+  const { images, pixelBytes } = modulator.outputSize;
+  modulator.writeOutput(hologram, grey, { image: 1 });
+  if (images !== 3 || pixelBytes !== 1 || grey[0] !== levels[16 * 12 + 15]) throw new Error(`${images} ${grey}`);
+  refused("setting", "lasers", () => Modulator.named("ti-plm-p47").writeOutput(hologram, grey));
   hologram.close();
   hologram.close();
   refused("session", "hologram is closed", () => hologram.levels);

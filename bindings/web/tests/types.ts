@@ -20,7 +20,9 @@ export async function show(context: CanvasRenderingContext2D, metres: Float32Arr
   const hologram = session.process(frame);
   const near: number | undefined = hologram.info.rangeM?.[0];
   console.log(near, hologram.levels.byteLength, session.statistics.times.totalMs);
-  return new ImageData(hologram.preview(hologram.zAt(0.5, 0.5), 640, 480), 640);
+  const view = new ImageData(640, 480);
+  hologram.writePreview(hologram.zAt(0.5, 0.5), view);
+  return view;
 }
 
 // @ts-expect-error: there is no mode `live`

@@ -5,6 +5,10 @@ import UIKit
 final class ExternalScreen {
     private var window: UIWindow?
     private let layer = CALayer()
+    /// The modulator's size in pixels, which the screen shows if it can.
+    private let size: CGSize
+
+    init(size: CGSize) { self.size = size }
 
     var isConnected: Bool { connect() != nil }
 
@@ -28,6 +32,10 @@ final class ExternalScreen {
             return nil
         }
         if window?.windowScene != scene {
+            // A television's mode that is scaled or cut at its edges would change the levels.
+            let screen = scene.screen
+            screen.overscanCompensation = .none
+            screen.currentMode = screen.availableModes.first { $0.size == size } ?? screen.preferredMode
             let window = UIWindow(windowScene: scene)
             let controller = UIViewController()
             controller.view.backgroundColor = .black

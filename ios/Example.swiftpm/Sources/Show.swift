@@ -12,15 +12,15 @@ final class Show: ObservableObject {
     @Published var hasError = false
     private(set) var message = ""
     private var latest: Hologram?
-    private let screen = ExternalScreen()
+    private let screen = ExternalScreen(size: CGSize(width: 960, height: 540))
     private let display = HologramDisplay(width: 960, height: 540)
+    private let views = PixelBuffers(width: 480, height: 270)
+    private let outputs = PixelBuffers(width: 960, height: 540)
 
     func run() async {
         do {
             try HologramLog.sendToSystem()
-            var options = try SessionOptions(display: display)
-            options.targetRateHz = 30
-            let session = try HologramSession(options, mode: .live)
+            let session = try HologramSession(SessionOptions.phone(display: display), mode: .live)
             let source: FrameSource = CameraSource.isSupported ? CameraSource() : SampleSource()
             source.start(session)
             defer { source.stop() }
@@ -39,18 +39,22 @@ final class Show: ObservableObject {
     }
 
     private func show(_ hologram: Hologram, of session: HologramSession) async throws {
-        let (zMm, display, needsLevels) = (zMm, display, screen.isConnected)
+        let (zMm, needsLevels) = (zMm, screen.isConnected)
         // Takes some milliseconds, so it must not run on the main thread.
-        let images = try await Task.detached {
-            let view = try hologram.preview(zMm: zMm, width: display.width / 2, height: display.height / 2)
-            return (try view.cgImage(), needsLevels ? try hologram.output().cgImage(colourSpace: nil) : nil)
+        let images = try await Task.detached { [views, outputs] () throws -> (CGImage, CGImage?) in
+            let view = try views.next()
+            try hologram.writePreview(zMm: zMm, to: view)
+            guard needsLevels else { return (try cgImage(of: view), nil) }
+            let levels = try outputs.next()
+            try hologram.writeOutput(to: levels)
+            return (try cgImage(of: view), try cgImage(of: levels, colourSpace: nil))
         }.value
         latest = hologram
         preview = images.0
         if let levels = images.1 { screen.show(levels) }
         let of = session.statistics
         statistics = String(
-            format: "%.1f holograms a second, %d dropped of %d\n%@: %.1f ms, of which the network takes %.1f",
+            format: "%.1f holograms a second, %lld dropped of %lld\n%@: %.1f ms, of which the method takes %.1f",
             of.rateHz, of.dropped.total, of.submitted, of.backend, of.times.totalMs, of.times.methodMs)
     }
 

@@ -1,35 +1,94 @@
-#if canImport(CoreGraphics)
+#if canImport(CoreVideo) && canImport(CoreGraphics)
     import CoreGraphics
+    import CoreVideo
     import PhasefrontCore
 
-    extension PixelImage {
-        /// Returns the image for Core Graphics and UIKit without a copy; the result retains this image. `colourSpace`
-        /// is sRGB for previews, or nil for device values that must reach a modulator unchanged.
+    extension Hologram {
+        /// Writes the displayed image for an eye focused at `zMm` into `buffer`, 32BGRA or 32RGBA of any size, in place.
         ///
-        /// - Throws: ``PhasefrontError/setting(message:)`` if the image does not have 4 bytes per pixel.
-        public func cgImage(colourSpace: CGColorSpace? = CGColorSpace(name: CGColorSpace.sRGB)) throws -> CGImage {
-            guard pixelBytes == 4 else {
-                throw PhasefrontError.setting(
-                    message: "an image of \(pixelBytes) bytes a pixel; the layout RGBA is needed for Core Graphics")
+        /// - Throws: ``PhasefrontError/setting(message:)`` for any other pixel format, or if z is too far away.
+        public func writePreview(zMm: Double, to buffer: CVPixelBuffer) throws {
+            try withPixels(of: buffer) { layout, memory, rowStride in
+                try writePreview(
+                    zMm: zMm, width: CVPixelBufferGetWidth(buffer), height: CVPixelBufferGetHeight(buffer),
+                    layout: layout, to: memory, rowStride: rowStride)
             }
-            let provider = withBytes { bytes in
-                CGDataProvider(
-                    dataInfo: Unmanaged.passRetained(self).toOpaque(), data: bytes.baseAddress!, size: bytes.count,
-                    releaseData: { owner, _, _ in
-                        if let owner { Unmanaged<PixelImage>.fromOpaque(owner).release() }
-                    })
-            }
-            let image = provider.flatMap {
-                CGImage(
-                    width: width, height: height, bitsPerComponent: 8, bitsPerPixel: 32, bytesPerRow: 4 * width,
-                    space: colourSpace ?? CGColorSpaceCreateDeviceRGB(),
-                    bitmapInfo: CGBitmapInfo(rawValue: CGImageAlphaInfo.noneSkipLast.rawValue), provider: $0,
-                    decode: nil, shouldInterpolate: colourSpace != nil, intent: .defaultIntent)
-            }
-            guard let image else {
-                throw PhasefrontError.setting(message: "Core Graphics makes no image of \(width)×\(height) pixels")
-            }
-            return image
         }
+
+        /// Writes the image for the modulator's driver into `buffer`, 32BGRA or 32RGBA of the modulator's size, in place
+        /// and with unchanged levels. `shiftX` and `shiftY` move the hologram, before the flips.
+        ///
+        /// - Throws: ``PhasefrontError/setting(message:)`` for any other pixel format or size.
+        public func writeOutput(
+            to buffer: CVPixelBuffer, flipX: Bool = false, flipY: Bool = false, shiftX: Int = 0, shiftY: Int = 0
+        ) throws {
+            try withPixels(of: buffer) { layout, memory, rowStride in
+                let (width, height) = (CVPixelBufferGetWidth(buffer), CVPixelBufferGetHeight(buffer))
+                let size = outputSize(layout)
+                guard (width, height) == (size.width, size.height) else {
+                    throw PhasefrontError.setting(
+                        message: "a buffer of \(width)×\(height); the modulator's \(size.width)×\(size.height) are needed")
+                }
+                let placement = Placement(
+                    layout: layout, flipX: flipX, flipY: flipY, shiftX: Int32(clamping: shiftX),
+                    shiftY: Int32(clamping: shiftY))
+                try writeOutput(placement, to: memory, rowStride: rowStride)
+            }
+        }
+    }
+
+    /// Returns the pixels of `buffer`, 32BGRA, for Core Graphics and UIKit without a copy. The image retains the buffer
+    /// and keeps it locked for reading, so write the next picture into another buffer; a `CVPixelBufferPool` hands them
+    /// out. `colourSpace` is sRGB for previews, or nil for device values that must reach a modulator unchanged.
+    ///
+    /// - Throws: ``PhasefrontError/setting(message:)`` for any other pixel format.
+    public func cgImage(
+        of buffer: CVPixelBuffer, colourSpace: CGColorSpace? = CGColorSpace(name: CGColorSpace.sRGB)
+    ) throws -> CGImage {
+        let (width, height) = (CVPixelBufferGetWidth(buffer), CVPixelBufferGetHeight(buffer))
+        let rowStride = CVPixelBufferGetBytesPerRow(buffer)
+        guard CVPixelBufferGetPixelFormatType(buffer) == kCVPixelFormatType_32BGRA,
+            CVPixelBufferLockBaseAddress(buffer, .readOnly) == kCVReturnSuccess,
+            let address = CVPixelBufferGetBaseAddress(buffer)
+        else { throw PhasefrontError.setting(message: "a pixel buffer of 32BGRA in memory is needed for Core Graphics") }
+        let provider = CGDataProvider(
+            dataInfo: Unmanaged.passRetained(buffer).toOpaque(), data: address, size: rowStride * height,
+            releaseData: { owner, _, _ in
+                guard let owner else { return }
+                let buffer = Unmanaged<CVPixelBuffer>.fromOpaque(owner).takeRetainedValue()
+                CVPixelBufferUnlockBaseAddress(buffer, .readOnly)
+            })
+        let image = provider.flatMap {
+            CGImage(
+                width: width, height: height, bitsPerComponent: 8, bitsPerPixel: 32, bytesPerRow: rowStride,
+                space: colourSpace ?? CGColorSpaceCreateDeviceRGB(),
+                bitmapInfo: [.byteOrder32Little, CGBitmapInfo(rawValue: CGImageAlphaInfo.noneSkipFirst.rawValue)],
+                provider: $0, decode: nil, shouldInterpolate: colourSpace != nil, intent: .defaultIntent)
+        }
+        guard let image else {
+            throw PhasefrontError.setting(message: "Core Graphics makes no image of \(width)×\(height) pixels")
+        }
+        return image
+    }
+
+    /// Calls `body` with the layout, the memory and the row stride of `buffer`, which is locked meanwhile.
+    private func withPixels(
+        of buffer: CVPixelBuffer, _ body: (ModulatorLayout, UnsafeMutableRawBufferPointer, Int) throws -> Void
+    ) throws {
+        let layout: ModulatorLayout
+        switch CVPixelBufferGetPixelFormatType(buffer) {
+        case kCVPixelFormatType_32BGRA: layout = .bgra
+        case kCVPixelFormatType_32RGBA: layout = .rgba
+        default: throw PhasefrontError.setting(message: "a pixel buffer of 32BGRA or 32RGBA is needed")
+        }
+        let status = CVPixelBufferLockBaseAddress(buffer, [])
+        guard status == kCVReturnSuccess else {
+            throw PhasefrontError.setting(message: "the pixel buffer cannot be locked (CVReturn \(status))")
+        }
+        defer { CVPixelBufferUnlockBaseAddress(buffer, []) }
+        let rowStride = CVPixelBufferGetBytesPerRow(buffer)
+        let memory = UnsafeMutableRawBufferPointer(
+            start: CVPixelBufferGetBaseAddress(buffer), count: rowStride * CVPixelBufferGetHeight(buffer))
+        try body(layout, memory, rowStride)
     }
 #endif

@@ -40,10 +40,18 @@ public final class Hologram: Sendable {
         raw.zAt(x: x, y: y)
     }
 
-    /// Returns the displayed image for an eye focused at `zMm`: red, green, blue, alpha. It takes some milliseconds, so
-    /// do not call it on the main thread.
-    public func preview(zMm: Double, width: Int, height: Int) throws -> PixelImage {
-        try PixelImage(raw.preview(zMm: zMm, width: width, height: height))
+    /// Writes the displayed image for an eye focused at `zMm` into `memory`: `width` × `height` pixels in `layout`, RGB,
+    /// RGBA or BGRA, whose rows are `rowStride` bytes apart, by default without gaps. Allocates no image. It takes some
+    /// milliseconds, so do not call it on the main thread.
+    ///
+    /// - Throws: ``PhasefrontError/setting(message:)`` if the image is empty or does not fit, or if z is too far away.
+    public func writePreview(
+        zMm: Double, width: Int, height: Int, layout: ModulatorLayout = .rgba,
+        to memory: UnsafeMutableRawBufferPointer, rowStride: Int? = nil
+    ) throws {
+        let rowStride = rowStride ?? width * (layout == .rgb ? 3 : 4)
+        try raw.writePreview(
+            zMm: zMm, width: width, height: height, layout: layout, to: RawMemory(memory, rowStride: rowStride))
     }
 
     /// Returns the displayed image of the whole hologram for an eye focused at `zMm`, as amplitudes; 1 is white. It
@@ -63,10 +71,67 @@ public final class Hologram: Sendable {
         try Planes(raw.field(zMm: zMm))
     }
 
-    /// Returns image `index` of the images for the modulator's driver, at the modulator's resolution, with unchanged
-    /// levels. All layouts except grey have one image.
-    public func output(_ placement: Placement = Placement(layout: .rgba), image index: Int = 0) throws -> PixelImage {
-        try PixelImage(raw.output(placement: placement, image: index))
+    /// Returns the size of the images of `layout` for the modulator. All layouts except grey have one image.
+    public func outputSize(_ layout: ModulatorLayout) -> OutputSize { raw.outputSize(layout: layout) }
+
+    /// Writes image `index` of the images for the modulator's driver, with unchanged levels, into `memory`:
+    /// ``outputSize(_:)`` has its size. Its rows are `rowStride` bytes apart, by default without gaps. Allocates no image.
+    ///
+    /// - Throws: ``PhasefrontError/setting(message:)`` if the layout has no such image or the image does not fit.
+    public func writeOutput(
+        _ placement: Placement, image index: Int = 0, to memory: UnsafeMutableRawBufferPointer, rowStride: Int? = nil
+    ) throws {
+        let rowStride = rowStride ?? outputSize(placement.layout).rowBytes
+        try raw.writeOutput(placement: placement, image: index, to: RawMemory(memory, rowStride: rowStride))
+    }
+}
+
+/// A modulator: its display, the phases of its levels, and the images that its input takes. ``modulatorNames()`` lists
+/// those that the library knows.
+public final class Modulator: Sendable {
+    /// The target of holograms for the modulator.
+    public let target: HologramTarget
+    /// The size of the images that its input takes.
+    public let outputSize: OutputSize
+    private let raw: RawModulator
+
+    private init(_ raw: RawModulator) {
+        self.raw = raw
+        (target, outputSize) = (raw.target(), raw.outputSize())
+    }
+
+    /// Creates the modulator called `name`, for example "holoeye-pluto".
+    ///
+    /// - Throws: ``PhasefrontError/display(message:)`` for a name that ``modulatorNames()`` does not have.
+    public convenience init(named name: String) throws { try self.init(.named(name: name)) }
+
+    /// Reads the text of a modulator's file, with keys such as packing and levels_turns.
+    ///
+    /// - Throws: ``PhasefrontError/display(message:)`` if it is not such a text.
+    public convenience init(toml text: String) throws { try self.init(.fromToml(text: text)) }
+
+    /// Writes image `index` of the images that its input takes of `hologram` into `memory`, whose rows are `rowStride`
+    /// bytes apart, by default without gaps.
+    ///
+    /// - Throws: ``PhasefrontError/setting(message:)`` if the hologram does not fit the modulator or the image does not
+    ///   fit.
+    public func writeOutput(
+        _ hologram: Hologram, image index: Int = 0, to memory: UnsafeMutableRawBufferPointer, rowStride: Int? = nil
+    ) throws {
+        let memory = RawMemory(memory, rowStride: rowStride ?? outputSize.rowBytes)
+        try raw.writeOutput(hologram: hologram.raw, image: index, to: memory)
+    }
+}
+
+extension OutputSize {
+    /// The number of bytes of a row without gaps.
+    public var rowBytes: Int { width * pixelBytes }
+}
+
+extension RawMemory {
+    init(_ memory: UnsafeMutableRawBufferPointer, rowStride: Int) {
+        self.init(
+            address: UInt64(UInt(bitPattern: memory.baseAddress)), length: UInt64(memory.count), rowStride: rowStride)
     }
 }
 
@@ -97,30 +162,6 @@ public final class Planes: Sendable {
         return try withExtendedLifetime(self) {
             let first = UnsafePointer<Float>(bitPattern: UInt(address))
             return try body(UnsafeBufferPointer(start: first, count: numbers * width * height))
-        }
-    }
-}
-
-/// An image whose rows have no gaps.
-public final class PixelImage: Sendable {
-    /// The width in pixels.
-    public let width: Int
-    /// The height in pixels.
-    public let height: Int
-    /// The number of bytes per pixel.
-    public let pixelBytes: Int
-    let raw: RawImage
-
-    init(_ raw: RawImage) {
-        self.raw = raw
-        (width, height, pixelBytes) = (raw.width(), raw.height(), raw.pixelBytes())
-    }
-
-    /// Reads the image in place. The pointer is valid only in `body`.
-    public func withBytes<R>(_ body: (UnsafeRawBufferPointer) throws -> R) rethrows -> R {
-        let (address, count) = (raw.address(), raw.byteLen())
-        return try withExtendedLifetime(self) {
-            try body(UnsafeRawBufferPointer(start: UnsafeRawPointer(bitPattern: UInt(address)), count: Int(count)))
         }
     }
 }

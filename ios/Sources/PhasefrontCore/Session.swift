@@ -1,7 +1,7 @@
 import Foundation
 
 /// A session that turns frames into holograms. Every method may be called from any thread at any time.
-/// ``process(_:)``, ``warmUp()`` and ``close()`` wait for a frame, so do not call them on the main thread.
+/// `process`, ``warmUp()`` and ``close()`` wait for a frame, so do not call them on the main thread.
 ///
 /// ```swift
 /// let session = try HologramSession(SessionOptions(), mode: .image)
@@ -33,7 +33,11 @@ public final class HologramSession: Sendable {
         }
     }
 
-    deinit { close() }
+    deinit {
+        // Closing waits for the last events, which a thread that releases the session must not.
+        let raw = raw
+        DispatchQueue.global().async { raw.shutDown() }
+    }
 
     /// Returns the hologram of `frame`, in an image or a video session. Blocks until it is done.
     ///
@@ -44,6 +48,18 @@ public final class HologramSession: Sendable {
             raw.process(
                 lumaOrColour: frame.colourBytes(0), chroma: frame.colourBytes(1), chromaV: frame.colourBytes(2),
                 depth: frame.depth.plane.bytes, confidence: frame.confidenceBytes, info: frame.info))
+    }
+
+    /// Returns the hologram of `frame`, in an image or a video session, without blocking the caller's thread. The frame's
+    /// memory must stay valid until then.
+    ///
+    /// - Throws: ``PhasefrontError`` if the frame is unusable or late, or if the session is a live stream, paused or closed.
+    public func process(_ frame: CameraFrame) async throws -> Hologram {
+        try await withCheckedThrowingContinuation { continuation in
+            DispatchQueue.global(qos: .userInitiated).async {
+                continuation.resume(with: Result { try self.process(frame) })
+            }
+        }
     }
 
     /// Submits `frame` to a live stream, which copies it. Never waits for a frame to be processed. Returns the reason
@@ -97,6 +113,17 @@ extension SessionOptions {
     /// Creates the default options for `display` and `network`.
     public init(display: HologramDisplay = HologramDisplay(), network: HologramNetwork) throws {
         try self.init(display: display, method: .trained(network: network))
+    }
+
+    /// Returns options for a live session on a phone: the defaults for `display` with a target rate and three quality
+    /// levels, at the display's resolution and at three quarters and half of it along each side. The session changes the
+    /// level as the frame times and ``HologramSession/setThermal(_:)`` require.
+    ///
+    /// - Throws: ``PhasefrontError/display(message:)`` for an impossible display.
+    public static func phone(
+        display: HologramDisplay = HologramDisplay(), rateHz: Double = 30, method: HologramMethod? = nil
+    ) throws -> SessionOptions {
+        try phoneOptions(target: HologramTarget.ofDisplay(display: display), rateHz: rateHz, method: method)
     }
 
     /// Creates the default options for `target`, a calibrated display.

@@ -71,14 +71,22 @@ final class SessionTests: XCTestCase {
 
     func testAPreviewShowsThePictureAndATapGivesZ() throws {
         let hologram = try HologramSession(options(), mode: .image).process(still())
-        let image = try hologram.preview(zMm: 0, width: 32, height: 24)
-        image.withBytes { bytes in
-            XCTAssertEqual(bytes.count, 4 * 32 * 24)
-            XCTAssert(stride(from: 3, to: bytes.count, by: 4).allSatisfy { bytes[$0] == 255 })
-            XCTAssertGreaterThan(Set(bytes).count, 20)
+        var bytes = [UInt8](repeating: 7, count: 4 * 32 * 24)
+        try bytes.withUnsafeMutableBytes { try hologram.writePreview(zMm: 0, width: 32, height: 24, to: $0) }
+        XCTAssert(stride(from: 3, to: bytes.count, by: 4).allSatisfy { bytes[$0] == 255 })
+        XCTAssertGreaterThan(Set(bytes).count, 20)
+        // Blue first, with gaps between rows, which stay as they are.
+        var gaps = [UInt8](repeating: 7, count: 140 * 24)
+        try gaps.withUnsafeMutableBytes {
+            try hologram.writePreview(zMm: 0, width: 32, height: 24, layout: .bgra, to: $0, rowStride: 140)
         }
+        XCTAssertEqual([gaps[0], gaps[1], gaps[2], gaps[128]], [bytes[2], bytes[1], bytes[0], 7])
+        XCTAssertEqual(gaps[140 + 2], bytes[4 * 32])
         XCTAssertGreaterThan(hologram.z(atX: 0.5, y: 0.5), hologram.z(atX: 0.02, y: 0.02))
-        assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
+        let memory = UnsafeMutableRawBufferPointer.allocate(byteCount: 100, alignment: 1)
+        defer { memory.deallocate() }
+        assertRefused("0×24") { try hologram.writePreview(zMm: 0, width: 0, height: 24, to: memory) }
+        assertRefused("24 rows") { try hologram.writePreview(zMm: 0, width: 32, height: 24, to: memory) }
     }
 
     func testNoticesComeAlong() throws {
@@ -106,13 +114,38 @@ final class SessionTests: XCTestCase {
     func testOutputIsWhatTheModulatorTakes() throws {
         let hologram = try HologramSession(options(), mode: .image).process(still())
         let levels = [UInt8](try hologram.levels())
-        try hologram.output().withBytes { rgba in
-            XCTAssertEqual((0..<64 * 48).map { rgba[4 * $0] }, Array(levels[..<(64 * 48)]))
+        XCTAssertEqual(hologram.outputSize(.rgba), OutputSize(width: 64, height: 48, pixelBytes: 4, images: 1))
+        var bytes = [UInt8](repeating: 0, count: 4 * 64 * 48)
+        try bytes.withUnsafeMutableBytes { try hologram.writeOutput(Placement(layout: .rgba), to: $0) }
+        XCTAssertEqual((0..<64 * 48).map { bytes[4 * $0] }, Array(levels[..<(64 * 48)]))
+        try bytes.withUnsafeMutableBytes { memory in
+            try hologram.writeOutput(Placement(layout: .grey, flipX: true), image: 2, to: memory)
+            XCTAssertEqual(memory[0], levels[2 * 64 * 48 + 63])
+            try hologram.writeOutput(Placement(layout: .grey16), to: memory)
+            XCTAssertEqual([memory[0], memory[1]], [0, levels[0]])
+            assertRefused("no image 1") { try hologram.writeOutput(Placement(layout: .rgba), image: 1, to: memory) }
+            assertRefused("48 rows") {
+                try hologram.writeOutput(Placement(layout: .rgba), to: .init(rebasing: memory[..<8]))
+            }
         }
-        let blue = try hologram.output(Placement(layout: .grey, flipX: true), image: 2)
-        XCTAssertEqual(blue.pixelBytes, 1)
-        XCTAssertEqual(blue.withBytes { $0[0] }, levels[2 * 64 * 48 + 63])
-        assertRefused("no image 1") { try hologram.output(image: 1) }
+    }
+
+    func testAModulatorIsTakenByItsName() throws {
+        XCTAssert(modulatorNames().contains("ti-plm-p47"))
+        assertRefused("holoeye-pluto") { try Modulator(named: "pluto") }
+        let modulator = try Modulator(toml: "width = 64\nheight = 48\npacking = \"grey\"\nflip_x = true")
+        XCTAssertEqual(modulator.outputSize, OutputSize(width: 64, height: 48, pixelBytes: 1, images: 3))
+        let options = try SessionOptions(target: modulator.target, network: network.get())
+        let hologram = try HologramSession(options, mode: .image).process(still())
+        let levels = [UInt8](try hologram.levels())
+        var green = [UInt8](repeating: 0, count: 64 * 48)
+        try green.withUnsafeMutableBytes { memory in
+            try modulator.writeOutput(hologram, image: 1, to: memory)
+            assertRefused("no image 3") { try modulator.writeOutput(hologram, image: 3, to: memory) }
+            let other = try Modulator(named: "ti-plm-p47")
+            assertRefused("lasers") { try other.writeOutput(hologram, to: memory) }
+        }
+        XCTAssertEqual(green[0], levels[64 * 48 + 63])
     }
 
     func testALiveStreamAnswersEveryFrameOnItsOwnThread() throws {
@@ -216,6 +249,35 @@ final class SessionTests: XCTestCase {
             if (try? session.process(still()).levels()) != want { wrong.withLock { $0 += 1 } }
         }
         XCTAssertEqual(wrong.withLock { $0 }, 0)
+    }
+
+    func testProcessCanBeAwaited() async throws {
+        let session = try HologramSession(options(), mode: .image)
+        let (one, other) = try await (session.process(still()), session.process(still()))
+        XCTAssertEqual(try one.levels(), try other.levels())
+        session.close()
+        do {
+            _ = try await session.process(still())
+            XCTFail("a closed session")
+        } catch let error as PhasefrontError { XCTAssert(error.message.contains("closed"), error.message) }
+    }
+
+    func testHeatMovesThePhonesQualityLevel() async throws {
+        let session = try HologramSession(SessionOptions.phone(display: smallDisplay), mode: .live)
+        try session.setThermal(.critical)
+        try session.submit(still(timestampNs: 1))
+        var (change, sizes): (QualityChange?, [Int]) = (nil, [])
+        for await event in session.events {
+            switch event {
+            case .processed(let hologram):
+                sizes.append(hologram.info.width)
+                if sizes.count == 1 { try session.submit(still(timestampNs: 40_000_000)) } else { session.close() }
+            case .qualityChanged(_, let to): change = to
+            default: XCTFail("\(event)")
+            }
+        }
+        XCTAssertEqual(change, QualityChange(fromQualityLevel: 0, toQualityLevel: 2, reason: .thermal))
+        XCTAssertEqual(sizes, [64, 32])
     }
 
     func testAClosedSessionSaysSo() throws {

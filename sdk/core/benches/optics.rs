@@ -65,7 +65,7 @@ fn pack_24_maps(bencher: Bencher<'_, '_>, threads: usize) {
     let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
     let mut frame = vec![0; plan.frame_bytes()];
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let run = || pool.install(|| plan.pack(&maps, &mut frame).unwrap());
+    let run = || pool.install(|| plan.pack(&maps, &mut frame, 6 * SIZE.1).unwrap());
     bencher.counter(pixels(24)).bench_local(run);
 }
 

@@ -8,10 +8,12 @@
 //! away from the pixels that the table assumes.
 
 mod cells;
+mod input;
 pub mod modulator;
 mod split;
 
 pub use cells::{BitPlanes, Cells};
+pub use input::{ModulatorInput, OutputSize};
 pub use split::Split;
 
 use crate::display::levels::Levels;
@@ -19,6 +21,7 @@ use crate::display::response::Response;
 use crate::display::response::per_pixel::PerPixel;
 use crate::display::target::Target;
 use crate::runtime::error::{Error, Result};
+use rayon::prelude::*;
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 
@@ -74,8 +77,13 @@ impl Layout {
         }
     }
 
+    /// Returns whether one image has all colours, with one byte for each.
+    pub(crate) fn is_byte_for_each_colour(self) -> bool {
+        self.images(3) == 1 && self.place_bits() == 8
+    }
+
     /// Writes a pixel of image `image` from the `level` of each colour. Levels are as wide as their place.
-    fn write_pixel(self, image: usize, level: impl Fn(usize) -> u16, pixel: &mut [u8]) {
+    pub(crate) fn write_pixel(self, image: usize, level: impl Fn(usize) -> u16, pixel: &mut [u8]) {
         let byte = |colour| level(colour) as u8;
         match self {
             Layout::Rgb => pixel.copy_from_slice(&[byte(0), byte(1), byte(2)]),
@@ -202,9 +210,14 @@ impl Output {
         })
     }
 
-    /// Returns the number of bytes of an image.
+    /// Returns the number of bytes of an image without gaps between rows.
     pub fn image_bytes(&self) -> usize {
-        self.modulator.0 * self.modulator.1 * self.placement.layout.pixel_bytes()
+        self.modulator.0 * self.row_bytes()
+    }
+
+    /// Returns the number of bytes of a row of an image.
+    pub fn row_bytes(&self) -> usize {
+        self.modulator.1 * self.placement.layout.pixel_bytes()
     }
 
     /// Returns the shape (H, W) of an image.
@@ -212,15 +225,15 @@ impl Output {
         self.modulator
     }
 
-    /// Writes image `image` of a hologram of `levels`, (C, H, W), into `bytes`, with no gaps between rows. Allocates
-    /// nothing.
+    /// Writes image `image` of a hologram of `levels`, (C, H, W), into `bytes`, whose rows begin `row_stride` bytes
+    /// apart. Bytes between rows stay as they are. Allocates nothing.
     ///
     /// # Errors
-    /// Returns an error if the layout does not have this image.
+    /// Returns an error if the layout does not have this image or `bytes` cannot hold it.
     ///
     /// # Panics
-    /// Panics if `levels` or `bytes` does not have the planned length.
-    pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8]) -> Result<()> {
+    /// Panics if `levels` does not have the planned length.
+    pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8], row_stride: usize) -> Result<()> {
         let size = self.colours * self.hologram.0 * self.hologram.1;
         let (byte_bits, word_bits) = self.bits;
         match levels {
@@ -235,14 +248,14 @@ impl Output {
                         table.level(DARK[odd], at).into()
                     }
                 };
-                self.write_levels(level, byte_bits, dark, image, bytes)
+                self.write_levels((level, byte_bits), dark, image, (bytes, row_stride))
             }
             Levels::Words(levels) => {
                 assert_eq!(levels.len(), size);
                 // The levels of π/2 and 3π/2.
                 let quarter = (1u16 << word_bits) / 4;
                 let dark = |odd: usize, _: usize, _: (usize, usize)| quarter * [1, 3][odd];
-                self.write_levels(|at| levels[at], word_bits, dark, image, bytes)
+                self.write_levels((|at| levels[at], word_bits), dark, image, (bytes, row_stride))
             }
         }
     }
@@ -301,16 +314,14 @@ impl Output {
 
     fn write_levels(
         &self,
-        level: impl Fn(usize) -> u16,
-        bits: u32,
-        dark: impl Fn(usize, usize, (usize, usize)) -> u16,
+        (level, bits): (impl Fn(usize) -> u16 + Sync, u32),
+        dark: impl Fn(usize, usize, (usize, usize)) -> u16 + Sync,
         image: usize,
-        bytes: &mut [u8],
+        (bytes, row_stride): (&mut [u8], usize),
     ) -> Result<()> {
         let layout = self.placement.layout;
         let (height, width) = self.hologram;
         let (out_height, out_width) = self.modulator;
-        assert_eq!(bytes.len(), self.image_bytes());
         self.check_image(image)?;
         let place = layout.place_bits();
         let placed = |level: u16| {
@@ -321,7 +332,8 @@ impl Output {
             }
         };
         let pixel_bytes = layout.pixel_bytes();
-        for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
+        let rows = rows(bytes, row_stride, (out_height, self.row_bytes()))?;
+        rows.enumerate().for_each(|(y, row)| {
             let modulator_y = flip(y, out_height, self.placement.flip_y);
             let y = self.from.0 + modulator_y as i64;
             for (x, pixel) in row.chunks_exact_mut(pixel_bytes).enumerate() {
@@ -338,9 +350,41 @@ impl Output {
                 };
                 layout.write_pixel(image, level, pixel);
             }
-        }
+        });
         Ok(())
     }
+}
+
+/// Returns the number of bytes from the first to the last of an image of `height` rows of `row_bytes` bytes that begin
+/// `row_stride` bytes apart.
+///
+/// # Errors
+/// Returns an error if rows overlap or `len` bytes cannot hold them.
+fn check_rows(len: usize, row_stride: usize, (height, row_bytes): (usize, usize)) -> Result<usize> {
+    let needed = row_stride.saturating_mul(height - 1).saturating_add(row_bytes);
+    if row_stride < row_bytes || len < needed {
+        return Err(Error::Setting(format!(
+            "{len} bytes with rows {row_stride} bytes apart cannot hold {height} rows of {row_bytes} bytes: they must be \
+             {row_bytes} bytes apart or more, and have {} bytes at least",
+            row_bytes * height
+        )));
+    }
+    Ok(needed)
+}
+
+/// Returns the rows of such an image in `bytes`.
+///
+/// # Errors
+/// Returns an error if rows overlap or `bytes` cannot hold them.
+pub(crate) fn rows(
+    bytes: &mut [u8],
+    row_stride: usize,
+    shape: (usize, usize),
+) -> Result<impl IndexedParallelIterator<Item = &mut [u8]>> {
+    let len = check_rows(bytes.len(), row_stride, shape)?;
+    Ok(bytes[..len]
+        .par_chunks_mut(row_stride)
+        .map(move |row| &mut row[..shape.1]))
 }
 
 /// Returns position `at` of `n`, counted from the other end if `flipped`.
@@ -371,7 +415,9 @@ mod tests {
 
     fn image(output: &Output, levels: &[u8], image: usize) -> Vec<u8> {
         let mut bytes = vec![7; output.image_bytes()];
-        output.write(Levels::Bytes(levels), image, &mut bytes).unwrap();
+        output
+            .write(Levels::Bytes(levels), image, &mut bytes, output.row_bytes())
+            .unwrap();
         bytes
     }
 
@@ -393,7 +439,8 @@ mod tests {
                     .write(
                         Levels::Bytes(&levels),
                         layout.images(3),
-                        &mut vec![0; output.image_bytes()]
+                        &mut vec![0; output.image_bytes()],
+                        output.row_bytes()
                     )
                     .is_err()
             );
@@ -440,6 +487,28 @@ mod tests {
     }
 
     #[test]
+    fn rows_with_gaps_have_the_same_pixels_and_keep_their_gaps() {
+        let levels = levels(2, 3);
+        for layout in [Layout::Rgb, Layout::Bgra, Layout::Grey16] {
+            let output = Output::new(&target(5, 4, 8), (2, 3), Placement::centred(layout)).unwrap();
+            let (plain, row) = (image(&output, &levels, 0), output.row_bytes());
+            let stride = row + 7;
+            let mut gaps = vec![7; 3 * stride + row];
+            output.write(Levels::Bytes(&levels), 0, &mut gaps, stride).unwrap();
+            for (wide, plain) in gaps.chunks(stride).zip(plain.chunks(row)) {
+                assert_eq!(wide[..row], *plain);
+                assert!(wide[row..].iter().all(|byte| *byte == 7));
+            }
+            for (len, stride) in [(plain.len() - 1, row), (1000, row - 1), (1000, usize::MAX)] {
+                let refused = output
+                    .write(Levels::Bytes(&levels), 0, &mut vec![0; len], stride)
+                    .unwrap_err();
+                assert!(refused.to_string().contains("4 rows"), "{refused}");
+            }
+        }
+    }
+
+    #[test]
     fn few_bits_stand_in_the_upper_ones() {
         for bits in 1..=8 {
             let placement = Placement::centred(Layout::Grey);
@@ -478,7 +547,7 @@ mod tests {
                 } else {
                     Levels::Bytes(&bytes)
                 };
-                output.write(levels, image, &mut pixels).unwrap();
+                output.write(levels, image, &mut pixels, output.row_bytes()).unwrap();
                 output.read(&pixels, image, &mut read).unwrap();
             }
             assert_eq!(read, words, "{layout:?}");
@@ -502,12 +571,16 @@ mod tests {
         ] {
             let output = Output::new(&target, (1, 2), Placement::centred(layout)).unwrap();
             let mut bytes = vec![0; output.image_bytes()];
-            output.write(Levels::Words(&words), 0, &mut bytes).unwrap();
+            output
+                .write(Levels::Words(&words), 0, &mut bytes, output.row_bytes())
+                .unwrap();
             assert_eq!(bytes[..expected.len()], expected, "{layout:?}");
         }
         let around = Output::new(&target, (1, 1), Placement::centred(Layout::Grey16)).unwrap();
         let mut bytes = vec![0; around.image_bytes()];
-        around.write(Levels::Words(&[1, 2, 3]), 1, &mut bytes).unwrap();
+        around
+            .write(Levels::Words(&[1, 2, 3]), 1, &mut bytes, around.row_bytes())
+            .unwrap();
         assert_eq!(bytes[..4], [0x80, 0, 0, 0xc0]);
     }
 }

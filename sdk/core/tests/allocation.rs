@@ -14,7 +14,7 @@ use num_complex::Complex32;
 use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
-use phasefront_core::display::levels::LevelsMut;
+use phasefront_core::display::levels::{Levels, LevelsMut};
 use phasefront_core::display::panel::Flatness;
 use phasefront_core::display::panel::Panel;
 use phasefront_core::display::registration::Registration;
@@ -33,6 +33,7 @@ use phasefront_core::method::sweep::Sweep;
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_core::optics::zernike::Aberration;
+use phasefront_core::output::{Layout, Output, Placement};
 use phasefront_core::pipeline::Pipeline;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::view::preview::Preview;
@@ -74,7 +75,18 @@ fn camera_frames_and_previews() {
     let plan = Preview::new((h, w), &Target::default(), 2e-3, (20, 20)).unwrap();
     let mut scratch = plan.scratch();
     let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
-    assert_eq!(count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)), 0);
+    let look = || {
+        plan.look(&levels, 1.0, (Layout::Rgba, &mut rgba, 80), &mut scratch)
+            .unwrap()
+    };
+    assert_eq!(count(look), 0);
+    let plan = Output::new(&Target::default(), (h, w), Placement::centred(Layout::Bgra)).unwrap();
+    let mut image = vec![0; plan.image_bytes()];
+    let write = || {
+        plan.write(Levels::Bytes(&levels), 0, &mut image, plan.row_bytes())
+            .unwrap()
+    };
+    assert_eq!(count(write), 0);
 }
 
 /// Returns a target with all possible results of calibration and bench measurements.

@@ -8,11 +8,12 @@ use num_complex::Complex32;
 use phasefront_core::display::levels::{Levels, LevelsMut};
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
+use phasefront_core::output::Layout;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::pipeline::{FrameTimes, field};
 use phasefront_core::runtime::error::{Error, Result};
 use phasefront_core::runtime::stage::stage;
-use phasefront_core::view::preview::{Preview, PreviewScratch, check_screen};
+use phasefront_core::view::preview::{Preview, PreviewScratch};
 use phasefront_core::view::refocus::seen_field;
 use std::sync::{Arc, Mutex, Weak};
 
@@ -278,43 +279,47 @@ impl Hologram {
         self.viewer.target.display.z_of_depth(f64::from(d) / 65535.0)
     }
 
-    /// Returns the number of bytes of the image that [`Self::preview`] fills.
+    /// Runs `call` on the session's threads.
     ///
     /// # Errors
-    /// Returns an error if the preview has over 2²⁶ pixels or a side over 2¹⁴.
-    pub fn preview_bytes(height: usize, width: usize) -> Result<usize> {
-        check_screen((height, width))?;
-        Ok(4 * height * width)
+    /// Returns an error in a process that was forked from the session's, or if a log handler makes the call while a
+    /// session computes.
+    #[doc(hidden)]
+    pub fn on_threads<R: Send>(&self, call: impl FnOnce() -> Result<R> + Send) -> Result<R> {
+        self.viewer.process.check()?;
+        computing::check()?;
+        let _computing = Computing::begin();
+        self.viewer.pool.install(call)
     }
 
-    /// Fills `rgba` with the view of an eye focused at `z_m`: `height` rows of `width` pixels of red, green, blue and
-    /// alpha 255. The plan is kept for the next call with the same z and size, on this or another result of the
-    /// session.
+    /// Writes the view of an eye focused at `z_m` into `bytes`, an image of `screen` = (H, W) pixels in `layout`, Rgb,
+    /// Rgba or Bgra, whose rows begin `row_stride` bytes apart. The plan is kept for the next call with the same z and
+    /// size, on this or another result of the session.
     ///
     /// # Errors
-    /// Returns an error if the image is empty, has over 2²⁶ pixels or a side over 2¹⁴, if the length of `rgba` is not
-    /// 4·height·width, if z is too far away, in a process that was forked from the session's, or if a log handler makes
+    /// Returns an error if the image is empty, has over 2²⁶ pixels or a side over 2¹⁴, has another layout or does not
+    /// fit `bytes`, if z is too far away, in a process that was forked from the session's, or if a log handler makes
     /// the call while a session computes.
-    pub fn preview(&self, z_m: f64, height: usize, width: usize, rgba: &mut [u8]) -> Result<()> {
-        if rgba.len() != Self::preview_bytes(height, width)? {
-            return Err(Error::Setting(format!(
-                "a preview of {width}×{height} needs 4 bytes a pixel; the image has {}",
-                rgba.len()
-            )));
-        }
+    pub fn write_preview(
+        &self,
+        z_m: f64,
+        screen: (usize, usize),
+        layout: Layout,
+        bytes: &mut [u8],
+        row_stride: usize,
+    ) -> Result<()> {
         self.viewer.process.check()?;
         computing::check()?;
         let _computing = Computing::begin();
         // Lock the plan before entering the pool, whose threads could otherwise start another view while this one
         // waits.
         let mut plan = lock(&self.viewer.plan);
-        let fits = |plan: &&mut ViewPlan| {
-            plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == (height, width)
-        };
+        let fits =
+            |plan: &&mut ViewPlan| plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == screen;
         if plan.as_mut().filter(fits).is_none() {
             let target = &self.viewer.target;
             *plan = Some(self.viewer.pool.install(|| -> Result<_> {
-                let preview = Preview::new(self.shape, target, z_m, (height, width))?;
+                let preview = Preview::new(self.shape, target, z_m, screen)?;
                 Ok(ViewPlan {
                     shape: self.shape,
                     z_m,
@@ -323,14 +328,13 @@ impl Hologram {
                 })
             })?);
         }
-        if let Some(ViewPlan { preview, scratch, .. }) = &mut *plan {
-            let look = || {
-                let _stage = stage!("preview");
-                preview.look(self.levels(), self.scale, rgba, scratch);
-            };
-            self.viewer.pool.install(look);
-        }
-        Ok(())
+        let Some(ViewPlan { preview, scratch, .. }) = &mut *plan else {
+            return Ok(());
+        };
+        self.viewer.pool.install(|| {
+            let _stage = stage!("preview");
+            preview.look(self.levels(), self.scale, (layout, bytes, row_stride), scratch)
+        })
     }
 
     /// Returns the field that the levels produce behind the aperture, through the optics, at `z_m`, (C, H, W); z = 0 is

@@ -71,7 +71,8 @@ fn ten_bits_have_words_and_go_to_the_modulator() {
     );
     let plan = Output::new(&target, (H, W), Placement::centred(Layout::Grey16)).unwrap();
     let mut frame = vec![0; plan.image_bytes()];
-    plan.write(hologram.output_levels(), 0, &mut frame).unwrap();
+    plan.write(hologram.output_levels(), 0, &mut frame, plan.row_bytes())
+        .unwrap();
     let mut back = vec![0; words.len()];
     plan.read(&frame, 0, &mut back).unwrap();
     assert_eq!(back, words);

@@ -6,6 +6,7 @@ use crate::on_gpu;
 use camera::{Scene, colour_formats, depth, frame, options};
 use on_gpu::on_gpu;
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
+use phasefront::output::Layout;
 use phasefront::session::{Backend, DropReason, Event, Quality};
 use phasefront::target::Response;
 use phasefront::{
@@ -63,8 +64,10 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
         assert_eq!(made.z_at(0.3, 0.4), expected.z_at(0.3, 0.4));
         let z_m = made.z_at(0.3, 0.4);
         let (mut a, mut b) = (vec![0; 4 * 24 * 32], vec![0; 4 * 24 * 32]);
-        made.preview(z_m, 24, 32, &mut a).unwrap();
-        expected.preview(z_m, 24, 32, &mut b).unwrap();
+        made.write_preview(z_m, (24, 32), Layout::Rgba, &mut a, 128).unwrap();
+        expected
+            .write_preview(z_m, (24, 32), Layout::Rgba, &mut b, 128)
+            .unwrap();
         assert!(a.iter().zip(&b).all(|(a, b)| a.abs_diff(*b) <= 2));
         let (there, here) = (gpu.statistics(), cpu.statistics());
         let device = gpu.gpu().unwrap();

@@ -272,7 +272,8 @@ fn views_and_images_of_one_laser_are_those_of_its_colour() {
         let preview = |target: &Target, levels: &[u8]| {
             let plan = Preview::new((H, W), target, 1e-3, (20, 30)).unwrap();
             let mut rgba = vec![0; 4 * 20 * 30];
-            plan.look(levels, 1.1, &mut rgba, &mut plan.scratch());
+            let image = (Layout::Rgba, &mut rgba[..], 120);
+            plan.look(levels, 1.1, image, &mut plan.scratch()).unwrap();
             rgba
         };
         let pixels = preview(&one, &levels);
@@ -292,7 +293,8 @@ fn images(one: &Target, three: &Target) {
         let image = |target: &Target, levels: &[u8]| {
             let plan = Output::new(target, shape, Placement::centred(layout)).unwrap();
             let mut bytes = vec![0; plan.image_bytes()];
-            plan.write(Levels::Bytes(levels), 0, &mut bytes).unwrap();
+            plan.write(Levels::Bytes(levels), 0, &mut bytes, plan.row_bytes())
+                .unwrap();
             let mut read = vec![0; levels.len()];
             plan.read(&bytes, 0, &mut read).unwrap();
             (bytes, read)
@@ -305,7 +307,7 @@ fn images(one: &Target, three: &Target) {
         }
         assert_eq!(layout.images(1), 1);
         let plan = Output::new(one, shape, Placement::centred(layout)).unwrap();
-        let refused = plan.write(Levels::Bytes(&levels[..h * w]), 1, &mut bytes.clone());
+        let refused = plan.write(Levels::Bytes(&levels[..h * w]), 1, &mut bytes.clone(), plan.row_bytes());
         assert!(refused.unwrap_err().to_string().contains("no image 1"));
     }
 }
@@ -342,7 +344,9 @@ fn a_session_shows_a_pictures_luminance() {
         let other = alone.levels().iter().zip(red).filter(far).count();
         assert!(other * 100 < SIZE, "{other} of {SIZE}");
         let mut rgba = vec![0; 4 * 20 * 30];
-        alone.preview(1e-3, 20, 30, &mut rgba).unwrap();
+        alone
+            .write_preview(1e-3, (20, 30), Layout::Rgba, &mut rgba, 120)
+            .unwrap();
         let is_grey = |p: &[u8]| p[0] == p[1] && p[1] == p[2] && p[3] == 255;
         assert!(rgba.chunks_exact(4).all(is_grey) && rgba.iter().any(|value| (30..200).contains(value)));
     }

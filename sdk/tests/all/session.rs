@@ -48,12 +48,24 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     assert_eq!(hologram.z_at(-3.0, f64::NAN), hologram.z_at(0.0, 0.0));
     // The square is bright and yellow in the preview; the wall is not.
     let mut rgba = vec![0; 4 * 24 * 32];
-    hologram.preview(hologram.z_at(0.3, 0.4), 24, 32, &mut rgba).unwrap();
+    hologram
+        .write_preview(hologram.z_at(0.3, 0.4), (24, 32), Layout::Rgba, &mut rgba, 128)
+        .unwrap();
     let pixel = |x: usize, y: usize| &rgba[4 * (y * 32 + x)..][..4];
     let (square, wall) = (pixel(9, 9), pixel(25, 20));
     assert!(square[0] > 150 && square[2] < 130 && square[3] == 255, "{square:?}");
     assert!(wall[0] < 100, "{wall:?}");
-    assert!(hologram.preview(0.0, 24, 32, &mut rgba[1..]).is_err());
+    for (layout, row_stride, len) in [
+        (Layout::Rgba, 128, 3071),
+        (Layout::Rgba, 127, 3072),
+        (Layout::Grey16, 128, 3072),
+    ] {
+        assert!(
+            hologram
+                .write_preview(0.0, (24, 32), layout, &mut rgba[..len], row_stride)
+                .is_err()
+        );
+    }
     let statistics = session.statistics();
     assert_eq!((statistics.submitted, statistics.processed), (1, 1));
     assert!(!statistics.backend.name.is_empty() && !statistics.backend.why.is_empty());
@@ -144,7 +156,10 @@ fn a_display_of_ten_bits_gets_words() {
     }
     let output = Output::new(&target, (H, W), Placement::centred(Layout::Grey16));
     let mut bytes = vec![0; 2 * W * H];
-    output.unwrap().write(ten.output_levels(), 1, &mut bytes).unwrap();
+    output
+        .unwrap()
+        .write(ten.output_levels(), 1, &mut bytes, 2 * W)
+        .unwrap();
     assert_eq!(u16::from_le_bytes([bytes[0], bytes[1]]), words[W * H] << 6);
     options.target.response = Response::lut([0; 256]);
     assert!(ImageSession::new(options).is_err());
@@ -643,7 +658,10 @@ fn a_preview_beyond_any_screen_is_refused_before_it_is_planned() {
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let hologram = image_session().process(&frame(1, &scene, &metres)).unwrap();
     let mut rgba = vec![0; 4 << 15];
-    let refused = hologram.preview(0.0, 1, 1 << 15, &mut rgba).unwrap_err().to_string();
+    let refused = hologram
+        .write_preview(0.0, (1, 1 << 15), Layout::Rgba, &mut rgba, 1 << 17)
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("16384 pixels a side"), "{refused}");
 }
 

@@ -14,6 +14,7 @@ public sealed class HologramView : MonoBehaviour, ISessionListener
     private readonly ConcurrentQueue<Hologram> made = new ConcurrentQueue<Hologram>();
     private HologramSession session;
     private Texture2D texture;
+    private byte[] levels;
 
     private void OnEnable()
     {
@@ -22,6 +23,7 @@ public sealed class HologramView : MonoBehaviour, ISessionListener
             session = HologramSession.Open(options, RunningMode.Live, this);
         texture = new Texture2D(width, height, TextureFormat.RGBA32, false, true);
         modulator.texture = texture;
+        levels = new byte[4 * width * height];
     }
 
     private void OnDisable()
@@ -39,7 +41,8 @@ public sealed class HologramView : MonoBehaviour, ISessionListener
             using (hologram)
             {
                 // The first row of a Unity texture is the lowest.
-                texture.LoadRawTextureData(hologram.Output(ModulatorLayout.Rgba, flipY: true).Bytes);
+                hologram.WriteOutput(ModulatorLayout.Rgba, new ImageMemory(levels, 4 * width), flipY: true);
+                texture.LoadRawTextureData(levels);
                 texture.Apply();
             }
     }

@@ -1,4 +1,4 @@
-import { PhasefrontError, guard, release, whole } from "./error.js";
+import { PhasefrontError, bytesOf, guard, release, whole } from "./error.js";
 import type { RawHologram } from "./raw/phasefront_web.js";
 
 /** The time of each stage of a frame. */
@@ -33,10 +33,16 @@ export interface HologramInfo {
   readonly times: FrameTimes;
 }
 
+/**
+ * The layout of colours in images: bytes red, green, blue; with alpha 255; 32-bit words with 10 bits of each colour; or
+ * one image per colour with bytes or 16-bit words. Words are little-endian.
+ */
+export type Layout = "rgb" | "rgba" | "bgra" | "rgb10" | "grey" | "grey16";
+
 /** The placement of a hologram on its modulator. */
 export interface Placement {
-  /** The layout of colours in images; `grey` has one image per colour with one byte per pixel. `rgb` by default. */
-  readonly layout?: "rgb" | "rgba" | "bgra" | "grey";
+  /** The layout; `rgb` by default. */
+  readonly layout?: Layout;
   readonly flipX?: boolean;
   readonly flipY?: boolean;
   /** The offset to the right of the centre in pixels, before flips. */
@@ -45,12 +51,33 @@ export interface Placement {
   readonly shiftY?: number;
 }
 
-/** An image for the modulator's driver, at the modulator's resolution. */
-export interface OutputImage {
+/** The images that a modulator's input takes. */
+export interface OutputSize {
   readonly width: number;
   readonly height: number;
+  /** The bytes of a pixel. */
   readonly pixelBytes: number;
-  readonly data: Uint8Array;
+  /** The number of images: one, or one for each colour. */
+  readonly images: number;
+}
+
+/** A view's pixels, for example an `ImageData` that is used again for each frame. */
+export interface PreviewImage {
+  readonly width: number;
+  readonly height: number;
+  readonly data: Uint8Array | Uint8ClampedArray;
+  /** The layout; `rgba` by default. */
+  readonly layout?: "rgb" | "rgba" | "bgra";
+  /** Bytes from one row to the next. By default rows have no gaps. */
+  readonly rowStride?: number;
+}
+
+/** The choice of an image of several, and its rows. */
+export interface OutputOptions {
+  /** The index of the image; 0 by default. */
+  readonly image?: number;
+  /** Bytes from one row to the next. By default rows have no gaps. */
+  readonly rowStride?: number;
 }
 
 /** The hologram of one frame. It uses the module's memory until it is closed or garbage-collected. */
@@ -71,7 +98,7 @@ export class Hologram {
 
   /** Returns a copy of the modulator levels, (C, H, W): red, green and blue, or those of the only laser. */
   get levels(): Uint8Array {
-    return this.#call((raw) => raw.levels());
+    return this.call((raw) => raw.levels());
   }
 
   /**
@@ -79,18 +106,20 @@ export class Hologram {
    * to 1 from the upper left corner.
    */
   zAt(x: number, y: number): number {
-    return this.#call((raw) => raw.zAt(x, y));
+    return this.call((raw) => raw.zAt(x, y));
   }
 
   /**
-   * Returns the view of an eye focused at `zMm`: rows of red, green, blue and alpha, as `new ImageData(pixels, width)`
-   * takes them.
+   * Writes the view of an eye focused at `zMm` into the pixels of `image`, for example of an `ImageData`.
    *
-   * @throws PhasefrontError `setting`: the image is empty or too large, or z is too far away.
+   * @throws PhasefrontError `setting`: the image is empty or too small, or z is too far away.
    */
-  preview(zMm: number, width: number, height: number): Uint8ClampedArray<ArrayBuffer> {
-    const [w, h] = [whole("the width of a preview", width), whole("the height of a preview", height)];
-    return this.#call((raw) => raw.preview(zMm, w, h)) as Uint8ClampedArray<ArrayBuffer>;
+  writePreview(zMm: number, image: PreviewImage): void {
+    const [w, h] = [whole("the width of a preview", image.width), whole("the height of a preview", image.height)];
+    const { layout = "rgba" } = image;
+    const stride = whole("the row stride", image.rowStride ?? w * (layout === "rgb" ? 3 : 4));
+    const bytes = bytesOf("the image", image.data, "setting");
+    this.call((raw) => raw.writePreview(zMm, w, h, layout, bytes, stride));
   }
 
   /**
@@ -99,7 +128,7 @@ export class Hologram {
    * @throws PhasefrontError `setting`: z is too far away.
    */
   refocus(zMm: number): Float32Array {
-    return this.#call((raw) => raw.refocus(zMm));
+    return this.call((raw) => raw.refocus(zMm));
   }
 
   /**
@@ -109,19 +138,32 @@ export class Hologram {
    * @throws PhasefrontError `setting`: z is too far away.
    */
   field(zMm = 0): Float32Array {
-    return this.#call((raw) => raw.field(zMm));
+    return this.call((raw) => raw.field(zMm));
   }
 
   /**
-   * Returns the image with index `image` for the modulator's driver. All layouts except `grey` have one image.
+   * Returns the size of the images of `layout` for the modulator. All layouts except `grey` and `grey16` have one.
    *
-   * @throws PhasefrontError `setting`: the layout is unknown or does not have the image.
+   * @throws PhasefrontError `setting`: the layout is unknown.
    */
-  output(placement: Placement = {}, image = 0): OutputImage {
+  outputSize(layout: Layout): OutputSize {
+    return this.call((raw) => raw.outputSize(layout)) as OutputSize;
+  }
+
+  /**
+   * Writes one of the images for the modulator's driver into `to`, for example the data of an `ImageData` with the layout
+   * `rgba`.
+   *
+   * @throws PhasefrontError `setting`: the layout is unknown or does not have the image, or the image does not fit.
+   */
+  writeOutput(placement: Placement, to: Uint8Array | Uint8ClampedArray, options: OutputOptions = {}): void {
     const { layout = "rgb", flipX = false, flipY = false, shiftX = 0, shiftY = 0 } = placement;
+    const size = this.outputSize(layout);
     const flips = Uint8Array.of(Number(flipX), Number(flipY));
-    const index = whole("the image", image);
-    return this.#call((raw) => raw.output(layout, flips, Int32Array.of(shiftX, shiftY), index)) as OutputImage;
+    const index = whole("the image", options.image ?? 0);
+    const stride = whole("the row stride", options.rowStride ?? size.width * size.pixelBytes);
+    const bytes = bytesOf("the image", to, "setting");
+    this.call((raw) => raw.writeOutput(layout, flips, Int32Array.of(shiftX, shiftY), index, bytes, stride));
   }
 
   /** Frees the memory now. Closing twice does nothing. */
@@ -130,7 +172,8 @@ export class Hologram {
     this.#raw = undefined;
   }
 
-  #call<T>(call: (raw: RawHologram) => T): T {
+  /** @internal */
+  call<T>(call: (raw: RawHologram) => T): T {
     const raw = this.#raw;
     if (!raw) throw new PhasefrontError("session", "the hologram is closed; take what is needed of it before");
     return guard(() => call(raw));

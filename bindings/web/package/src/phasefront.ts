@@ -34,7 +34,17 @@ export {
   type PlanarColour,
   type Plane,
 } from "./frame.js";
-export { Hologram, type FrameTimes, type HologramInfo, type OutputImage, type Placement } from "./hologram.js";
+export {
+  Hologram,
+  type FrameTimes,
+  type HologramInfo,
+  type Layout,
+  type OutputOptions,
+  type OutputSize,
+  type Placement,
+  type PreviewImage,
+} from "./hologram.js";
+export { Modulator } from "./modulator.js";
 export { Network, type DeepPair, type NetworkInfo } from "./network.js";
 export {
   Session,

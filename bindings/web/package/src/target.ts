@@ -49,6 +49,11 @@ export class Target {
     this.raw = raw;
   }
 
+  /** @internal */
+  static of(raw: RawTarget): Target {
+    return new Target(raw);
+  }
+
   /**
    * Creates a target from a display in TOML, with levels in equal phase steps.
    *

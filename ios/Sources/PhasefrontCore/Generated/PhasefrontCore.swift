@@ -1250,13 +1250,9 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     func info()  -> HologramInfo
     
     /**
-     * Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
-     * levels in the upper bits of a byte; `placement` positions the hologram.
-     *
-     * # Errors
-     * Returns an error if the layout does not have this image.
+     * Returns the size of the images of `layout` for the modulator.
      */
-    func output(placement: Placement, image: Int) throws  -> RawImage
+    func outputSize(layout: ModulatorLayout)  -> OutputSize
     
     /**
      * Returns the address of the levels of one colour: 0 red, 1 green, 2 blue, or 0 for one laser. Each level is a
@@ -1273,14 +1269,6 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     func planeLen()  -> UInt64
     
     /**
-     * Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
-     *
-     * # Errors
-     * Returns an error if the image is empty or z is too far away.
-     */
-    func preview(zMm: Double, width: Int, height: Int) throws  -> RawImage
-    
-    /**
      * Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
      *
      * # Errors
@@ -1292,6 +1280,23 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
      * Returns another handle to the same hologram. Each reader of its memory holds one.
      */
     func share()  -> RawHologram
+    
+    /**
+     * Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
+     * fewer bits than their place use its upper bits; `placement` positions the hologram.
+     *
+     * # Errors
+     * Returns an error if the layout does not have this image or the image does not fit.
+     */
+    func writeOutput(placement: Placement, image: Int, to: RawMemory) throws 
+    
+    /**
+     * Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+     *
+     * # Errors
+     * Returns an error if the image is empty or does not fit, or z is too far away.
+     */
+    func writePreview(zMm: Double, width: Int, height: Int, layout: ModulatorLayout, to: RawMemory) throws 
     
     /**
      * Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
@@ -1412,19 +1417,14 @@ open func info() -> HologramInfo  {
 }
     
     /**
-     * Returns image `image` of those that the modulator's driver takes, at the modulator's resolution. It contains the
-     * levels in the upper bits of a byte; `placement` positions the hologram.
-     *
-     * # Errors
-     * Returns an error if the layout does not have this image.
+     * Returns the size of the images of `layout` for the modulator.
      */
-open func output(placement: Placement, image: Int)throws  -> RawImage  {
-    return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func outputSize(layout: ModulatorLayout) -> OutputSize  {
+    return try!  FfiConverterTypeOutputSize_lift(try! rustCall() {
         uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawhologram_output(
+    uniffi_phasefront_ffi_fn_method_rawhologram_output_size(
             self.uniffiCloneHandle(),
-        FfiConverterTypePlacement_lower(placement),
-        FfiConverterTypeInt_lower(image),uniffiCallStatus
+        FfiConverterTypeModulatorLayout_lower(layout),uniffiCallStatus
     )
 })
 }
@@ -1459,24 +1459,6 @@ open func planeLen() -> UInt64  {
 }
     
     /**
-     * Returns the view of an eye focused at `z_mm`, with `width` × `height` pixels.
-     *
-     * # Errors
-     * Returns an error if the image is empty or z is too far away.
-     */
-open func preview(zMm: Double, width: Int, height: Int)throws  -> RawImage  {
-    return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawhologram_preview(
-            self.uniffiCloneHandle(),
-        FfiConverterDouble.lower(zMm),
-        FfiConverterTypeInt_lower(width),
-        FfiConverterTypeInt_lower(height),uniffiCallStatus
-    )
-})
-}
-    
-    /**
      * Returns the view of an eye focused at `z_mm` at full resolution, as amplitudes where 1 is white.
      *
      * # Errors
@@ -1502,6 +1484,43 @@ open func share() -> RawHologram  {
             self.uniffiCloneHandle(),uniffiCallStatus
     )
 })
+}
+    
+    /**
+     * Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
+     * fewer bits than their place use its upper bits; `placement` positions the hologram.
+     *
+     * # Errors
+     * Returns an error if the layout does not have this image or the image does not fit.
+     */
+open func writeOutput(placement: Placement, image: Int, to: RawMemory)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_write_output(
+            self.uniffiCloneHandle(),
+        FfiConverterTypePlacement_lower(placement),
+        FfiConverterTypeInt_lower(image),
+        FfiConverterTypeRawMemory_lower(to),uniffiCallStatus
+    )
+}
+}
+    
+    /**
+     * Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+     *
+     * # Errors
+     * Returns an error if the image is empty or does not fit, or z is too far away.
+     */
+open func writePreview(zMm: Double, width: Int, height: Int, layout: ModulatorLayout, to: RawMemory)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_write_preview(
+            self.uniffiCloneHandle(),
+        FfiConverterDouble.lower(zMm),
+        FfiConverterTypeInt_lower(width),
+        FfiConverterTypeInt_lower(height),
+        FfiConverterTypeModulatorLayout_lower(layout),
+        FfiConverterTypeRawMemory_lower(to),uniffiCallStatus
+    )
+}
 }
     
     /**
@@ -1570,253 +1589,43 @@ public func FfiConverterTypeRawHologram_lower(_ value: RawHologram) -> UInt64 {
 
 
 /**
- * An image without gaps between rows. The layers written by hand read it.
- */
-public protocol RawImageProtocol: AnyObject, Sendable {
-    
-    /**
-     * Returns the address of the bytes. It is valid as long as this object.
-     */
-    func address()  -> UInt64
-    
-    /**
-     * Returns the number of bytes.
-     */
-    func byteLen()  -> UInt64
-    
-    /**
-     * Returns the height in pixels.
-     */
-    func height()  -> Int
-    
-    /**
-     * Returns the number of bytes of a pixel.
-     */
-    func pixelBytes()  -> Int
-    
-    /**
-     * Returns another handle to the same image. Each reader of its memory holds one.
-     */
-    func share()  -> RawImage
-    
-    /**
-     * Returns the width in pixels.
-     */
-    func width()  -> Int
-    
-}
-/**
- * An image without gaps between rows. The layers written by hand read it.
- */
-open class RawImage: RawImageProtocol, @unchecked Sendable {
-    fileprivate let handle: UInt64
-
-    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public struct NoHandle {
-        public init() {}
-    }
-
-    // TODO: We'd like this to be `private` but for Swifty reasons,
-    // we can't implement `FfiConverter` without making this `required` and we can't
-    // make it `required` without making it `public`.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    required public init(unsafeFromHandle handle: UInt64) {
-        self.handle = handle
-    }
-
-    // This constructor can be used to instantiate a fake object.
-    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
-    //
-    // - Warning:
-    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public init(noHandle: NoHandle) {
-        self.handle = 0
-    }
-
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public func uniffiCloneHandle() -> UInt64 {
-        return try! rustCall { uniffi_phasefront_ffi_fn_clone_rawimage(self.handle, $0) }
-    }
-    // No primary constructor declared for this class.
-
-    deinit {
-        if handle == 0 {
-            // Mock objects have handle=0 don't try to free them
-            return
-        }
-
-        try! rustCall { uniffi_phasefront_ffi_fn_free_rawimage(handle, $0) }
-    }
-
-    
-
-    
-    /**
-     * Returns the address of the bytes. It is valid as long as this object.
-     */
-open func address() -> UInt64  {
-    return try!  FfiConverterUInt64.lift(try! rustCall() {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawimage_address(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Returns the number of bytes.
-     */
-open func byteLen() -> UInt64  {
-    return try!  FfiConverterUInt64.lift(try! rustCall() {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawimage_byte_len(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Returns the height in pixels.
-     */
-open func height() -> Int  {
-    return try!  FfiConverterTypeInt_lift(try! rustCall() {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawimage_height(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Returns the number of bytes of a pixel.
-     */
-open func pixelBytes() -> Int  {
-    return try!  FfiConverterTypeInt_lift(try! rustCall() {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawimage_pixel_bytes(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Returns another handle to the same image. Each reader of its memory holds one.
-     */
-open func share() -> RawImage  {
-    return try!  FfiConverterTypeRawImage_lift(try! rustCall() {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawimage_share(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-    /**
-     * Returns the width in pixels.
-     */
-open func width() -> Int  {
-    return try!  FfiConverterTypeInt_lift(try! rustCall() {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawimage_width(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public struct FfiConverterTypeRawImage: FfiConverter {
-    typealias FfiType = UInt64
-    typealias SwiftType = RawImage
-
-    public static func lift(_ handle: UInt64) throws -> RawImage {
-        return RawImage(unsafeFromHandle: handle)
-    }
-
-    public static func lower(_ value: RawImage) -> UInt64 {
-        return value.uniffiCloneHandle()
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> RawImage {
-        let handle: UInt64 = try readInt(&buf)
-        return try lift(handle)
-    }
-
-    public static func write(_ value: RawImage, into buf: inout [UInt8]) {
-        writeInt(&buf, lower(value))
-    }
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeRawImage_lift(_ handle: UInt64) throws -> RawImage {
-    return try FfiConverterTypeRawImage.lift(handle)
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeRawImage_lower(_ value: RawImage) -> UInt64 {
-    return FfiConverterTypeRawImage.lower(value)
-}
-
-
-
-
-
-
-/**
- * A modulator: its display, the phases of its levels, and the frames that its input takes. For the layers by hand.
+ * A modulator: its display, the phases of its levels, and the images that its input takes. The layers written by hand
+ * use it.
  */
 public protocol RawModulatorProtocol: AnyObject, Sendable {
     
     /**
-     * The images that its input takes of `hologram`, one, or one for each colour.
-     *
-     * # Errors
-     * A hologram that is larger than the modulator or for another number of lasers or bits; with bit planes, one of
-     * another size.
+     * Returns the size of the images that its input takes.
      */
-    func pack(hologram: RawHologram) throws  -> [RawImage]
-    
-    /**
-     * What holograms for it are made for.
-     *
-     * # Errors
-     * Levels of more than 8 bits that are not evenly spaced.
-     */
-    func target() throws  -> HologramTarget
+    func outputSize()  -> OutputSize
     
     /**
      * Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
-     * without gaps. The result has 2 bytes a level, planes of colours one after another.
+     * without gaps. Writes 2 bytes a level, planes of colours one after another without gaps.
      *
      * # Errors
-     * Another number of bytes, or cells that are those of no level.
+     * Returns an error for another number of bytes, or for cells that are those of no level.
      */
-    func unpack(images: Data, width: Int, height: Int) throws  -> RawImage
+    func read(images: Data, width: Int, height: Int, to: RawMemory) throws 
+    
+    /**
+     * Returns the target of holograms for the modulator.
+     */
+    func target()  -> HologramTarget
+    
+    /**
+     * Writes image `image` of those that its input takes of `hologram`.
+     *
+     * # Errors
+     * Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for
+     * another number of lasers or bits; with bit planes, also if it has another size.
+     */
+    func writeOutput(hologram: RawHologram, image: Int, to: RawMemory) throws 
     
 }
 /**
- * A modulator: its display, the phases of its levels, and the frames that its input takes. For the layers by hand.
+ * A modulator: its display, the phases of its levels, and the images that its input takes. The layers written by hand
+ * use it.
  */
 open class RawModulator: RawModulatorProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -1873,7 +1682,8 @@ open class RawModulator: RawModulatorProtocol, @unchecked Sendable {
      * Reads a modulator's file.
      *
      * # Errors
-     * Text that is not TOML, an unknown key, or a value out of its range.
+     * Returns an error if the text is not TOML, a key is unknown, a value is out of its range, or levels of more than
+     * 8 bits are not evenly spaced.
      */
 public static func fromToml(text: String)throws  -> RawModulator  {
     return try  FfiConverterTypeRawModulator_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1885,10 +1695,10 @@ public static func fromToml(text: String)throws  -> RawModulator  {
 }
     
     /**
-     * A modulator that `phasefront devices` lists.
+     * Returns the modulator called `name`, one of [`modulator_names`].
      *
      * # Errors
-     * Another name.
+     * Returns an error for another name.
      */
 public static func named(name: String)throws  -> RawModulator  {
     return try  FfiConverterTypeRawModulator_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -1902,30 +1712,43 @@ public static func named(name: String)throws  -> RawModulator  {
 
     
     /**
-     * The images that its input takes of `hologram`, one, or one for each colour.
-     *
-     * # Errors
-     * A hologram that is larger than the modulator or for another number of lasers or bits; with bit planes, one of
-     * another size.
+     * Returns the size of the images that its input takes.
      */
-open func pack(hologram: RawHologram)throws  -> [RawImage]  {
-    return try  FfiConverterSequenceTypeRawImage.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func outputSize() -> OutputSize  {
+    return try!  FfiConverterTypeOutputSize_lift(try! rustCall() {
         uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_rawmodulator_pack(
-            self.uniffiCloneHandle(),
-        FfiConverterTypeRawHologram_lower(hologram),uniffiCallStatus
+    uniffi_phasefront_ffi_fn_method_rawmodulator_output_size(
+            self.uniffiCloneHandle(),uniffiCallStatus
     )
 })
 }
     
     /**
-     * What holograms for it are made for.
+     * Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
+     * without gaps. Writes 2 bytes a level, planes of colours one after another without gaps.
      *
      * # Errors
-     * Levels of more than 8 bits that are not evenly spaced.
+     * Returns an error for another number of bytes, or for cells that are those of no level.
      */
-open func target()throws  -> HologramTarget  {
-    return try  FfiConverterTypeHologramTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func read(images: Data, width: Int, height: Int, to: RawMemory)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(images) { imagesFb in
+    uniffi_phasefront_ffi_fn_method_rawmodulator_read(
+            self.uniffiCloneHandle(),
+        imagesFb,
+        FfiConverterTypeInt_lower(width),
+        FfiConverterTypeInt_lower(height),
+        FfiConverterTypeRawMemory_lower(to),uniffiCallStatus
+    )
+        }
+}
+}
+    
+    /**
+     * Returns the target of holograms for the modulator.
+     */
+open func target() -> HologramTarget  {
+    return try!  FfiConverterTypeHologramTarget_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_rawmodulator_target(
             self.uniffiCloneHandle(),uniffiCallStatus
@@ -1934,24 +1757,21 @@ open func target()throws  -> HologramTarget  {
 }
     
     /**
-     * Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another
-     * without gaps. The result has 2 bytes a level, planes of colours one after another.
+     * Writes image `image` of those that its input takes of `hologram`.
      *
      * # Errors
-     * Another number of bytes, or cells that are those of no level.
+     * Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for
+     * another number of lasers or bits; with bit planes, also if it has another size.
      */
-open func unpack(images: Data, width: Int, height: Int)throws  -> RawImage  {
-    return try  FfiConverterTypeRawImage_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func writeOutput(hologram: RawHologram, image: Int, to: RawMemory)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
-        FfiConverterByRefBytes.lower(images) { imagesFb in
-    uniffi_phasefront_ffi_fn_method_rawmodulator_unpack(
+    uniffi_phasefront_ffi_fn_method_rawmodulator_write_output(
             self.uniffiCloneHandle(),
-        imagesFb,
-        FfiConverterTypeInt_lower(width),
-        FfiConverterTypeInt_lower(height),uniffiCallStatus
+        FfiConverterTypeRawHologram_lower(hologram),
+        FfiConverterTypeInt_lower(image),
+        FfiConverterTypeRawMemory_lower(to),uniffiCallStatus
     )
-        }
-})
+}
 }
     
 
@@ -4732,6 +4552,95 @@ public func FfiConverterTypeOrientation_lower(_ value: Orientation) -> RustBuffe
 
 
 /**
+ * The images that a modulator's input takes of a hologram.
+ */
+public struct OutputSize: Equatable, Hashable {
+    /**
+     * The width of an image in pixels.
+     */
+    public var width: Int
+    /**
+     * The height of an image in pixels.
+     */
+    public var height: Int
+    /**
+     * The number of bytes of a pixel.
+     */
+    public var pixelBytes: Int
+    /**
+     * The number of images: one, or one for each colour.
+     */
+    public var images: Int
+
+    // Default memberwise initializers are never public by default, so we
+    // declare one manually.
+    public init(
+        /**
+         * The width of an image in pixels.
+         */width: Int, 
+        /**
+         * The height of an image in pixels.
+         */height: Int, 
+        /**
+         * The number of bytes of a pixel.
+         */pixelBytes: Int, 
+        /**
+         * The number of images: one, or one for each colour.
+         */images: Int) {
+        self.width = width
+        self.height = height
+        self.pixelBytes = pixelBytes
+        self.images = images
+    }
+
+    
+
+    
+}
+
+#if compiler(>=6)
+extension OutputSize: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeOutputSize: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> OutputSize {
+        return
+            try OutputSize(
+                width: FfiConverterTypeInt.read(from: &buf), 
+                height: FfiConverterTypeInt.read(from: &buf), 
+                pixelBytes: FfiConverterTypeInt.read(from: &buf), 
+                images: FfiConverterTypeInt.read(from: &buf)
+        )
+    }
+
+    public static func write(_ value: OutputSize, into buf: inout [UInt8]) {
+        FfiConverterTypeInt.write(value.width, into: &buf)
+        FfiConverterTypeInt.write(value.height, into: &buf)
+        FfiConverterTypeInt.write(value.pixelBytes, into: &buf)
+        FfiConverterTypeInt.write(value.images, into: &buf)
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeOutputSize_lift(_ buf: RustBuffer) throws -> OutputSize {
+    return try FfiConverterTypeOutputSize.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeOutputSize_lower(_ value: OutputSize) -> RustBuffer {
+    return FfiConverterTypeOutputSize.lower(value)
+}
+
+
+/**
  * The placement of a hologram on its modulator.
  */
 public struct Placement: Equatable, Hashable {
@@ -5075,6 +4984,86 @@ public func FfiConverterTypeQualityLevel_lift(_ buf: RustBuffer) throws -> Quali
 #endif
 public func FfiConverterTypeQualityLevel_lower(_ value: QualityLevel) -> RustBuffer {
     return FfiConverterTypeQualityLevel.lower(value)
+}
+
+
+/**
+ * The caller's memory for an image. The layers written by hand promise that it stays valid during the call and that
+ * nobody else uses it.
+ */
+public struct RawMemory: Equatable, Hashable {
+    /**
+     * The address of the first byte.
+     */
+    public var address: UInt64
+    /**
+     * The number of bytes.
+     */
+    public var length: UInt64
+    /**
+     * The number of bytes from one row to the next.
+     */
+    public var rowStride: Int
+
+    // Default memberwise initializers are never public by default, so we
+    // declare one manually.
+    public init(
+        /**
+         * The address of the first byte.
+         */address: UInt64, 
+        /**
+         * The number of bytes.
+         */length: UInt64, 
+        /**
+         * The number of bytes from one row to the next.
+         */rowStride: Int) {
+        self.address = address
+        self.length = length
+        self.rowStride = rowStride
+    }
+
+    
+
+    
+}
+
+#if compiler(>=6)
+extension RawMemory: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeRawMemory: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> RawMemory {
+        return
+            try RawMemory(
+                address: FfiConverterUInt64.read(from: &buf), 
+                length: FfiConverterUInt64.read(from: &buf), 
+                rowStride: FfiConverterTypeInt.read(from: &buf)
+        )
+    }
+
+    public static func write(_ value: RawMemory, into buf: inout [UInt8]) {
+        FfiConverterUInt64.write(value.address, into: &buf)
+        FfiConverterUInt64.write(value.length, into: &buf)
+        FfiConverterTypeInt.write(value.rowStride, into: &buf)
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawMemory_lift(_ buf: RustBuffer) throws -> RawMemory {
+    return try FfiConverterTypeRawMemory.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawMemory_lower(_ value: RawMemory) -> RustBuffer {
+    return FfiConverterTypeRawMemory.lower(value)
 }
 
 
@@ -6554,9 +6543,18 @@ public enum ModulatorLayout: Equatable, Hashable {
      */
     case bgra
     /**
+     * One image with 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
+     * RGBA_1010102, Metal's rgb10a2.
+     */
+    case rgb10
+    /**
      * One image for each colour in the order red, green, blue, with one byte for each pixel.
      */
     case grey
+    /**
+     * One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
+     */
+    case grey16
 
 
 
@@ -6584,7 +6582,11 @@ public struct FfiConverterTypeModulatorLayout: FfiConverterRustBuffer {
         
         case 3: return .bgra
         
-        case 4: return .grey
+        case 4: return .rgb10
+        
+        case 5: return .grey
+        
+        case 6: return .grey16
         
         default: throw UniffiInternalError.unexpectedEnumCase
         }
@@ -6606,8 +6608,16 @@ public struct FfiConverterTypeModulatorLayout: FfiConverterRustBuffer {
             writeInt(&buf, Int32(3))
         
         
-        case .grey:
+        case .rgb10:
             writeInt(&buf, Int32(4))
+        
+        
+        case .grey:
+            writeInt(&buf, Int32(5))
+        
+        
+        case .grey16:
+            writeInt(&buf, Int32(6))
         
         }
     }
@@ -7778,23 +7788,23 @@ fileprivate struct FfiConverterSequenceDouble: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterSequenceTypeRawImage: FfiConverterRustBuffer {
-    typealias SwiftType = [RawImage]
+fileprivate struct FfiConverterSequenceString: FfiConverterRustBuffer {
+    typealias SwiftType = [String]
 
-    public static func write(_ value: [RawImage], into buf: inout [UInt8]) {
+    public static func write(_ value: [String], into buf: inout [UInt8]) {
         let len = Int32(value.count)
         writeInt(&buf, len)
         for item in value {
-            FfiConverterTypeRawImage.write(item, into: &buf)
+            FfiConverterString.write(item, into: &buf)
         }
     }
 
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> [RawImage] {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> [String] {
         let len: Int32 = try readInt(&buf)
-        var seq = [RawImage]()
+        var seq = [String]()
         seq.reserveCapacity(Int(len))
         for _ in 0 ..< len {
-            seq.append(try FfiConverterTypeRawImage.read(from: &buf))
+            seq.append(try FfiConverterString.read(from: &buf))
         }
         return seq
     }
@@ -7853,6 +7863,9 @@ fileprivate struct FfiConverterSequenceTypeQualityLevel: FfiConverterRustBuffer 
 
 
 
+/**
+ * A number of pixels, steps and the like.
+ */
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
@@ -7935,6 +7948,16 @@ public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try
 }
 }
 /**
+ * Returns the names of the modulators that the library knows.
+ */
+public func modulatorNames() -> [String]  {
+    return try!  FfiConverterSequenceString.lift(try! rustCall() {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_func_modulator_names(uniffiCallStatus
+    )
+})
+}
+/**
  * Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
  *
  * # Errors
@@ -7945,6 +7968,21 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_func_built_in_pair(
         FfiConverterDouble.lower(offsetMm),uniffiCallStatus
+    )
+})
+}
+/**
+ * Returns options for a live session on a phone: the defaults of [`session_options`] with a target rate and three
+ * quality levels, at the modulator's resolution and at three quarters and half of it along each side. The session
+ * lowers the level when frames are too slow for the rate or the device is hot, and raises it when there is time left.
+ */
+public func phoneOptions(target: HologramTarget, rateHz: Double = Double(30.0), method: HologramMethod? = nil)throws  -> SessionOptions  {
+    return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_func_phone_options(
+        FfiConverterTypeHologramTarget_lower(target),
+        FfiConverterDouble.lower(rateHz),
+        FfiConverterOptionTypeHologramMethod.lower(method),uniffiCallStatus
     )
 })
 }
@@ -8001,7 +8039,13 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 38295) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_func_modulator_names() != 60502) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 22076) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_func_phone_options() != 23382) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_session_options() != 44888) {
@@ -8016,7 +8060,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 15062) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_output() != 41211) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_output_size() != 41776) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 49260) {
@@ -8025,34 +8069,19 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len() != 39135) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 64900) {
-        return InitializationResult.apiChecksumMismatch
-    }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_refocus() != 61631) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 9110) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_write_output() != 58308) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_write_preview() != 53849) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_z_at() != 53543) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_address() != 51676) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_byte_len() != 21355) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_height() != 42953) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_pixel_bytes() != 7485) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_share() != 42777) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 12776) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 3309) {
@@ -8076,13 +8105,16 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 36303) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_pack() != 23) {
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_output_size() != 24231) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_target() != 52954) {
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_read() != 30182) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_unpack() != 55891) {
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_target() != 4030) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_write_output() != 11040) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_hologramnetwork_info() != 60467) {
@@ -8145,10 +8177,10 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field() != 1349) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_from_toml() != 51094) {
+    if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_from_toml() != 23445) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named() != 21491) {
+    if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named() != 2724) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_hologramnetwork_built_in() != 26010) {

@@ -3,7 +3,7 @@
 //!
 //! Plane n of a frame is bit n mod 8 of red (n < 8), green (n < 16) or blue.
 
-use super::flip;
+use super::{check_rows, flip};
 use crate::runtime::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -101,14 +101,14 @@ impl BitPlanes {
 
     /// Packs `maps` of levels, (H, W) each, into `frame`. The maps are displayed one after another for equal times:
     /// with N maps, plane n displays map ⌊n·N/24⌋. Three maps therefore fill red, green and blue, and a single map
-    /// fills the whole frame. Allocates nothing.
+    /// fills the whole frame. The rows of `frame` begin `row_stride` bytes apart. Allocates nothing.
     ///
     /// # Errors
-    /// Returns an error if the number of maps does not divide 24.
+    /// Returns an error if the number of maps does not divide 24 or `frame` cannot hold the frame.
     ///
     /// # Panics
-    /// Panics if a map or `frame` does not have the planned length.
-    pub fn pack(&self, maps: &[&[u8]], frame: &mut [u8]) -> Result<()> {
+    /// Panics if a map does not have the planned length.
+    pub fn pack(&self, maps: &[&[u8]], frame: &mut [u8], row_stride: usize) -> Result<()> {
         let (height, width) = self.shape;
         let count = maps.len();
         if count == 0 || !PLANES.is_multiple_of(count) {
@@ -117,23 +117,21 @@ impl BitPlanes {
             )));
         }
         assert!(maps.iter().all(|map| map.len() == height * width));
-        assert_eq!(frame.len(), self.frame_bytes());
-        frame
-            .par_chunks_exact_mut(12 * width)
-            .enumerate()
-            .for_each(|(y, rows)| {
-                let y = flip(y, height, self.flip_y);
-                let planes: [&[u8]; PLANES] = std::array::from_fn(|n| &maps[n * count / PLANES][y * width..][..width]);
-                self.pack_row(&planes, rows);
-            });
+        let len = check_rows(frame.len(), row_stride, (2 * height, 6 * width))?;
+        let frame = &mut frame[..len];
+        frame.par_chunks_mut(2 * row_stride).enumerate().for_each(|(y, rows)| {
+            let y = flip(y, height, self.flip_y);
+            let planes: [&[u8]; PLANES] = std::array::from_fn(|n| &maps[n * count / PLANES][y * width..][..width]);
+            let (upper, lower) = rows.split_at_mut(row_stride);
+            self.pack_row(&planes, &mut upper[..6 * width], lower);
+        });
         Ok(())
     }
 
     /// Packs one row of pixels into two rows of a frame.
-    fn pack_row(&self, planes: &[&[u8]; PLANES], rows: &mut [u8]) {
+    fn pack_row(&self, planes: &[&[u8]; PLANES], upper: &mut [u8], lower: &mut [u8]) {
         const RUN: usize = 64;
         let width = planes[0].len();
-        let (upper, lower) = rows.split_at_mut(6 * width);
         for first in (0..width).step_by(RUN) {
             let count = RUN.min(width - first);
             let at = if self.flip_x { width - first - count } else { first };
@@ -217,7 +215,7 @@ mod tests {
                 let maps: Vec<Vec<u8>> = (0..count).map(|n| map(n, shape)).collect();
                 let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
                 let mut frame = vec![0; plan.frame_bytes()];
-                plan.pack(&maps, &mut frame).unwrap();
+                plan.pack(&maps, &mut frame, 6 * 7).unwrap();
                 for plane in 0..24 {
                     let shown = maps[plane * count / 24];
                     for (at, value) in frame.chunks(3).enumerate() {
@@ -232,7 +230,7 @@ mod tests {
                 }
             }
             assert!(
-                plan.pack(&[map(0, shape).as_slice(); 5], &mut vec![0; plan.frame_bytes()])
+                plan.pack(&[map(0, shape).as_slice(); 5], &mut vec![0; plan.frame_bytes()], 6 * 7)
                     .is_err()
             );
             assert!(plan.unpack(&vec![0; plan.frame_bytes()], 24, &mut [0; 35]).is_err());

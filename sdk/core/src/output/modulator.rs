@@ -370,7 +370,7 @@ mod tests {
             let plan = BitPlanes::new(cells, (2, 8), device.flip_x, device.flip_y);
             let levels: Vec<u8> = (0..16).collect();
             let mut frame = vec![0; plan.frame_bytes()];
-            plan.pack(&[&levels], &mut frame).unwrap();
+            plan.pack(&[&levels], &mut frame, 6 * 8).unwrap();
             let cells = golden.chars().filter(|c| *c != ' ');
             let want: Vec<u8> = cells.flat_map(|c| [if c == '1' { 255 } else { 0 }; 3]).collect();
             assert_eq!(frame, want, "{name}");

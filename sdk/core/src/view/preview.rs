@@ -14,6 +14,7 @@ use crate::frame::Axis;
 use crate::optics::asm::Propagator;
 use crate::optics::fft::ConvolveScratch;
 use crate::optics::zernike::Aberration;
+use crate::output::{Layout, rows};
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -44,7 +45,7 @@ pub struct Preview {
 ///
 /// # Errors
 /// Returns an error if the image has more than [`MOST_PIXELS`] in all or more than 2¹⁴ pixels along a side.
-pub fn check_screen((height, width): (usize, usize)) -> Result<()> {
+fn check_screen((height, width): (usize, usize)) -> Result<()> {
     if height.max(width) > MOST_SIDE || height * width > MOST_PIXELS {
         return Err(Error::Setting(format!(
             "a preview of {width}×{height} is too large; {MOST_SIDE} pixels a side and {MOST_PIXELS} in all are the most"
@@ -119,17 +120,31 @@ impl Preview {
         }
     }
 
-    /// Renders `levels`, (C, H, W), into `rgba`: rows of red, green, blue, alpha 255. `scale` is the amplitude that
-    /// maps to full light. Amplitude 1 becomes 255, and the view of one laser is grey. Allocates nothing.
+    /// Renders `levels`, (C, H, W), into `image`: its layout and its memory, whose rows begin so many bytes apart.
+    /// `scale` is the amplitude that maps to full light. Amplitude 1 becomes 255, and the view of one laser is grey.
+    /// Allocates nothing.
+    ///
+    /// # Errors
+    /// Returns an error if the layout is not Rgb, Rgba or Bgra, or the memory cannot hold the image.
     ///
     /// # Panics
-    /// Panics if `levels` or `rgba` does not have the planned length.
-    pub fn look(&self, levels: &[u8], scale: f32, rgba: &mut [u8], scratch: &mut PreviewScratch) {
+    /// Panics if `levels` does not have the planned length.
+    pub fn look(
+        &self,
+        levels: &[u8],
+        scale: f32,
+        (layout, bytes, row_stride): (Layout, &mut [u8], usize),
+        scratch: &mut PreviewScratch,
+    ) -> Result<()> {
         let (height, width) = self.hologram;
         let (small_height, small_width) = self.small;
-        let (screen_height, screen_width) = self.screen;
         assert_eq!(levels.len(), self.colours * height * width);
-        assert_eq!(rgba.len(), 4 * screen_height * screen_width);
+        if !layout.is_byte_for_each_colour() {
+            return Err(Error::Setting(format!(
+                "a preview has bytes Rgb, Rgba or Bgra, not {layout:?}"
+            )));
+        }
+        let rows = rows(bytes, row_stride, (self.screen.0, layout.pixel_bytes() * self.screen.1))?;
         let light = scale / (self.factor * self.factor) as f32;
         // If all pixels respond alike, each level has one phase.
         let shown: [Complex32; 256] = match &self.response {
@@ -160,7 +175,8 @@ impl Preview {
                 *amplitude = value.norm();
             }
         }
-        self.draw(&scratch.amplitude, rgba);
+        self.draw(&scratch.amplitude, layout, rows);
+        Ok(())
     }
 
     /// Sums the light of `factor` × `factor` pixels into each value, from `factor` rows of levels. `light` returns the
@@ -195,27 +211,25 @@ impl Preview {
     }
 
     /// Converts the planes of amplitudes to pixels of the screen.
-    fn draw(&self, amplitude: &[f32], rgba: &mut [u8]) {
+    fn draw<'a>(&self, amplitude: &[f32], layout: Layout, rows: impl IndexedParallelIterator<Item = &'a mut [u8]>) {
         let (height, width) = self.small;
-        (rgba.par_chunks_exact_mut(4 * self.screen.1))
-            .enumerate()
-            .for_each(|(y, pixels)| {
-                let byte = |colour: usize, x: usize| {
-                    let plane = &amplitude[colour * height * width..];
-                    let row = |(row, weight): (usize, f32)| {
-                        let row = &plane[row * width..][..width];
-                        weight * self.x.taps(x).map(|(at, w)| w * row[at]).sum::<f32>()
-                    };
-                    (self.y.taps(y).map(row).sum::<f32>() * 255.0 + 0.5) as u8
+        rows.enumerate().for_each(|(y, pixels)| {
+            let byte = |colour: usize, x: usize| {
+                let plane = &amplitude[colour * height * width..];
+                let row = |(row, weight): (usize, f32)| {
+                    let row = &plane[row * width..][..width];
+                    weight * self.x.taps(x).map(|(at, w)| w * row[at]).sum::<f32>()
                 };
-                for (x, pixel) in pixels.as_chunks_mut::<4>().0.iter_mut().enumerate() {
-                    let [red, green, blue] = match self.colours {
-                        1 => [byte(0, x); 3],
-                        _ => [0, 1, 2].map(|colour| byte(colour, x)),
-                    };
-                    *pixel = [red, green, blue, 255];
-                }
-            });
+                (self.y.taps(y).map(row).sum::<f32>() * 255.0 + 0.5) as u8
+            };
+            for (x, pixel) in pixels.chunks_exact_mut(layout.pixel_bytes()).enumerate() {
+                let bytes = match self.colours {
+                    1 => [byte(0, x); 3],
+                    _ => [0, 1, 2].map(|colour| byte(colour, x)),
+                };
+                layout.write_pixel(0, |colour| bytes[colour].into(), pixel);
+            }
+        });
     }
 }
 
@@ -278,7 +292,8 @@ mod tests {
                     let plan = Preview::new(SHAPE, &target, z_m, screen).unwrap();
                     assert_eq!(plan.factor(), factor);
                     let mut rgba = vec![0; 4 * screen.0 * screen.1];
-                    plan.look(&levels, scale, &mut rgba, &mut plan.scratch());
+                    let image = (Layout::Rgba, &mut rgba[..], 4 * screen.1);
+                    plan.look(&levels, scale, image, &mut plan.scratch()).unwrap();
                     let mut squares = 0.0;
                     for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
                         assert_eq!(pixel[3], 255);

@@ -167,7 +167,7 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
             (0..layout.images(colours))
                 .map(|image| {
                     let mut bytes = vec![0; output.image_bytes()];
-                    output.write(levels, image, &mut bytes)?;
+                    output.write(levels, image, &mut bytes, output.row_bytes())?;
                     swap(kind(*layout), &mut bytes);
                     Ok(Image {
                         shape: output.shape(),
@@ -192,7 +192,7 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
 /// Returns an error if the number of maps does not divide 24.
 pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
     let mut bytes = vec![0; plan.frame_bytes()];
-    plan.pack(maps, &mut bytes)?;
+    plan.pack(maps, &mut bytes, 3 * plan.frame_shape().1)?;
     Ok(Image {
         shape: plan.frame_shape(),
         bytes,

@@ -5,6 +5,7 @@ use crate::scene;
 use crate::sensor::coarse::{Coarse, Sampling};
 use crate::sensor::colour_bytes;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::output::Layout;
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
 use phasefront_exact::truth::visible_depth;
 use phasefront_io::{Error, Result};
@@ -158,7 +159,7 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
                 let hologram = process(&CameraFrame::new(timestamp, colour, depth))?;
                 let (height, width) = (shape.0 / 2, shape.1 / 2);
                 let mut rgba = vec![0; 4 * height * width];
-                hologram.preview(0.0, height, width, &mut rgba)?;
+                hologram.write_preview(0.0, (height, width), Layout::Rgba, &mut rgba, 4 * width)?;
                 // The preview undoes the scale, but the eye sees the light, which is the amplitude divided by the
                 // scale.
                 let light = |byte: &u8| f32::from(*byte) / 255.0 / hologram.scale();

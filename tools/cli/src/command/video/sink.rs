@@ -3,6 +3,7 @@
 use crate::record::{Before, Claim, RunRecord, already, names_of};
 use ndarray::Array3;
 use phasefront::Hologram;
+use phasefront::output::Layout;
 use phasefront_io::film::video::VideoFrame;
 use phasefront_io::film::{self, Quality};
 use phasefront_io::hologram::{self, HologramInfo, Levels};
@@ -129,7 +130,7 @@ impl Sink {
         let (height, width) = hologram.shape();
         if let Some(z_m) = self.preview_z_m {
             let mut rgba = vec![0; 4 * height * width];
-            hologram.preview(z_m, height, width, &mut rgba)?;
+            hologram.write_preview(z_m, (height, width), Layout::Rgba, &mut rgba, 4 * width)?;
             picture::write_rgba(&self.preview(folder, index), width, height, &rgba)?;
         }
         let shape = (hologram.colours(), height, width);

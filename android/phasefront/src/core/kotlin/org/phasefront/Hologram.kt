@@ -1,5 +1,6 @@
 package org.phasefront
 
+import com.sun.jna.Native
 import com.sun.jna.Pointer
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
@@ -48,14 +49,24 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     public fun zAt(x: Double, y: Double): Double = open { it.zAt(x, y) }
 
     /**
-     * Returns the displayed image for an eye focused at [zMm]: red, green, blue, alpha. It takes some milliseconds, so
-     * do not call it on the main thread.
+     * Writes the displayed image for an eye focused at [zMm] into [to]: [width] × [height] pixels in [layout], RGB, RGBA
+     * or BGRA, from the position of a direct buffer, with rows [rowStride] bytes apart. Allocates no image. It takes some
+     * milliseconds, so do not call it on the main thread.
+     *
+     * @throws PhasefrontException.Setting if the image is empty or does not fit, or if z is too far away.
      */
-    public fun preview(zMm: Double, width: Int, height: Int): PixelImage {
+    public fun writePreview(
+        zMm: Double,
+        width: Int,
+        height: Int,
+        to: ByteBuffer,
+        layout: ModulatorLayout = ModulatorLayout.RGBA,
+        rowStride: Int = width * if (layout == ModulatorLayout.RGB) 3 else 4,
+    ) {
         if (width < 1 || height < 1) {
             throw PhasefrontException.Setting("a preview of $width×$height is empty; each side must be at least 1")
         }
-        return PixelImage(open { it.preview(zMm, width, height) })
+        to.lend(rowStride) { memory -> open { it.writePreview(zMm, width, height, layout, memory) } }
     }
 
     /**
@@ -75,19 +86,25 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
      */
     public fun field(zMm: Double = 0.0): Planes = Planes(open { it.field(zMm) })
 
+    /** Returns the size of the images of [layout] for the modulator. All layouts except grey have one image. */
+    public fun outputSize(layout: ModulatorLayout): OutputSize = open { it.outputSize(layout) }
+
     /**
-     * Returns image [index] of the images for the modulator's driver, at the modulator's resolution, with unchanged
-     * levels. All layouts except grey have one image.
+     * Writes image [index] of the images for the modulator's driver, with unchanged levels, into [to]: [outputSize] has
+     * its size. It begins at the position of a direct buffer, and its rows are [rowStride] bytes apart, by default
+     * without gaps. Allocates no image.
+     *
+     * @throws PhasefrontException.Setting if the layout has no such image or the image does not fit.
      */
-    public fun output(placement: Placement = Placement(ModulatorLayout.RGBA), index: Int = 0): PixelImage {
-        if (index < 0) throw PhasefrontException.Setting("there is no image $index; the first is 0")
-        return PixelImage(open { it.output(placement, index) })
+    public fun writeOutput(placement: Placement, to: ByteBuffer, index: Int = 0, rowStride: Int? = null) {
+        val stride = rowStride ?: outputSize(placement.layout).run { width * pixelBytes }
+        to.lend(stride) { memory -> open { it.writeOutput(placement, index, memory) } }
     }
 
     /** Frees the memory. Closing twice does nothing. */
     override fun close(): Unit = raw.destroy()
 
-    private fun <R> open(call: (RawHologram) -> R): R {
+    internal fun <R> open(call: (RawHologram) -> R): R {
         if (raw.uniffiIsDestroyed) throw PhasefrontException.Session("hologram: it is closed; read it before closing it")
         return call(raw)
     }
@@ -128,26 +145,18 @@ public class Planes internal constructor(private val raw: RawPlanes) : AutoClose
     override fun close(): Unit = raw.destroy()
 }
 
-/** An image whose rows have no gaps. */
-public class PixelImage internal constructor(private val raw: RawImage) : AutoCloseable {
-    public val width: Int = raw.width()
-    public val height: Int = raw.height()
-
-    /** The number of bytes per pixel. */
-    public val pixelBytes: Int = raw.pixelBytes()
-
-    /**
-     * Reads the image in place. The buffer is valid only in [body], even if another thread closes the image meanwhile.
-     */
-    public fun <R> useBytes(body: (ByteBuffer) -> R): R {
-        if (raw.uniffiIsDestroyed) throw PhasefrontException.Session("image: it is closed; read it before closing it")
-        return raw.share().use { body(memory(it.address(), it.byteLen())) }
-    }
-
-    /** Frees the memory. Closing twice does nothing. */
-    override fun close(): Unit = raw.destroy()
-}
-
 /** Returns a read-only view of the library's memory. */
 private fun memory(address: ULong, len: ULong): ByteBuffer =
     Pointer(address.toLong()).getByteBuffer(0, len.toLong()).asReadOnlyBuffer()
+
+/**
+ * Lends the bytes of a direct buffer from its position to its limit to [call], as memory of an image whose rows are
+ * [rowStride] bytes apart.
+ */
+internal inline fun ByteBuffer.lend(rowStride: Int, call: (RawMemory) -> Unit) {
+    if (isReadOnly) throw PhasefrontException.Setting("the image is in a buffer that is read-only")
+    val bytes = direct { PhasefrontException.Setting("the image is $it; a direct one is needed, from ByteBuffer.allocateDirect") }
+    val address = if (bytes.hasRemaining()) Pointer.nativeValue(Native.getDirectBufferPointer(bytes)) else 0
+    // A lock keeps the buffer, and with it its memory, until the call has returned.
+    synchronized(this) { call(RawMemory(address.toULong(), bytes.remaining().toULong(), rowStride)) }
+}

@@ -2,17 +2,19 @@ package org.phasefront
 
 import com.sun.jna.Native
 import java.util.ArrayDeque
+import kotlinx.coroutines.Dispatchers
 import kotlinx.coroutines.channels.Channel
 import kotlinx.coroutines.flow.Flow
 import kotlinx.coroutines.flow.flow
+import kotlinx.coroutines.withContext
 
 /**
- * A session that turns frames into holograms. Every method may be called from any thread at any time. [process],
- * [warmUp] and [close] wait for a frame, so do not call them on the main thread.
+ * A session that turns frames into holograms. Every method may be called from any thread at any time.
+ * [processBlocking], [warmUp] and [close] wait for a frame, so do not call them on the main thread.
  *
  * ```kotlin
  * HologramSession(sessionOptions(), RunningMode.IMAGE).use { session ->
- *     session.process(frame).use { hologram -> hologram.usePlane(Colour.GREEN) { println(it.remaining()) } }
+ *     session.processBlocking(frame).use { hologram -> hologram.usePlane(Colour.GREEN) { println(it.remaining()) } }
  * }
  * ```
  *
@@ -47,12 +49,21 @@ public class HologramSession(
     }
 
     /**
+     * Returns the hologram of [frame], in an image or a video session, without blocking the caller's thread. The frame's
+     * memory must stay valid until then.
+     *
+     * @throws PhasefrontException if the frame is unusable or late, or if the session is a live stream, paused or
+     * closed. Later frames are not affected.
+     */
+    public suspend fun process(frame: CameraFrame): Hologram = withContext(Dispatchers.Default) { processBlocking(frame) }
+
+    /**
      * Returns the hologram of [frame], in an image or a video session. Blocks until it is done.
      *
      * @throws PhasefrontException if the frame is unusable or late, or if the session is a live stream, paused or
      * closed. Later frames are not affected.
      */
-    public fun process(frame: CameraFrame): Hologram = Hologram(
+    public fun processBlocking(frame: CameraFrame): Hologram = Hologram(
         raw.process(
             frame.colourBytes(0),
             frame.colourBytes(1),
@@ -132,6 +143,19 @@ public sealed interface SessionEvent {
  */
 public fun sessionOptions(display: HologramDisplay = HologramDisplay(), method: HologramMethod? = null): SessionOptions =
     HologramTarget.ofDisplay(display).use { sessionOptions(it, method) }
+
+/**
+ * Returns options for a live session on a phone: the defaults for [display] with a target rate and three quality levels,
+ * at the display's resolution and at three quarters and half of it along each side. The session changes the level as the
+ * frame times and [HologramSession.setThermal] require.
+ *
+ * @throws PhasefrontException.Display for an impossible display.
+ */
+public fun phoneOptions(
+    display: HologramDisplay = HologramDisplay(),
+    rateHz: Double = 30.0,
+    method: HologramMethod? = null,
+): SessionOptions = HologramTarget.ofDisplay(display).use { phoneOptions(it, rateHz, method) }
 
 /** Returns the default options for [display] and [network]. */
 public fun sessionOptions(display: HologramDisplay = HologramDisplay(), network: HologramNetwork): SessionOptions =

@@ -4,6 +4,7 @@ import android.graphics.Bitmap
 import android.graphics.ImageFormat
 import android.hardware.HardwareBuffer
 import android.media.Image
+import java.nio.ByteBuffer
 
 /**
  * Returns a camera image without a copy. Its format is YUV_420_888, as from Camera2 and ARCore. Keep the [Image] open
@@ -57,17 +58,55 @@ public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: B
 private fun Image.Plane.toPlane(): ImagePlane = ImagePlane(buffer, rowStride, pixelStride)
 
 /**
- * Copies the image into a bitmap: into [to] if it is mutable and has the same size and the configuration ARGB_8888,
- * else into a new one.
+ * Writes the displayed image for an eye focused at [zMm] into [to], a mutable bitmap of the configuration ARGB_8888,
+ * with one copy through memory that is kept for the next call on the thread.
  *
- * @throws PhasefrontException.Setting if the image does not have 4 bytes per pixel.
+ * @throws PhasefrontException.Setting for another bitmap.
  */
-public fun PixelImage.toBitmap(to: Bitmap? = null): Bitmap {
-    if (pixelBytes != 4) {
-        throw PhasefrontException.Setting("an image of $pixelBytes bytes a pixel; the layout RGBA is needed for a bitmap")
+public fun Hologram.writePreview(zMm: Double, to: Bitmap): Unit = to.fill { writePreview(zMm, to.width, to.height, it) }
+
+/**
+ * Writes the image for the modulator's driver into [to], as [writePreview] does. The bitmap has the modulator's size.
+ * Create it with `density = Bitmap.DENSITY_NONE`, so that views do not scale it. [flipX] and [flipY] flip the image,
+ * [shiftX] and [shiftY] move the hologram.
+ *
+ * @throws PhasefrontException.Setting for another bitmap.
+ */
+public fun Hologram.writeOutput(
+    to: Bitmap,
+    flipX: Boolean = false,
+    flipY: Boolean = false,
+    shiftX: Int = 0,
+    shiftY: Int = 0,
+) {
+    val size = outputSize(ModulatorLayout.RGBA)
+    if (to.width != size.width || to.height != size.height) {
+        throw PhasefrontException.Setting("a bitmap of ${to.width}×${to.height}; the modulator's ${size.width}×${size.height} are needed")
     }
-    val fits = to?.takeIf { it.width == width && it.height == height && it.config == Bitmap.Config.ARGB_8888 && it.isMutable }
-    val bitmap = fits ?: Bitmap.createBitmap(width, height, Bitmap.Config.ARGB_8888)
-    useBytes { bitmap.copyPixelsFromBuffer(it) }
-    return bitmap
+    to.fill { writeOutput(Placement(ModulatorLayout.RGBA, flipX, flipY, shiftX, shiftY), it) }
+}
+
+/**
+ * Writes the image for the modulator's driver into an image of an `ImageWriter` of RGBA_8888, in place, which sends it
+ * to a surface: no copy. The image has the modulator's size.
+ *
+ * @throws PhasefrontException.Setting for another image.
+ */
+public fun Hologram.writeOutput(to: Image) {
+    val plane = to.planes.singleOrNull()?.takeIf { it.pixelStride == 4 }
+        ?: throw PhasefrontException.Setting("an image of Android's format ${to.format}; RGBA_8888 is needed")
+    writeOutput(Placement(ModulatorLayout.RGBA), plane.buffer, rowStride = plane.rowStride)
+}
+
+/** The memory of each thread's bitmaps. */
+private val memory = ThreadLocal<ByteBuffer>()
+
+private fun Bitmap.fill(write: (ByteBuffer) -> Unit) {
+    if (config != Bitmap.Config.ARGB_8888 || !isMutable) {
+        throw PhasefrontException.Setting("a bitmap of $config; a mutable one of ARGB_8888 is needed")
+    }
+    val bytes = memory.get()?.takeIf { it.capacity() >= byteCount } ?: ByteBuffer.allocateDirect(byteCount).also(memory::set)
+    bytes.clear().limit(byteCount)
+    write(bytes)
+    copyPixelsFromBuffer(bytes)
 }

@@ -27,7 +27,7 @@ class BorderTest {
             val levels = ByteArray(1920 * 1080)
             val added = MutableList((System.getenv("PHASEFRONT_BORDER") ?: "1").toInt() + 5) {
                 val start = System.nanoTime()
-                val inside = session.process(frame).use { hologram ->
+                val inside = session.processBlocking(frame).use { hologram ->
                     for (plane in Colour.entries) hologram.usePlane(plane) { bytes -> bytes.get(levels, 0, 1) }
                     hologram.info.times.totalMs
                 }

@@ -109,7 +109,7 @@ class ConformanceTest {
         HologramSession(options(case), RunningMode.valueOf(case.getString("mode").uppercase())).use { session ->
             val all = ByteArrayOutputStream()
             for (frame in case.getJSONArray("frames").objects()) {
-                session.process(frame(frame)).use { hologram ->
+                session.processBlocking(frame(frame)).use { hologram ->
                     all.write(hologram.levels())
                     hologram.refocus(1.5).use { seen.write(it.bytes()) }
                     hologram.field(-1.0).use { seen.write(it.bytes()) }

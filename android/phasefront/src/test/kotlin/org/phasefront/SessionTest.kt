@@ -33,7 +33,7 @@ class SessionTest {
 
     @Test
     fun levelsAreReadInPlaceAndOutliveTheSession() {
-        val hologram = image { it.process(still()) }
+        val hologram = image { it.processBlocking(still()) }
         val before = hologram.levels()
         assertTrue(before.toSet().size > 100)
         hologram.usePlane(Colour.GREEN) { plane ->
@@ -45,28 +45,28 @@ class SessionTest {
             assertContentEquals(before.copyOfRange(64 * 48, 2 * 64 * 48), bytes)
         }
         assertRefused<PhasefrontException.Session>("closed") { hologram.usePlane(Colour.RED) {} }
-        assertRefused<PhasefrontException.Session>("closed") { hologram.preview(0.0, 8, 8) }
+        assertRefused<PhasefrontException.Session>("closed") { hologram.writePreview(0.0, 8, 8, direct(256)) }
         hologram.close()
     }
 
     @Test
     fun positionsAndSlicesOfBuffersAreRespected() = image { session ->
-        val want = session.process(still()).use { it.levels() }
+        val want = session.processBlocking(still()).use { it.levels() }
         val colour = colourBytes()
         val positioned = direct(colour.capacity() + 100).position(60).put(colour.duplicate())
         positioned.flip().position(60)
-        assertContentEquals(want, session.process(still(colour = positioned)).use { it.levels() })
+        assertContentEquals(want, session.processBlocking(still(colour = positioned)).use { it.levels() })
         assertEquals(60, positioned.position())
-        assertContentEquals(want, session.process(still(colour = positioned.slice())).use { it.levels() })
-        assertContentEquals(want, session.process(still(colour = positioned.asReadOnlyBuffer())).use { it.levels() })
+        assertContentEquals(want, session.processBlocking(still(colour = positioned.slice())).use { it.levels() })
+        assertContentEquals(want, session.processBlocking(still(colour = positioned.asReadOnlyBuffer())).use { it.levels() })
         positioned.limit(positioned.limit() - 4)
-        assertRefused<PhasefrontException.Frame>("too few") { session.process(still(colour = positioned)) }
-        assertRefused<PhasefrontException.Frame>("too few") { session.process(still(depth = direct(0))) }
+        assertRefused<PhasefrontException.Frame>("too few") { session.processBlocking(still(colour = positioned)) }
+        assertRefused<PhasefrontException.Frame>("too few") { session.processBlocking(still(depth = direct(0))) }
     }
 
     @Test
     fun buffersOnTheHeapAreRefused() = image { session ->
-        assertRefused<PhasefrontException.Frame>("allocateDirect") { session.process(still(depth = ByteBuffer.allocate(4 * 32 * 24))) }
+        assertRefused<PhasefrontException.Frame>("allocateDirect") { session.processBlocking(still(depth = ByteBuffer.allocate(4 * 32 * 24))) }
     }
 
     @Test
@@ -74,30 +74,33 @@ class SessionTest {
         fun colour(width: Int, height: Int, vararg planes: ImagePlane) =
             CameraFrame(0, ColourImage(ColourFormat.RGBA, width, height, planes.toList()), still().depth)
         val bytes = colourBytes()
-        assertRefused<PhasefrontException.Frame>("64×0") { session.process(colour(64, 0, ImagePlane(bytes, 256, 4))) }
-        assertRefused<PhasefrontException.Frame>("-64") { session.process(colour(-64, 48, ImagePlane(bytes, 256, 4))) }
-        assertRefused<PhasefrontException.Frame>("must not be negative") { session.process(colour(64, 48, ImagePlane(bytes, -256, 4))) }
-        assertRefused<PhasefrontException.Frame>("row stride") { session.process(colour(64, 48, ImagePlane(bytes, 200, 4))) }
-        assertRefused<PhasefrontException.Frame>("pixel stride") { session.process(colour(64, 48, ImagePlane(bytes, 256, 1))) }
-        assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48)) }
-        assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48, *Array(4) { ImagePlane(bytes, 256, 4) })) }
-        session.process(still()).close()
+        assertRefused<PhasefrontException.Frame>("64×0") { session.processBlocking(colour(64, 0, ImagePlane(bytes, 256, 4))) }
+        assertRefused<PhasefrontException.Frame>("-64") { session.processBlocking(colour(-64, 48, ImagePlane(bytes, 256, 4))) }
+        assertRefused<PhasefrontException.Frame>("must not be negative") { session.processBlocking(colour(64, 48, ImagePlane(bytes, -256, 4))) }
+        assertRefused<PhasefrontException.Frame>("row stride") { session.processBlocking(colour(64, 48, ImagePlane(bytes, 200, 4))) }
+        assertRefused<PhasefrontException.Frame>("pixel stride") { session.processBlocking(colour(64, 48, ImagePlane(bytes, 256, 1))) }
+        assertRefused<PhasefrontException.Frame>("planes") { session.processBlocking(colour(64, 48)) }
+        assertRefused<PhasefrontException.Frame>("planes") { session.processBlocking(colour(64, 48, *Array(4) { ImagePlane(bytes, 256, 4) })) }
+        session.processBlocking(still()).close()
     }
 
     @Test
     fun aPreviewShowsThePictureAndATapGivesZ() {
-        image { it.process(still()) }.use { hologram ->
-            hologram.preview(0.0, 32, 24).use { image ->
-                assertEquals(32 to 24, image.width to image.height)
-                image.useBytes { bytes ->
-                    assertEquals(4 * 32 * 24, bytes.remaining())
-                    val values = ByteArray(bytes.remaining()).also { bytes.get(it) }
-                    assertTrue(values.indices.filter { it % 4 == 3 }.all { values[it] == 255.toByte() })
-                    assertTrue(values.toSet().size > 20)
-                }
-            }
+        image { it.processBlocking(still()) }.use { hologram ->
+            val rgba = direct(4 * 32 * 24).also { hologram.writePreview(0.0, 32, 24, it) }
+            val values = ByteArray(rgba.remaining()).also { rgba.get(it) }
+            assertTrue(values.indices.filter { it % 4 == 3 }.all { values[it] == 255.toByte() })
+            assertTrue(values.toSet().size > 20)
+            // Blue first, with gaps between rows, which stay as they are.
+            val gaps = direct(140 * 24)
+            hologram.writePreview(0.0, 32, 24, gaps, ModulatorLayout.BGRA, rowStride = 140)
+            assertEquals(listOf(values[2], values[1], values[0], 0), listOf(gaps[0], gaps[1], gaps[2], gaps[128]))
+            assertEquals(values[4 * 32], gaps[140 + 2])
             assertTrue(hologram.zAt(0.5, 0.5) > hologram.zAt(0.02, 0.02))
-            assertRefused<PhasefrontException.Setting>("0×24") { hologram.preview(0.0, 0, 24) }
+            assertRefused<PhasefrontException.Setting>("0×24") { hologram.writePreview(0.0, 0, 24, direct(8)) }
+            assertRefused<PhasefrontException.Setting>("24 rows") { hologram.writePreview(0.0, 32, 24, direct(100)) }
+            assertRefused<PhasefrontException.Setting>("allocateDirect") { hologram.writePreview(0.0, 1, 1, ByteBuffer.allocate(4)) }
+            assertRefused<PhasefrontException.Setting>("read-only") { hologram.writePreview(0.0, 1, 1, direct(4).asReadOnlyBuffer()) }
         }
     }
 
@@ -109,7 +112,7 @@ class SessionTest {
 
     @Test
     fun aWholeViewIsTheFieldWithoutItsPhases() {
-        image { it.process(still()) }.use { hologram ->
+        image { it.processBlocking(still()) }.use { hologram ->
             hologram.field().use { field ->
                 hologram.refocus(0.0).use { seen ->
                     assertEquals(listOf(64, 48, 3, 1), listOf(seen.width, seen.height, seen.colours, seen.numbers))
@@ -132,15 +135,34 @@ class SessionTest {
 
     @Test
     fun outputIsWhatTheModulatorTakes() {
-        image { it.process(still()) }.use { hologram ->
+        image { it.processBlocking(still()) }.use { hologram ->
             val levels = hologram.levels()
-            val rgba = hologram.output().use { image -> image.useBytes { bytes -> ByteArray(bytes.remaining()).also { bytes.get(it) } } }
+            assertEquals(OutputSize(width = 64, height = 48, pixelBytes = 4, images = 1), hologram.outputSize(ModulatorLayout.RGBA))
+            val rgba = direct(4 * 64 * 48).also { hologram.writeOutput(Placement(ModulatorLayout.RGBA), it) }
             assertContentEquals(levels.copyOf(64 * 48), ByteArray(64 * 48) { rgba[4 * it] })
-            hologram.output(Placement(ModulatorLayout.GREY, flipX = true), 2).use { image ->
-                assertEquals(1, image.pixelBytes)
-                image.useBytes { assertEquals(levels[2 * 64 * 48 + 63], it.get(0)) }
+            val blue = direct(64 * 48).also { hologram.writeOutput(Placement(ModulatorLayout.GREY, flipX = true), it, index = 2) }
+            assertEquals(levels[2 * 64 * 48 + 63], blue[0])
+            val words = direct(2 * 64 * 48).also { hologram.writeOutput(Placement(ModulatorLayout.GREY16), it) }
+            assertEquals(levels[0], words[1])
+            assertRefused<PhasefrontException.Setting>("no image 1") { hologram.writeOutput(Placement(ModulatorLayout.RGBA), rgba, index = 1) }
+            assertRefused<PhasefrontException.Setting>("48 rows") { hologram.writeOutput(Placement(ModulatorLayout.RGBA), direct(8)) }
+        }
+    }
+
+    @Test
+    fun aModulatorIsTakenByItsName() {
+        assertTrue("ti-plm-p47" in modulatorNames())
+        assertRefused<PhasefrontException.Display>("holoeye-pluto") { Modulator.named("pluto") }
+        Modulator.fromToml("width = 64\nheight = 48\npacking = \"grey\"\nflip_x = true").use { modulator ->
+            assertEquals(OutputSize(width = 64, height = 48, pixelBytes = 1, images = 3), modulator.outputSize)
+            HologramSession(sessionOptions(modulator.target, network), RunningMode.IMAGE).use { it.processBlocking(still()) }.use { hologram ->
+                val green = direct(64 * 48).also { modulator.writeOutput(hologram, it, index = 1) }
+                assertEquals(hologram.levels()[64 * 48 + 63], green[0])
+                assertRefused<PhasefrontException.Setting>("no image 3") { modulator.writeOutput(hologram, green, index = 3) }
+                Modulator.named("ti-plm-p47").use { other ->
+                    assertRefused<PhasefrontException.Setting>("lasers") { other.writeOutput(hologram, green) }
+                }
             }
-            assertRefused<PhasefrontException.Setting>("no image 1") { hologram.output(index = 1) }
         }
     }
 
@@ -164,6 +186,35 @@ class SessionTest {
         assertEquals(50, statistics.submitted)
         assertEquals(50, statistics.processed + statistics.dropped.total)
         assertEquals(0, statistics.listenerFailures)
+    }
+
+    @Test
+    fun processCanSuspend() = runBlocking {
+        HologramSession(options(), RunningMode.IMAGE).use { session ->
+            val levels = session.process(still()).use { it.levels() }
+            assertContentEquals(session.processBlocking(still()).use { it.levels() }, levels)
+        }
+    }
+
+    @Test
+    fun heatMovesThePhonesQualityLevel() = runBlocking {
+        val session = HologramSession(phoneOptions(display), RunningMode.LIVE)
+        session.setThermal(Thermal.CRITICAL)
+        session.submit(still(1))
+        val sizes = mutableListOf<Int>()
+        var change: QualityChange? = null
+        session.events.collect { event ->
+            when (event) {
+                is SessionEvent.Processed -> {
+                    sizes += event.hologram.use { it.info.width }
+                    if (sizes.size == 1) session.submit(still(40_000_000)) else session.close()
+                }
+                is SessionEvent.QualityChanged -> change = event.change
+                else -> error("$event")
+            }
+        }
+        assertEquals(QualityChange(0, 2, QualityReason.THERMAL), change)
+        assertEquals(listOf(64, 32), sizes)
     }
 
     @Test
@@ -245,12 +296,12 @@ class SessionTest {
 
     @Test
     fun threadsShareASession() = image { session ->
-        val want = session.process(still()).use { it.levels() }
+        val want = session.processBlocking(still()).use { it.levels() }
         val wrong = LinkedBlockingQueue<Any>()
         List(4) {
             thread {
                 repeat(10) {
-                    val got = session.process(still()).use { it.levels() }
+                    val got = session.processBlocking(still()).use { it.levels() }
                     if (!got.contentEquals(want)) wrong.add(got)
                 }
             }
@@ -261,10 +312,10 @@ class SessionTest {
     @Test
     fun aClosedSessionSaysSo() {
         val session = HologramSession(options(), RunningMode.IMAGE)
-        session.process(still()).close()
+        session.processBlocking(still()).close()
         session.close()
         session.close()
-        val calls = listOf({ session.process(still()) }, session::warmUp, session::reset, session::pause, session::resume)
+        val calls = listOf({ session.processBlocking(still()) }, session::warmUp, session::reset, session::pause, session::resume)
         for (call in calls) assertRefused<PhasefrontException.Session>("closed; make a new one") { call() }
         assertEquals(1L, session.statistics.processed)
     }
@@ -273,14 +324,14 @@ class SessionTest {
     fun aPausedSessionRefusesAndAResetLetsTimeBeginAnew() {
         HologramSession(options(), RunningMode.VIDEO).use { session ->
             session.warmUp()
-            session.process(still(100)).close()
-            assertRefused<PhasefrontException.Timestamp>("99 ns") { session.process(still(99)) }
+            session.processBlocking(still(100)).close()
+            assertRefused<PhasefrontException.Timestamp>("99 ns") { session.processBlocking(still(99)) }
             session.reset()
-            session.process(still(1)).close()
+            session.processBlocking(still(1)).close()
             session.pause()
-            assertRefused<PhasefrontException.Session>("paused") { session.process(still(2)) }
+            assertRefused<PhasefrontException.Session>("paused") { session.processBlocking(still(2)) }
             session.resume()
-            session.process(still(3)).close()
+            session.processBlocking(still(3)).close()
         }
     }
 
@@ -288,7 +339,7 @@ class SessionTest {
     fun modesAreNotMixed() {
         image { session -> assertRefused<PhasefrontException.Session>("not live") { session.submit(still()) } }
         HologramSession(options(), RunningMode.LIVE) {}.use { session ->
-            assertRefused<PhasefrontException.Session>("submitted") { session.process(still()) }
+            assertRefused<PhasefrontException.Session>("submitted") { session.processBlocking(still()) }
         }
         assertRefused<PhasefrontException.Session>("listener") { HologramSession(options(), RunningMode.IMAGE) {} }
         image { session -> runBlocking { assertEquals(listOf(), session.events.toList()) } }
@@ -319,7 +370,7 @@ class SessionTest {
             val defaults = sessionOptions(display.copy(offsetMm = offset))
             assertIs<HologramMethod.Trained>(defaults.qualityLevels[0].method)
             assertTrue(defaults.encoding is Encoding.AntiAlias)
-            HologramSession(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+            HologramSession(defaults, RunningMode.IMAGE).use { session -> session.processBlocking(still()).close() }
         }
     }
 
@@ -327,13 +378,13 @@ class SessionTest {
     fun thePairThatIsBuiltInCanBeTaken() {
         val pair = builtInPair(6.0)
         val options = sessionOptions(display.copy(offsetMm = 6.0), pair.hologram).copy(encoding = Encoding.Deep(pair.prefilter))
-        HologramSession(options, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+        HologramSession(options, RunningMode.IMAGE).use { session -> session.processBlocking(still()).close() }
     }
 
     @Test
     fun stepsAndDarkCanBeSet() {
         fun levels(options: SessionOptions) =
-            HologramSession(options, RunningMode.IMAGE).use { session -> session.process(still()).use { it.levels() } }
+            HologramSession(options, RunningMode.IMAGE).use { session -> session.processBlocking(still()).use { it.levels() } }
         val defaults = sessionOptions(display)
         assertContentEquals(levels(defaults), levels(defaults.copy(darkThreshold = 0.4f, localSteps = 1)))
         assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(localSteps = 0))))
@@ -348,7 +399,7 @@ class SessionTest {
     fun withoutANetworkTheSweepIsTheDefault() {
         val defaults = sessionOptions(display.copy(pitchUm = 3.74))
         assertIs<HologramMethod.Sweep>(defaults.qualityLevels[0].method)
-        HologramSession(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+        HologramSession(defaults, RunningMode.IMAGE).use { session -> session.processBlocking(still()).close() }
         assertRefused<PhasefrontException.Network>("pairs for 0, 6, 12 mm") { builtInPair(3.0) }
     }
 
@@ -366,7 +417,7 @@ class SessionTest {
         val target = HologramTarget.withLookUpTable(display, ByteArray(256) { it.toByte() })
         val options = sessionOptions(target)
         assertEquals(display, options.target.display())
-        fun levels(options: SessionOptions) = HologramSession(options, RunningMode.IMAGE).use { it.process(still()).use { made -> made.levels() } }
+        fun levels(options: SessionOptions) = HologramSession(options, RunningMode.IMAGE).use { it.processBlocking(still()).use { made -> made.levels() } }
         // This table has equal steps.
         assertContentEquals(levels(sessionOptions(display)), levels(options))
     }
@@ -402,9 +453,9 @@ class SessionTest {
     fun stagesBeginAndEnd() {
         val stages = Collections.synchronizedList(mutableListOf<Pair<Stage, Boolean>>())
         HologramTrace.send { stage, begins -> stages.add(stage to begins) }
-        image { it.process(still()).close() }
+        image { it.processBlocking(still()).close() }
         HologramTrace.send(null)
-        image { it.process(still()).close() }
+        image { it.processBlocking(still()).close() }
         val inside = listOf(Stage.COLOUR, Stage.DEPTH, Stage.METHOD, Stage.PROPAGATE, Stage.ENCODE)
         val ended = stages.filterNot { it.second }.map { it.first }
         assertEquals(listOf(Stage.PLAN, Stage.FRAME) + inside, stages.filter { it.second }.map { it.first })
@@ -423,7 +474,7 @@ class SessionTest {
             val frame = still()
             val sum = LongArray(1)
             fun frames(count: Int) = repeat(count) {
-                session.process(frame).use { hologram -> hologram.usePlane(Colour.BLUE) { sum[0] += it.get(0).toLong() } }
+                session.processBlocking(frame).use { hologram -> hologram.usePlane(Colour.BLUE) { sum[0] += it.get(0).toLong() } }
             }
             frames(1000)
             val before = residentMb()

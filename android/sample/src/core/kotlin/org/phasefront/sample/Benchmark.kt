@@ -122,9 +122,9 @@ class Benchmark(
     /** Returns the times of each stage and adds the total time and the backend to [json]. */
     private fun spreads(run: Run, display: HologramDisplay, json: JSONObject): Map<Stage, Spread> {
         return HologramSession(run.options(display), RunningMode.IMAGE).use { session ->
-            repeat(WARM) { session.process(scene()).close() }
+            repeat(WARM) { session.processBlocking(scene()).close() }
             val begun = System.nanoTime()
-            val times = List(frames) { session.process(scene()).use { it.info.times } }
+            val times = List(frames) { session.processBlocking(scene()).use { it.info.times } }
             val statistics = session.statistics
             json.put("frames", frames).put("seconds", (System.nanoTime() - begun) / 1e9).put("behind", conditions())
                 .put("backend", statistics.backend).put("why", statistics.backendWhy)

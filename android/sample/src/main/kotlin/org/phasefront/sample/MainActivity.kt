@@ -4,11 +4,11 @@ import android.Manifest
 import android.app.Activity
 import android.content.Intent
 import android.content.pm.PackageManager
-import android.graphics.Bitmap
 import android.hardware.display.DisplayManager
 import android.os.Build
 import android.os.Bundle
 import android.os.PowerManager
+import android.util.Log
 import android.view.Gravity
 import android.view.MotionEvent
 import android.view.Surface
@@ -19,6 +19,8 @@ import android.widget.LinearLayout
 import android.widget.SeekBar
 import android.widget.TextView
 import android.widget.Toast
+import java.util.concurrent.Executors
+import org.phasefront.CameraFrame
 import org.phasefront.Hologram
 import org.phasefront.HologramDisplay
 import org.phasefront.HologramLog
@@ -26,10 +28,11 @@ import org.phasefront.HologramSession
 import org.phasefront.PhasefrontException
 import org.phasefront.RunningMode
 import org.phasefront.SessionEvent
+import org.phasefront.phoneOptions
 import org.phasefront.sendToLogcat
-import org.phasefront.sessionOptions
 import org.phasefront.thermalOf
-import org.phasefront.toBitmap
+import org.phasefront.writeOutput
+import org.phasefront.writePreview
 
 /**
  * Converts the camera or the sample scene to holograms. Shows the displayed image focused by the slider or a tap, the
@@ -39,16 +42,40 @@ class MainActivity : Activity() {
     private lateinit var preview: ImageView
     private lateinit var focus: SeekBar
     private lateinit var statistics: TextView
-    private var session: HologramSession? = null
+
+    /** Plans and closes sessions and opens cameras, one after another, because each takes long. */
+    private val work = Executors.newSingleThreadExecutor()
+
+    /** Written on the thread of [work]. */
+    @Volatile private var session: HologramSession? = null
     private var source: FrameSource? = null
     private var output: PhaseOutput? = null
     private val hologramDisplay = HologramDisplay(width = 960, height = 540)
+    private val views = Bitmaps(hologramDisplay.width / 2, hologramDisplay.height / 2)
+    private val levels = Bitmaps(hologramDisplay.width, hologramDisplay.height)
+    private var wasAsked = false
 
     /** The focus, written on the main thread and read on the session's thread. */
     @Volatile private var zMm = 0.0
 
+    /** Whether an external screen shows the levels, written on the main thread and read on the session's thread. */
+    @Volatile private var needsLevels = false
+
     /** The latest hologram, for taps. Only the main thread uses it. */
     private var latest: Hologram? = null
+
+    private val screens = object : DisplayManager.DisplayListener {
+        override fun onDisplayAdded(id: Int) = showOnExternalScreen()
+
+        override fun onDisplayRemoved(id: Int) = showOnExternalScreen()
+
+        override fun onDisplayChanged(id: Int) = Unit
+    }
+    private val thermal = if (Build.VERSION.SDK_INT < Build.VERSION_CODES.Q) {
+        null
+    } else {
+        PowerManager.OnThermalStatusChangedListener { status -> work.execute { session?.setThermal(thermalOf(status)) } }
+    }
 
     override fun onCreate(savedInstanceState: Bundle?) {
         super.onCreate(savedInstanceState)
@@ -87,40 +114,46 @@ class MainActivity : Activity() {
 
     override fun onStart() {
         super.onStart()
-        if (checkSelfPermission(Manifest.permission.CAMERA) == PackageManager.PERMISSION_GRANTED) {
+        getSystemService(DisplayManager::class.java).registerDisplayListener(screens, null)
+        showOnExternalScreen()
+        if (hasCamera() || wasAsked) {
             run()
         } else {
+            wasAsked = true
             requestPermissions(arrayOf(Manifest.permission.CAMERA), 0)
         }
     }
 
     override fun onRequestPermissionsResult(request: Int, permissions: Array<out String>, results: IntArray) {
         super.onRequestPermissionsResult(request, permissions, results)
+        if (!hasCamera()) say("without the permission for the camera, this is the sample scene")
         run()
     }
 
+    private fun hasCamera(): Boolean = checkSelfPermission(Manifest.permission.CAMERA) == PackageManager.PERMISSION_GRANTED
+
     private fun run() {
-        if (session != null) return
+        val degrees = displayDegrees()
+        work.execute {
+            if (session != null) return@execute
+            try {
+                session = HologramSession(phoneOptions(hologramDisplay), RunningMode.LIVE, ::heard)
+            } catch (refused: PhasefrontException) {
+                return@execute runOnUiThread { say(refused.message.orEmpty()) }
+            }
+            val camera = if (hasCamera()) CameraSource.find(this, degrees) else null
+            source = (camera ?: SampleSource(assets)).also { it.start(::submit) { message -> runOnUiThread { say(message) } } }
+        }
+        if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q && thermal != null) {
+            getSystemService(PowerManager::class.java).addThermalStatusListener(thermal)
+        }
+    }
+
+    private fun submit(frame: CameraFrame) {
         try {
-            session = HologramSession(sessionOptions(hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE, ::heard)
+            session?.submit(frame)
         } catch (refused: PhasefrontException) {
-            return say(refused.message.orEmpty())
-        }
-        showOnExternalScreen()
-        if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q) {
-            getSystemService(PowerManager::class.java).addThermalStatusListener(mainExecutor) { session?.setThermal(thermalOf(it)) }
-        }
-        val granted = checkSelfPermission(Manifest.permission.CAMERA) == PackageManager.PERMISSION_GRANTED
-        val camera = if (granted) CameraSource.find(this, displayDegrees()) else null
-        if (camera == null) say("no camera with depth: this is the sample scene")
-        source = (camera ?: SampleSource(assets)).also { source ->
-            source.start({ frame ->
-                try {
-                    session?.submit(frame)
-                } catch (refused: PhasefrontException) {
-                    android.util.Log.w("sample", refused.message.orEmpty())
-                }
-            }, { message -> runOnUiThread { say(message) } })
+            Log.w("sample", refused.message.orEmpty())
         }
     }
 
@@ -128,20 +161,21 @@ class MainActivity : Activity() {
     private fun heard(event: SessionEvent) {
         if (event !is SessionEvent.Processed) return
         val hologram = event.hologram
-        val view = hologram.preview(zMm, hologramDisplay.width / 2, hologramDisplay.height / 2).use { it.toBitmap() }
-        val levels: Bitmap? = output?.let { hologram.output().use { image -> image.toBitmap() } }
+        val view = views.next().also { hologram.writePreview(zMm, it) }
+        val image = if (needsLevels) levels.next().also { hologram.writeOutput(it) } else null
+        val told = describe()
         runOnUiThread {
             latest?.close()
             latest = hologram
             preview.setImageBitmap(view)
-            levels?.let { output?.show(it) }
-            statistics.text = describe()
+            image?.let { output?.show(it) }
+            statistics.text = told
         }
     }
 
     private fun describe(): String {
         val of = session?.statistics ?: return ""
-        return "%.1f holograms a second, %d dropped of %d\n%s: %.1f ms, of which the network takes %.1f".format(
+        return "%.1f holograms a second, %d dropped of %d\n%s: %.1f ms, of which the method takes %.1f".format(
             of.rateHz,
             of.dropped.total,
             of.submitted,
@@ -158,9 +192,13 @@ class MainActivity : Activity() {
         return true
     }
 
+    /** Shows the levels on the first external screen, which may have come or gone. */
     private fun showOnExternalScreen() {
-        val screens = getSystemService(DisplayManager::class.java).getDisplays(DisplayManager.DISPLAY_CATEGORY_PRESENTATION)
-        output = screens.firstOrNull()?.let { PhaseOutput(this, it).apply { show() } }
+        val found = getSystemService(DisplayManager::class.java).getDisplays(DisplayManager.DISPLAY_CATEGORY_PRESENTATION)
+        if (output?.display?.displayId == found.firstOrNull()?.displayId) return
+        output?.dismiss()
+        output = found.firstOrNull()?.let { PhaseOutput(this, it).apply { show() } }
+        needsLevels = output != null
     }
 
     @Suppress("DEPRECATION") // The newer call needs API 30.
@@ -175,15 +213,29 @@ class MainActivity : Activity() {
 
     override fun onStop() {
         super.onStop()
-        source?.close()
-        source = null
-        // Closing waits for the listener, which only posts to this thread and therefore never blocks on it.
-        session?.close()
-        session = null
+        getSystemService(DisplayManager::class.java).unregisterDisplayListener(screens)
+        if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q && thermal != null) {
+            getSystemService(PowerManager::class.java).removeThermalStatusListener(thermal)
+        }
+        work.execute {
+            source?.close()
+            source = null
+            session?.close()
+            session = null
+            // Behind what the listener has posted.
+            runOnUiThread {
+                latest?.close()
+                latest = null
+            }
+        }
         output?.dismiss()
         output = null
-        latest?.close()
-        latest = null
+        needsLevels = false
+    }
+
+    override fun onDestroy() {
+        super.onDestroy()
+        work.shutdown()
     }
 
     private companion object {

@@ -1,0 +1,203 @@
+//! The images that a modulator's input takes of a hologram, and back.
+
+use super::modulator::{ModulatorSpec, Packing};
+use super::{BitPlanes, Output, Placement};
+use crate::display::levels::Levels;
+use crate::display::target::Target;
+use crate::runtime::error::{Error, Result};
+
+/// The size and the number of the images that a modulator's input takes of a hologram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OutputSize {
+    /// The height of an image in pixels.
+    pub height: usize,
+    /// The width of an image in pixels.
+    pub width: usize,
+    /// The number of bytes of a pixel.
+    pub pixel_bytes: usize,
+    /// The number of images: one, or one for each colour.
+    pub images: usize,
+}
+
+/// A plan for the input of one modulator and holograms of one shape. It is immutable and can be shared between threads.
+#[derive(Debug, Clone)]
+pub struct ModulatorInput {
+    size: OutputSize,
+    colours: usize,
+    plan: Plan,
+}
+
+#[derive(Debug, Clone)]
+enum Plan {
+    Planes(BitPlanes),
+    Images(Box<Output>),
+}
+
+impl ModulatorSpec {
+    /// Returns the size of the images that the modulator's input takes.
+    #[doc(hidden)]
+    pub fn output_size(&self) -> OutputSize {
+        let (height, width) = (self.display.height(), self.display.width());
+        match &self.packing {
+            Packing::Images(layout) => OutputSize {
+                height,
+                width,
+                pixel_bytes: layout.pixel_bytes(),
+                images: layout.images(self.display.colours()),
+            },
+            // Two cells along each axis, and red, green and blue for each.
+            Packing::BitPlanes(_) => OutputSize {
+                height: 2 * height,
+                width: 2 * width,
+                pixel_bytes: 3,
+                images: 1,
+            },
+        }
+    }
+
+    /// Plans the images of holograms of `shape` = (H, W) for `target`. A smaller hologram lies in the middle of the
+    /// modulator.
+    ///
+    /// # Errors
+    /// Returns an error if the target has another number of lasers or bits, or if the hologram is larger than the
+    /// modulator; with bit planes, also if it is smaller.
+    #[doc(hidden)]
+    pub fn input(&self, shape: (usize, usize), target: &Target) -> Result<ModulatorInput> {
+        let (own, theirs) = (&self.display, &target.display);
+        if (theirs.colours(), theirs.bits()) != (own.colours(), own.bits()) {
+            return Err(Error::Setting(format!(
+                "the hologram has {} lasers and levels of {} bits, the modulator {} and {}; make it for the modulator's target",
+                theirs.colours(),
+                theirs.bits(),
+                own.colours(),
+                own.bits()
+            )));
+        }
+        let (flip_x, flip_y) = (self.flip_x, self.flip_y);
+        let plan = match &self.packing {
+            Packing::BitPlanes(cells) => {
+                let modulator = (self.display.height(), self.display.width());
+                if shape != modulator {
+                    return Err(Error::Setting(format!(
+                        "a hologram of {}×{} for a modulator of {}×{} pixels; for bit planes both must be of one size",
+                        shape.1, shape.0, modulator.1, modulator.0
+                    )));
+                }
+                Plan::Planes(BitPlanes::new(cells, shape, flip_x, flip_y))
+            }
+            Packing::Images(layout) => {
+                let placement = Placement {
+                    flip_x,
+                    flip_y,
+                    ..Placement::centred(*layout)
+                };
+                Plan::Images(Box::new(Output::new(&self.target()?, shape, placement)?))
+            }
+        };
+        Ok(ModulatorInput {
+            size: self.output_size(),
+            colours: self.display.colours(),
+            plan,
+        })
+    }
+}
+
+impl ModulatorInput {
+    /// Writes image `image` of a hologram of `levels`, (C, H, W), into `bytes`, whose rows begin `row_stride` bytes
+    /// apart.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such image, `bytes` cannot hold it, or the levels have another number of values
+    /// or bits.
+    pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8], row_stride: usize) -> Result<()> {
+        if image >= self.size.images {
+            return Err(Error::Setting(format!(
+                "there is no image {image}; the modulator takes {}",
+                self.size.images
+            )));
+        }
+        match (&self.plan, levels) {
+            (Plan::Planes(plan), Levels::Bytes(levels)) => {
+                let maps: Vec<_> = levels.chunks_exact(levels.len() / self.colours).collect();
+                plan.pack(&maps, bytes, row_stride)
+            }
+            (Plan::Planes(_), Levels::Words(_)) => {
+                Err(Error::Setting("levels of over 8 bits have no bit planes".into()))
+            }
+            (Plan::Images(plan), levels) => plan.write(levels, image, bytes, row_stride),
+        }
+    }
+
+    /// Reads `levels`, (C, H, W), back from all images, which follow one another in `bytes` without gaps.
+    ///
+    /// # Errors
+    /// Returns an error for another number of bytes, or if the cells of a pixel are those of no level.
+    ///
+    /// # Panics
+    /// Panics if `levels` does not have the planned length.
+    pub fn read(&self, bytes: &[u8], levels: &mut [u16]) -> Result<()> {
+        let OutputSize {
+            height,
+            width,
+            pixel_bytes,
+            images,
+        } = self.size;
+        let image = height * width * pixel_bytes;
+        if bytes.len() != images * image {
+            return Err(Error::Setting(format!(
+                "the images have {} bytes; {} are the modulator's",
+                bytes.len(),
+                images * image
+            )));
+        }
+        match &self.plan {
+            Plan::Planes(plan) => {
+                let mut plane = vec![0; levels.len() / self.colours];
+                for (colour, levels) in levels.chunks_exact_mut(plane.len()).enumerate() {
+                    // Each colour has its share of the 24 planes.
+                    plan.unpack(bytes, colour * (24 / self.colours), &mut plane)?;
+                    (levels.iter_mut().zip(&plane)).for_each(|(level, byte)| *level = (*byte).into());
+                }
+                Ok(())
+            }
+            Plan::Images(plan) => {
+                (bytes.chunks_exact(image).enumerate()).try_for_each(|(n, bytes)| plan.read(bytes, n, levels))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn every_bundled_modulator_gives_back_its_levels() {
+        for name in ModulatorSpec::names() {
+            let spec = ModulatorSpec::shipped(name).unwrap();
+            let (display, size) = (&spec.display, spec.output_size());
+            let shape = (display.height(), display.width());
+            let input = spec.input(shape, &spec.target().unwrap()).unwrap();
+            let count = display.colours() * shape.0 * shape.1;
+            let words: Vec<u16> = (0..count).map(|i| (i * 37 % (1 << display.bits())) as u16).collect();
+            let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
+            let levels = match display.bits() {
+                0..=8 => Levels::Bytes(&bytes),
+                _ => Levels::Words(&words),
+            };
+            let row = size.width * size.pixel_bytes;
+            let mut images = vec![0; size.images * size.height * row];
+            for (n, image) in images.chunks_exact_mut(size.height * row).enumerate() {
+                input.write(levels, n, image, row).unwrap();
+            }
+            let mut read = vec![0; count];
+            input.read(&images, &mut read).unwrap();
+            assert!(read == words, "{name}");
+            assert!(input.write(levels, size.images, &mut images, row).is_err());
+            assert!(input.read(&images[1..], &mut read).is_err());
+            let target = spec.target().unwrap();
+            assert!(spec.input((shape.0 + 1, shape.1), &target).is_err());
+        }
+    }
+}
