@@ -30,8 +30,8 @@ pub enum YuvMatrix {
     Bt709,
 }
 
-/// The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
-/// are not finite mean no reading.
+/// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers
+/// and numbers that are not finite mean no reading.
 #[uniffi::remote(Enum)]
 #[non_exhaustive]
 pub enum DepthFormat {
@@ -52,6 +52,11 @@ pub enum DepthFormat {
     NormalizedU8,
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16,
+    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
+    /// are not finite mean no reading.
+    RelativeF32,
+    /// Relative inverse depth as 16-bit floats.
+    RelativeF16,
 }
 
 /// The memory layout of a confidence map.

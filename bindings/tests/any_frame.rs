@@ -122,9 +122,11 @@ fn frame(random: &mut Random, timestamp_ns: i64) -> (FrameInfo, [Vec<u8>; 5]) {
         DepthFormat::AndroidDepth16,
         DepthFormat::NormalizedU8,
         DepthFormat::NormalizedU16,
+        DepthFormat::RelativeF32,
+        DepthFormat::RelativeF16,
     ]);
     let pixel = match depth_format {
-        DepthFormat::MetresF32 | DepthFormat::DisparityF32 => 4,
+        DepthFormat::MetresF32 | DepthFormat::DisparityF32 | DepthFormat::RelativeF32 => 4,
         DepthFormat::NormalizedU8 => 1,
         _ => 2,
     };

@@ -144,6 +144,8 @@ fn info(frame: &Value) -> FrameInfo {
                 "android-depth16" => DepthFormat::AndroidDepth16,
                 "normalized-u8" => DepthFormat::NormalizedU8,
                 "normalized-u16" => DepthFormat::NormalizedU16,
+                "relative-f32" => DepthFormat::RelativeF32,
+                "relative-f16" => DepthFormat::RelativeF16,
                 other => panic!("{other}"),
             },
             width: int(&depth["width"]),
@@ -409,6 +411,14 @@ mod write {
                     }
                     "normalized-u8" => vec![byte(normalized)],
                     "normalized-u16" => ((normalized * 65535.0) as u16).to_le_bytes().to_vec(),
+                    "relative-f32" => (if hole(x, y) {
+                        f32::NAN
+                    } else {
+                        1.0 - metres as f32
+                    })
+                    .to_le_bytes()
+                    .to_vec(),
+                    "relative-f16" => f16_bits(5.0 - 2.0 * metres).to_le_bytes().to_vec(),
                     other => panic!("{other}"),
                 }
             });
@@ -603,6 +613,14 @@ mod write {
         let mut one = case("a display of one laser", vec![cases[0]["frames"][0].clone()]);
         one["display"] = json!(format!("{display}wavelengths_nm = [532]\n"));
         cases.push(one);
+
+        for format in ["relative-f32", "relative-f16"] {
+            let frame = still(
+                frames.colour("rgba", 64, 48, "bt601", false, 0.0),
+                frames.depth(format, 32, 24, 0.0),
+            );
+            cases.push(case(&format!("depth of a network, {format}"), vec![frame]));
+        }
 
         let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0).levels).collect();
         let folder = folder();

@@ -97,6 +97,8 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
         DepthFormat::AndroidDepth16,
         DepthFormat::NormalizedU8,
         DepthFormat::NormalizedU16,
+        DepthFormat::RelativeF32,
+        DepthFormat::RelativeF16,
     ]);
     let (depth_width, depth_height) = (numbers.size(), numbers.size());
     let depth_strides = (numbers.size().wrapping_mul(4), numbers.size());

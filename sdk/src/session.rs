@@ -10,6 +10,11 @@
 //! [`phasefront_core::pipeline::Pipeline`] processes a single frame without a camera's formats.
 
 mod computing;
+#[cfg(feature = "tract")]
+mod depth_estimates;
+#[cfg(not(feature = "tract"))]
+#[path = "session/no_depth_estimates.rs"]
+mod depth_estimates;
 mod drop_reason;
 mod engine;
 mod event;
@@ -41,6 +46,7 @@ pub use phasefront_gpu::DeviceOptions;
 pub use quality::{Backend, Quality, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, Statistics};
 
+use depth_estimates::DepthEstimates;
 use handle::Frames;
 use live::{Live, guarded, lock};
 use live_work::{LiveWork, tell};
@@ -175,7 +181,8 @@ impl LiveSession {
             ));
         }
         let period_ns = options.target_rate_hz.map(|rate| (1e9 / rate) as u64);
-        let shared = Shared::new(options)?;
+        let estimates = DepthEstimates::on_own_thread(&options)?;
+        let shared = Shared::new(options, estimates)?;
         let of = shared.clone();
         let listener = move |report| tell(&of, &mut listener, report);
         let live = Arc::new(Live::start(LiveWork(shared.clone()), period_ns, listener)?);
@@ -241,7 +248,8 @@ struct Answering {
 
 impl Answering {
     fn new(options: SessionOptions) -> Result<Self> {
-        let shared = Shared::new(options)?;
+        let estimates = DepthEstimates::for_each_frame(&options);
+        let shared = Shared::new(options, estimates)?;
         let gate = Arc::new(Mutex::new(Gate::new(shared.cancel.clone())));
         let frames = Frames::Answered(gate.clone());
         let handle = SessionHandle { shared, frames };

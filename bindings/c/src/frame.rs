@@ -64,9 +64,14 @@ pub enum PfDepthFormat {
     NormalizedU8 = 6,
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16 = 7,
+    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
+    /// are not finite mean no reading.
+    RelativeF32 = 8,
+    /// Relative inverse depth as 16-bit floats.
+    RelativeF16 = 9,
 }
 
-const DEPTH_FORMATS: [DepthFormat; 8] = [
+const DEPTH_FORMATS: [DepthFormat; 10] = [
     DepthFormat::MetresF32,
     DepthFormat::MetresF16,
     DepthFormat::DisparityF32,
@@ -75,6 +80,8 @@ const DEPTH_FORMATS: [DepthFormat; 8] = [
     DepthFormat::AndroidDepth16,
     DepthFormat::NormalizedU8,
     DepthFormat::NormalizedU16,
+    DepthFormat::RelativeF32,
+    DepthFormat::RelativeF16,
 ];
 
 /// The memory layout of a confidence map.
@@ -352,6 +359,8 @@ mod tests {
             D::AndroidDepth16,
             D::NormalizedU8,
             D::NormalizedU16,
+            D::RelativeF32,
+            D::RelativeF16,
         ];
         of(&depths.map(|d| d as u32));
         same(

@@ -51,7 +51,8 @@ static uint32_t pick(const char *name, const char *const *names, uint32_t count)
 static const char *const COLOURS[] = {"rgba", "bgra", "rgb", "nv12", "yuv420"};
 static const char *const MATRICES[] = {"bt601", "bt709"};
 static const char *const DEPTHS[] = {"metres-f32",      "metres-f16",      "disparity-f32", "disparity-f16",
-                                     "millimetres-u16", "android-depth16", "normalized-u8", "normalized-u16"};
+                                     "millimetres-u16", "android-depth16", "normalized-u8", "normalized-u16",
+                                     "relative-f32",    "relative-f16"};
 static const char *const CONFIDENCES[] = {"low-medium-high", "u8"};
 static const char *const MODES[] = {"image", "video"};
 

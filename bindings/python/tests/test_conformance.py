@@ -38,6 +38,8 @@ DEPTH = {
     "android-depth16": (DepthFormat.ANDROID_DEPTH16, "<u2"),
     "normalized-u8": (DepthFormat.NORMALIZED_U8, "u1"),
     "normalized-u16": (DepthFormat.NORMALIZED_U16, "<u2"),
+    "relative-f32": (DepthFormat.RELATIVE_F32, "<f4"),
+    "relative-f16": (DepthFormat.RELATIVE_F16, "<f2"),
 }
 TURN = {0: Rotation.UPRIGHT, 90: Rotation.CLOCKWISE90, 180: Rotation.HALF, 270: Rotation.CLOCKWISE270}
 ENCODING = {

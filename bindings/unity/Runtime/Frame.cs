@@ -48,6 +48,10 @@ namespace Phasefront
         NormalizedU8 = 6,
         /// <summary>0 nearest to 65535 farthest; every pixel is a reading.</summary>
         NormalizedU16 = 7,
+        /// <summary>Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale.</summary>
+        RelativeF32 = 8,
+        /// <summary>Relative inverse depth as 16-bit floats.</summary>
+        RelativeF16 = 9,
     }
 
     /// <summary>The memory layout of a confidence map.</summary>

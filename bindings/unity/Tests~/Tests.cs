@@ -16,7 +16,7 @@ internal static class Tests
     private static readonly string[] Depths =
     {
         "metres-f32", "metres-f16", "disparity-f32", "disparity-f16", "millimetres-u16", "android-depth16",
-        "normalized-u8", "normalized-u16",
+        "normalized-u8", "normalized-u16", "relative-f32", "relative-f16",
     };
     private static readonly string[] Confidences = { "low-medium-high", "u8" };
     private static readonly string[] Modes = { "image", "video" };

@@ -124,9 +124,11 @@ impl RawFrame {
             "android-depth16" => DepthFormat::AndroidDepth16,
             "normalized-u8" => DepthFormat::NormalizedU8,
             "normalized-u16" => DepthFormat::NormalizedU16,
+            "relative-f32" => DepthFormat::RelativeF32,
+            "relative-f16" => DepthFormat::RelativeF16,
             other => {
                 let known = "metres-f32, metres-f16, disparity-f32, disparity-f16, millimetres-u16, android-depth16, \
-                             normalized-u8, normalized-u16";
+                             normalized-u8, normalized-u16, relative-f32, relative-f16";
                 return Err(unknown("depth format", other, known));
             }
         };

@@ -116,8 +116,8 @@ extension DepthFormat {
     public var pixelBytes: Int {
         switch self {
         case .normalizedU8: 1
-        case .metresF32, .disparityF32: 4
-        case .metresF16, .disparityF16, .millimetresU16, .androidDepth16, .normalizedU16: 2
+        case .metresF32, .disparityF32, .relativeF32: 4
+        case .metresF16, .disparityF16, .millimetresU16, .androidDepth16, .normalizedU16, .relativeF16: 2
         }
     }
 }

@@ -57,6 +57,7 @@ final class ConformanceTests: XCTestCase {
         "metres-f32": .metresF32, "metres-f16": .metresF16, "disparity-f32": .disparityF32,
         "disparity-f16": .disparityF16, "millimetres-u16": .millimetresU16, "android-depth16": .androidDepth16,
         "normalized-u8": .normalizedU8, "normalized-u16": .normalizedU16,
+        "relative-f32": .relativeF32, "relative-f16": .relativeF16,
     ]
     private static let confidences: [String: ConfidenceFormat] = ["low-medium-high": .lowMediumHigh, "u8": .u8]
     private static let matrices: [String: YuvMatrix] = ["bt601": .bt601, "bt709": .bt709]

@@ -14,14 +14,17 @@
 //! | [`optics`] | propagation, Fourier transforms, aperture, aberrations |
 //! | [`display`] | the display, its modulator's response, its laser illumination, its correction |
 //! | [`frame`] | colour images, depth planes, conversion, resampling |
-//! | [`depth`] | units, hole filling, alignment, temporal smoothing, range, refinement |
+//! | [`depth`] | units, hole filling, alignment, temporal smoothing, range, conditioning |
 //! | [`method`] | from a frame to a complex field: networks, the plane sweep, both combined |
+//! | `depth_network` | depth from colour alone, by a network that the user supplies |
 //! | [`encode`] | from a field to phases: double phase, its filters, corrections, brightness |
 //! | [`pipeline`] | one frame through all stages |
 //! | [`output`] | from levels to modulator images; the catalogue of modulators |
 //! | [`view`] | refocused views, previews |
 
 pub mod depth;
+#[cfg(feature = "tract")]
+pub mod depth_network;
 pub mod display;
 pub mod encode;
 pub mod frame;

@@ -27,6 +27,7 @@ const LAYERS: &[&str] = &[
     "method::network",
     "method::seeded",
     "method",
+    "depth_network",
     "encode::brightness",
     "encode",
     "pipeline::display_plan",

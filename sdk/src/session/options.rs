@@ -4,11 +4,15 @@
 use super::engine::GpuOptions;
 use super::quality::{self, Backend, Quality, QualityLevel};
 use phasefront_core::depth::stream::DepthOptions;
+#[cfg(feature = "tract")]
+use phasefront_core::depth_network::DepthNetwork;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::method::Method;
 use phasefront_core::runtime::error::{Error, Result};
 use std::num::NonZeroUsize;
+#[cfg(feature = "tract")]
+use std::sync::Arc;
 
 /// The options of a session. [`SessionOptions::new`] sets the defaults.
 #[derive(Debug, Clone)]
@@ -28,6 +32,10 @@ pub struct SessionOptions {
     pub encoder: EncoderOptions,
     /// The processing of depth.
     pub depth: DepthOptions,
+    /// The network that estimates the depth of frames without depth. A live session runs it on its own thread, at the
+    /// network's own rate, so that the result depends on timing; other sessions run it for each frame.
+    #[cfg(feature = "tract")]
+    pub depth_network: Option<Arc<DepthNetwork>>,
     /// The backend of quality levels that do not set their own.
     pub backend: Backend,
     /// The options of the GPU.
@@ -68,6 +76,8 @@ impl SessionOptions {
             target_rate_hz: None,
             encoder: EncoderOptions::default(),
             depth: DepthOptions::default(),
+            #[cfg(feature = "tract")]
+            depth_network: None,
             backend: Backend::Cpu,
             #[cfg(feature = "gpu")]
             gpu: GpuOptions::default(),

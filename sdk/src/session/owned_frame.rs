@@ -32,7 +32,7 @@ impl OwnedPlane {
 struct Description {
     timestamp_ns: u64,
     colour: (ColourFormat, (usize, usize)),
-    depth: (DepthFormat, (usize, usize)),
+    depth: Option<(DepthFormat, (usize, usize))>,
     confidence: Option<ConfidenceFormat>,
     orientation: Orientation,
     alignment: Alignment,
@@ -53,8 +53,8 @@ impl OwnedFrame {
         let description = Description {
             timestamp_ns: frame.timestamp_ns,
             colour: (frame.colour.format(), frame.colour.shape()),
-            depth: (frame.depth.format(), frame.depth.shape()),
-            confidence: frame.depth.confidence().map(|(format, _)| format),
+            depth: frame.depth.map(|depth| (depth.format(), depth.shape())),
+            confidence: frame.depth.and_then(|depth| depth.confidence()).map(|(format, _)| format),
             orientation: frame.orientation,
             alignment: frame.alignment,
         };
@@ -70,9 +70,11 @@ impl OwnedFrame {
         for (to, plane) in copy.colour.iter_mut().zip(frame.colour.planes()) {
             to.copy(plane);
         }
-        copy.depth.copy(&frame.depth.plane());
-        if let Some((_, plane)) = frame.depth.confidence() {
-            copy.confidence.copy(&plane);
+        if let Some(depth) = &frame.depth {
+            copy.depth.copy(&depth.plane());
+            if let Some((_, plane)) = depth.confidence() {
+                copy.confidence.copy(&plane);
+            }
         }
         copy
     }
@@ -86,11 +88,16 @@ impl OwnedFrame {
         let (format, (height, width)) = d.colour;
         let planes: [Plane<'_>; 3] = std::array::from_fn(|i| self.colour[i].plane());
         let colour = ColourImage::new(format, width, height, &planes[..format.planes()])?;
-        let (format, (height, width)) = d.depth;
-        let mut depth = DepthImage::new(format, width, height, self.depth.plane())?;
-        if let Some(format) = d.confidence {
-            depth = depth.with_confidence(format, width, height, self.confidence.plane())?;
-        }
+        let depth = match d.depth {
+            Some((format, (height, width))) => {
+                let depth = DepthImage::new(format, width, height, self.depth.plane())?;
+                Some(match d.confidence {
+                    Some(format) => depth.with_confidence(format, width, height, self.confidence.plane())?,
+                    None => depth,
+                })
+            }
+            None => None,
+        };
         Ok(CameraFrame {
             timestamp_ns: d.timestamp_ns,
             colour,

@@ -1,6 +1,7 @@
 //! The state that a session's callers and its thread share.
 
 use super::computing::{self, Computing};
+use super::depth_estimates::DepthEstimates;
 use super::live::lock;
 use super::options::SessionOptions;
 use super::process_id::ProcessId;
@@ -35,7 +36,7 @@ pub(super) struct Control {
 impl Shared {
     /// # Errors
     /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
-    pub(super) fn new(options: SessionOptions) -> Result<Arc<Self>> {
+    pub(super) fn new(options: SessionOptions, estimates: Option<DepthEstimates>) -> Result<Arc<Self>> {
         options.check()?;
         let control = Control {
             quality_levels: options.quality_levels.len(),
@@ -43,7 +44,7 @@ impl Shared {
             thermal: Thermal::Nominal,
         };
         let cancel = Cancel::default();
-        let mut stages = Stages::new(options, cancel.clone())?;
+        let mut stages = Stages::new(options, estimates, cancel.clone())?;
         let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.quality_level());
         Ok(Arc::new(Shared {
             process: ProcessId::current(),

@@ -2,6 +2,7 @@
 //! is next.
 
 use super::SessionOptions;
+use super::depth_estimates::DepthEstimates;
 use super::engine::BrightnessTracker;
 use super::engine::FrameInput;
 use super::engine::OnCpu;
@@ -42,6 +43,8 @@ impl LevelPlan {
         &mut self,
         frame: &CameraFrame<'_>,
         elapsed: Option<Duration>,
+        estimates: Option<&mut DepthEstimates>,
+        cancel: &Cancel,
         times: &mut FrameTimes,
     ) -> Result<DepthReport> {
         let stage = stage!("colour");
@@ -71,7 +74,13 @@ impl LevelPlan {
         };
         times.colour = stage.end();
         let stage = stage!("depth");
-        let report = self.depth.next(frame, elapsed, rgb, depth)?;
+        let report = match estimates {
+            Some(estimates) if frame.depth.is_none() => {
+                let estimate = estimates.estimate(rgb, (height, width), elapsed.is_none(), cancel)?;
+                self.depth.next_estimate(&estimate, elapsed, rgb, depth)?
+            }
+            _ => self.depth.next(frame, elapsed, rgb, depth)?,
+        };
         times.depth = stage.end();
         Ok(report)
     }
@@ -84,6 +93,8 @@ pub(super) struct Stages {
     pool: Arc<Threads>,
     level_control: LevelControl,
     gpu: GpuState,
+    /// The depth of frames without depth, if there is a network for it.
+    estimates: Option<DepthEstimates>,
     /// The plan; `None` after a panic, so that it is created again.
     plan: Option<LevelPlan>,
     brightness: BrightnessTracker,
@@ -103,7 +114,7 @@ pub(super) struct FrameResult {
 
 impl Stages {
     /// Plans the stages. Requesting `cancel` gives up the current frame.
-    pub(super) fn new(options: SessionOptions, cancel: Cancel) -> Result<Self> {
+    pub(super) fn new(options: SessionOptions, estimates: Option<DepthEstimates>, cancel: Cancel) -> Result<Self> {
         let pool = Arc::new(Threads::start(options.threads)?);
         let start = match options.quality {
             Quality::Adaptive => 0,
@@ -117,6 +128,7 @@ impl Stages {
         let mut stages = Stages {
             level_control: LevelControl::new(options.quality_levels.len(), start),
             gpu: GpuState::default(),
+            estimates,
             plan: None,
             brightness: BrightnessTracker::default(),
             viewer: Arc::new(Viewer::new(options.target.clone(), pool.clone())),
@@ -279,9 +291,14 @@ impl Stages {
     pub(super) fn replay(&mut self, frame: &CameraFrame<'_>, past: bool, scale: f32) -> Result<()> {
         let elapsed = self.elapsed(frame, past);
         let mut plan = self.take_plan()?;
-        let taken = self
-            .pool
-            .install(|| plan.take_in(frame, elapsed, &mut FrameTimes::default()));
+        let Stages {
+            pool,
+            estimates,
+            cancel,
+            ..
+        } = self;
+        let mut times = FrameTimes::default();
+        let taken = pool.install(|| plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times));
         self.plan = Some(plan);
         taken?;
         given_up(&self.cancel)?;
@@ -308,6 +325,7 @@ impl Stages {
             options,
             level_control,
             gpu,
+            estimates,
             cancel,
             ..
         } = self;
@@ -321,7 +339,7 @@ impl Stages {
         let mut times = FrameTimes::default();
         let (report, encoded) = pool.install(|| -> Result<_> {
             let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
-            let report = plan.take_in(frame, elapsed, &mut times)?;
+            let report = plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
             given_up(cancel)?;
             let depth = plan.frame.depth();
             for (to, d) in depths.values.iter_mut().zip(depth) {
@@ -374,7 +392,9 @@ impl Stages {
     }
 }
 
-fn given_up(cancel: &Cancel) -> Result<()> {
+/// # Errors
+/// Returns an error if `cancel` is requested.
+pub(super) fn given_up(cancel: &Cancel) -> Result<()> {
     if cancel.requested() {
         Err(Error::Session(
             "the frame was given up: the session was reset or closed while it was computed".into(),
@@ -402,7 +422,7 @@ mod tests {
         let mut options = SessionOptions::new(display, Method::Sweep(sweep));
         let best = options.quality_levels[0].clone();
         options.quality_levels.push(best.clone());
-        let mut stages = Stages::new(options, Cancel::default()).unwrap();
+        let mut stages = Stages::new(options, None, Cancel::default()).unwrap();
         // The second quality level was valid at the start and becomes invalid.
         let worse = Sweep { planes: 0, ..sweep };
         stages.options.quality_levels[1] = QualityLevel {

@@ -4,6 +4,9 @@
 
 #[path = "../camera/mod.rs"]
 mod camera;
+#[cfg(feature = "tract")]
+#[path = "../../../tests/depth_models.rs"]
+mod depth_models;
 #[path = "../../../tests/network_models.rs"]
 mod network_models;
 #[path = "../on_gpu/mod.rs"]
@@ -11,6 +14,8 @@ mod on_gpu;
 
 mod camera_formats;
 mod debug;
+#[cfg(feature = "tract")]
+mod depth_network;
 mod determinism;
 mod field;
 #[cfg(feature = "gpu")]

@@ -22,7 +22,7 @@ pub(crate) fn colour_formats() -> Vec<ColourFormat> {
 }
 
 /// All depth formats.
-pub(crate) const DEPTH_FORMATS: [DepthFormat; 8] = [
+pub(crate) const DEPTH_FORMATS: [DepthFormat; 10] = [
     DepthFormat::MetresF32,
     DepthFormat::MetresF16,
     DepthFormat::DisparityF32,
@@ -31,6 +31,8 @@ pub(crate) const DEPTH_FORMATS: [DepthFormat; 8] = [
     DepthFormat::AndroidDepth16,
     DepthFormat::NormalizedU8,
     DepthFormat::NormalizedU16,
+    DepthFormat::RelativeF32,
+    DepthFormat::RelativeF16,
 ];
 
 /// The memory of one plane.
@@ -144,6 +146,8 @@ impl Scene {
             DepthFormat::DisparityF16 => half(1.0 / m),
             DepthFormat::NormalizedU8 => vec![((m - 1.0) / 2.0 * 255.0) as u8],
             DepthFormat::NormalizedU16 => whole((m - 1.0) / 2.0 * 65535.0),
+            DepthFormat::RelativeF32 => (5.0 - 2.0 * m).to_le_bytes().to_vec(),
+            DepthFormat::RelativeF16 => half(5.0 - 2.0 * m),
             // Full confidence has the bits 0, so both formats in millimetres are the same.
             _ => whole(m * 1000.0),
         };

@@ -1,8 +1,7 @@
 //! The parts of the command `phasefront` other than making holograms: pages and screens that show them, links to
-//! modulators, time multiplexing, depth from a network, and measurements of a machine.
+//! modulators, time multiplexing, and measurements of a machine.
 
 pub mod bench;
-pub mod depth_network;
 pub mod doctor;
 pub mod gpu;
 pub mod modulator;

@@ -5,9 +5,10 @@ import { RawFrame } from "./raw/phasefront_web.js";
 export type ColourFormat = "rgba" | "bgra" | "rgb" | "nv12" | "yuv420";
 
 /**
- * The meaning of a depth image's numbers: metres, inverse metres, millimetres, Android's DEPTH16, or normalized, where
- * 0 is nearest and the largest number farthest. Except in normalized formats, 0, negative and non-finite numbers mean
- * that there is no reading.
+ * The meaning of a depth image's numbers: metres, inverse metres, millimetres, Android's DEPTH16; normalized, where 0 is
+ * nearest and the largest number farthest; or relative inverse depth, as networks estimate it, which is larger where it
+ * is nearer, on any scale. Except in normalized and relative formats, 0, negative and non-finite numbers mean that there
+ * is no reading.
  */
 export type DepthFormat =
   | "metres-f32"
@@ -17,7 +18,9 @@ export type DepthFormat =
   | "millimetres-u16"
   | "android-depth16"
   | "normalized-u8"
-  | "normalized-u16";
+  | "normalized-u16"
+  | "relative-f32"
+  | "relative-f16";
 
 /** The meaning of a confidence map's bytes: 0 low, 1 medium, 2 high; or 0 none to 255 full. */
 export type ConfidenceFormat = "low-medium-high" | "u8";

@@ -25,8 +25,8 @@ pub struct CameraFrame<'a> {
     pub timestamp_ns: u64,
     /// The colour image.
     pub colour: ColourImage<'a>,
-    /// The depth image.
-    pub depth: DepthImage<'a>,
+    /// The depth image. Without one, a session needs a depth network.
+    pub depth: Option<DepthImage<'a>>,
     /// The rotation and mirroring that turn both images upright.
     pub orientation: Orientation,
     /// The correspondence between their pixels.
@@ -39,7 +39,18 @@ impl<'a> CameraFrame<'a> {
         CameraFrame {
             timestamp_ns,
             colour,
-            depth,
+            depth: Some(depth),
+            orientation: Orientation::default(),
+            alignment: Alignment::Aligned,
+        }
+    }
+
+    /// Creates a frame of an upright image without depth.
+    pub fn without_depth(timestamp_ns: u64, colour: ColourImage<'a>) -> Self {
+        CameraFrame {
+            timestamp_ns,
+            colour,
+            depth: None,
             orientation: Orientation::default(),
             alignment: Alignment::Aligned,
         }
@@ -49,9 +60,12 @@ impl<'a> CameraFrame<'a> {
     ///
     /// # Errors
     /// Returns [`Error::Frame`] if the aspect ratios of aligned images differ, if the cameras are invalid, or if
-    /// cameras are given for normalized depth, which has no metres to project.
+    /// cameras are given for depth that has no metres to project.
     pub fn check(&self) -> Result<()> {
-        let ((height, width), (depth_height, depth_width)) = (self.colour.shape(), self.depth.shape());
+        let Some(depth) = &self.depth else {
+            return Ok(());
+        };
+        let ((height, width), (depth_height, depth_width)) = (self.colour.shape(), depth.shape());
         match self.alignment {
             Alignment::Aligned => {
                 let ratio = (width * depth_height) as f64 / (height * depth_width) as f64;
@@ -66,11 +80,11 @@ impl<'a> CameraFrame<'a> {
             }
             Alignment::Cameras(cameras) => {
                 cameras.check()?;
-                match self.depth.format().is_metric() {
+                match depth.format().is_metric() {
                     true => Ok(()),
                     false => Err(Error::Frame(format!(
                         "depth is {:?}, which has no metres to take to the colour camera; depth in metres, millimetres or disparity is needed",
-                        self.depth.format()
+                        depth.format()
                     ))),
                 }
             }

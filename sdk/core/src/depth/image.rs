@@ -6,7 +6,8 @@ use half::f16;
 
 /// The memory layout of a depth image: one plane of little-endian numbers.
 ///
-/// In all formats except the normalized ones, 0, negative numbers and numbers that are not finite mean no reading.
+/// In all formats except the normalized and the relative ones, 0, negative numbers and numbers that are not finite mean
+/// no reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DepthFormat {
@@ -28,6 +29,11 @@ pub enum DepthFormat {
     NormalizedU8,
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16,
+    /// Relative inverse depth as 32-bit floats, as networks estimate it from colour alone (MiDaS, Depth Anything; by
+    /// tract, Core ML or LiteRT): larger where nearer, on any scale. Numbers that are not finite mean no reading.
+    RelativeF32,
+    /// Relative inverse depth as 16-bit floats.
+    RelativeF16,
 }
 
 impl DepthFormat {
@@ -35,23 +41,32 @@ impl DepthFormat {
     pub fn pixel_bytes(self) -> usize {
         match self {
             DepthFormat::NormalizedU8 => 1,
-            DepthFormat::MetresF32 | DepthFormat::DisparityF32 => 4,
+            DepthFormat::MetresF32 | DepthFormat::DisparityF32 | DepthFormat::RelativeF32 => 4,
             _ => 2,
         }
     }
 
-    /// Returns whether readings are distances rather than normalized depth.
+    /// Returns whether readings are distances rather than normalized or relative depth.
     pub fn is_metric(self) -> bool {
-        !matches!(self, DepthFormat::NormalizedU8 | DepthFormat::NormalizedU16)
+        !self.is_relative() && !matches!(self, DepthFormat::NormalizedU8 | DepthFormat::NormalizedU16)
+    }
+
+    /// Returns whether readings have no scale.
+    #[doc(hidden)]
+    pub fn is_relative(self) -> bool {
+        matches!(self, DepthFormat::RelativeF32 | DepthFormat::RelativeF16)
     }
 
     /// Returns the reading in `pixel`, which has [`Self::pixel_bytes`] bytes, and its confidence. The reading is in
-    /// metres or, for normalized formats, normalized depth. It is NaN if the pixel has no reading.
+    /// metres, or normalized depth, or minus the relative inverse depth. It is NaN if the pixel has no reading.
     #[doc(hidden)]
     pub fn reading(self, pixel: &[u8]) -> (f32, f32) {
         let u16_at = || u16::from_le_bytes([pixel[0], pixel[1]]);
         let f16_at = || f16::from_le_bytes([pixel[0], pixel[1]]).to_f32();
         let f32_at = || f32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+        let farther = |nearer: f32| {
+            if nearer.is_finite() { -nearer } else { f32::NAN }
+        };
         let metres = |m: f32| {
             if m.is_finite() && m > 0.0 { m } else { f32::NAN }
         };
@@ -71,6 +86,8 @@ impl DepthFormat {
             }
             DepthFormat::NormalizedU8 => (f32::from(pixel[0]) / 255.0, 1.0),
             DepthFormat::NormalizedU16 => (f32::from(u16_at()) / 65535.0, 1.0),
+            DepthFormat::RelativeF32 => (farther(f32_at()), 1.0),
+            DepthFormat::RelativeF16 => (farther(f16_at()), 1.0),
         }
     }
 }
@@ -170,7 +187,7 @@ impl<'a> DepthImage<'a> {
     /// Writes the readings to `values` and their confidences to `confidence`, both (H, W) in the sensor's orientation,
     /// and returns the number of readings. Does not allocate.
     ///
-    /// Readings are in metres or normalized depth. A pixel without a reading, or with a confidence below `least`,
+    /// Readings are those of [`DepthFormat::reading`]. A pixel without a reading, or with a confidence below `least`,
     /// becomes NaN with confidence 0.
     ///
     /// # Panics
@@ -233,6 +250,8 @@ mod tests {
             (DepthFormat::NormalizedU8, vec![0], 0.0, 1.0),
             (DepthFormat::NormalizedU8, vec![255], 1.0, 1.0),
             (DepthFormat::NormalizedU16, vec![0xff, 0xff], 1.0, 1.0),
+            (DepthFormat::RelativeF32, (-2.5f32).to_le_bytes().to_vec(), 2.5, 1.0),
+            (DepthFormat::RelativeF16, f16_bytes(0.5), -0.5, 1.0),
         ];
         for (format, bytes, metres, confidence) in cases {
             assert_eq!(bytes.len(), format.pixel_bytes());
@@ -247,6 +266,8 @@ mod tests {
             assert!(DepthFormat::MetresF16.reading(&f16_bytes(bad)).0.is_nan());
             assert!(DepthFormat::DisparityF16.reading(&f16_bytes(bad)).0.is_nan() || bad.is_infinite());
         }
+        assert_eq!(DepthFormat::RelativeF32.reading(&[0; 4]).0, 0.0);
+        assert!(DepthFormat::RelativeF16.reading(&f16_bytes(f32::INFINITY)).0.is_nan());
         assert!(DepthFormat::MillimetresU16.reading(&[0, 0]).0.is_nan());
         assert!(DepthFormat::AndroidDepth16.reading(&[0, 0x20]).0.is_nan());
     }
@@ -265,6 +286,8 @@ mod tests {
             DepthFormat::AndroidDepth16,
             DepthFormat::NormalizedU8,
             DepthFormat::NormalizedU16,
+            DepthFormat::RelativeF32,
+            DepthFormat::RelativeF16,
         ] {
             for confidences in [None, Some(ConfidenceFormat::LowMediumHigh), Some(ConfidenceFormat::U8)] {
                 let (w, h) = (random.random_range(1..20), random.random_range(1..20));

@@ -7,8 +7,9 @@ use super::condition::{ConditionScratch, Conditioner};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::smoothing::Smoother;
-use crate::frame::{Crop, Orientation};
+use crate::frame::{Crop, Orientation, Plane};
 use crate::runtime::error::{Error, Result};
+use ndarray::Array2;
 use std::time::Duration;
 
 /// The depth settings of a session.
@@ -51,7 +52,7 @@ impl DepthOptions {
 /// The result of a frame's depth processing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthReport {
-    /// The distances at the near and the far end of the volume, in metres, or `None` for normalized depth.
+    /// The distances at the near and the far end of the volume, in metres, or `None` for normalized or relative depth.
     pub range_m: Option<(f32, f32)>,
     /// The share of the sensor's pixels with a usable reading.
     pub valid: f32,
@@ -82,6 +83,8 @@ pub struct DepthStream {
     options: DepthOptions,
     out: (usize, usize),
     range: RangeTracker,
+    /// The range of relative depth, which has no metres.
+    relative_range: RangeTracker,
     smoother: Smoother,
     plan: Option<Plan>,
 }
@@ -97,6 +100,7 @@ impl DepthStream {
             options,
             out,
             range: RangeTracker::new(options.range),
+            relative_range: RangeTracker::new(DepthRange::Percentiles),
             smoother: Smoother::default(),
             plan: None,
         })
@@ -105,6 +109,7 @@ impl DepthStream {
     /// Clears the history.
     pub fn reset(&mut self) {
         self.range.reset();
+        self.relative_range.reset();
         self.smoother.reset();
         if let Some(plan) = &mut self.plan {
             plan.scratch.reset();
@@ -117,7 +122,7 @@ impl DepthStream {
     /// frame, or `None` if there is no previous frame to smooth with. Later frames of the same layout do not allocate.
     ///
     /// # Errors
-    /// Returns an error if the depth has no usable reading.
+    /// Returns an error if the frame has no depth or no usable reading.
     ///
     /// # Panics
     /// Panics if `rgb` does not have 3·H·W values or `depth` does not have H·W.
@@ -128,7 +133,11 @@ impl DepthStream {
         rgb: &[f32],
         depth: &mut [f32],
     ) -> Result<DepthReport> {
-        let image = &frame.depth;
+        let Some(image) = &frame.depth else {
+            return Err(Error::Frame(
+                "it has no depth; give it depth, or the session a depth network".into(),
+            ));
+        };
         let layout = Layout {
             format: image.format(),
             sensor: image.shape(),
@@ -139,6 +148,45 @@ impl DepthStream {
                 Alignment::Cameras(cameras) => Some(cameras),
             },
         };
+        self.process(image, layout, elapsed, rgb, depth)
+    }
+
+    /// Processes `estimate`, (h, w), the relative inverse depth that a network estimated for `rgb`, as [`Self::next`]
+    /// processes a frame's depth.
+    ///
+    /// # Errors
+    /// Returns an error if the estimate has no finite value.
+    ///
+    /// # Panics
+    /// Panics in the cases of [`Self::next`].
+    pub fn next_estimate(
+        &mut self,
+        estimate: &Array2<f32>,
+        elapsed: Option<Duration>,
+        rgb: &[f32],
+        depth: &mut [f32],
+    ) -> Result<DepthReport> {
+        let (height, width) = estimate.dim();
+        let bytes: Vec<u8> = estimate.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let image = DepthImage::new(DepthFormat::RelativeF32, width, height, Plane::new(&bytes, 4 * width, 4))?;
+        let layout = Layout {
+            format: image.format(),
+            sensor: image.shape(),
+            orientation: Orientation::default(),
+            colour: self.out,
+            cameras: None,
+        };
+        self.process(&image, layout, elapsed, rgb, depth)
+    }
+
+    fn process(
+        &mut self,
+        image: &DepthImage<'_>,
+        layout: Layout,
+        elapsed: Option<Duration>,
+        rgb: &[f32],
+        depth: &mut [f32],
+    ) -> Result<DepthReport> {
         if elapsed.is_none()
             || self
                 .plan
@@ -161,12 +209,17 @@ impl DepthStream {
         let elapsed = elapsed.unwrap_or_default();
         let width = plan.upright().1;
         let metric = layout.format.is_metric();
-        self.smoother.smooth(&mut plan.values, width, elapsed, metric);
-        let range_m = match metric {
-            true => Some(self.range.next(&plan.values, elapsed)?),
-            false => None,
+        if metric {
+            self.smoother.smooth(&mut plan.values, width, elapsed, true);
+        }
+        let range = if metric {
+            Some(self.range.next(&plan.values, elapsed)?)
+        } else if layout.format.is_relative() {
+            Some(self.relative_range.next(&plan.values, elapsed)?)
+        } else {
+            None
         };
-        if let Some((near, far)) = range_m {
+        if let Some((near, far)) = range {
             // If all distances are equal, there is no extent to scale, so d = ½ puts the surface in the middle of the
             // volume.
             let (scale, shift) = match near < far {
@@ -177,10 +230,13 @@ impl DepthStream {
                 *value = (*value * scale + shift).clamp(0.0, 1.0);
             }
         }
+        if !metric {
+            self.smoother.smooth(&mut plan.values, width, elapsed, false);
+        }
         plan.conditioner
             .condition(&plan.values, rgb, depth, &mut plan.scratch)?;
         Ok(DepthReport {
-            range_m,
+            range_m: range.filter(|_| metric),
             valid: found as f32 / plan.values.len() as f32,
         })
     }

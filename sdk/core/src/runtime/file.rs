@@ -7,6 +7,8 @@ use std::path::Path;
 
 /// The maximum size of a network file, in bytes.
 pub const MOST_NETWORK: u64 = 1 << 28;
+/// The maximum size of a depth network's file, in bytes.
+pub const MOST_DEPTH_NETWORK: u64 = 1 << 31;
 /// The maximum size of a calibration file, in bytes. It fits the tables of the largest modulator.
 pub const MOST_TARGET: u64 = 1 << 30;
 /// The maximum size of a text file written by hand, such as a display's TOML, in bytes.

@@ -5,14 +5,15 @@ use crate::flags::depth::DepthFlags;
 use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
 use ndarray::{Array2, Array3};
+use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
-use phasefront_cli::depth_network::{Colours, DepthNetwork};
 use phasefront_io::film::sequence;
 use phasefront_io::frame::Captured;
 use phasefront_io::frame::fit::{Fit, Placement};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::picture::{self, photo};
-use phasefront_io::{Error, Result, frame};
+use phasefront_io::input::quiet;
+use phasefront_io::{Error, Result, frame, output};
 use std::path::{Path, PathBuf};
 
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
@@ -77,10 +78,25 @@ impl SeenDepthFlags {
         self.invert
     }
 
-    /// Returns the depth that `network` estimates for `rgb`, larger where it is farther.
-    pub(crate) fn farther(&self, network: &DepthNetwork, rgb: &Array3<f32>) -> Result<Array2<f32>> {
-        let seen = network.see(rgb.view(), self.depth_network_colours.colours())?;
-        Ok(if self.invert { seen } else { seen.mapv(|v| -v) })
+    /// Opens the network that the flags name, if there is one.
+    pub(crate) fn open(&self) -> Result<Option<DepthNetwork>> {
+        let Some(path) = self.network() else {
+            return Ok(None);
+        };
+        output::reading(path)?;
+        if !path.exists() {
+            return Err(Error::file(
+                path,
+                "there is no such file; --depth-network takes an ONNX file",
+            ));
+        }
+        // tract panics on files that it does not expect.
+        let mut network = quiet::caught(|| DepthNetwork::open(path))
+            .map_err(|why| Error::file(path, why))?
+            .map_err(|why| Error::file(path, why))?;
+        network.colours = self.depth_network_colours.scale();
+        network.gives_distance = self.invert;
+        Ok(Some(network))
     }
 }
 
@@ -96,11 +112,11 @@ enum ColoursName {
 }
 
 impl ColoursName {
-    fn colours(self) -> Colours {
+    fn scale(self) -> ColourScale {
         match self {
-            ColoursName::Imagenet => Colours::Imagenet,
-            ColoursName::Unit => Colours::Unit,
-            ColoursName::Signed => Colours::Signed,
+            ColoursName::Imagenet => ColourScale::Imagenet,
+            ColoursName::Unit => ColourScale::Unit,
+            ColoursName::Signed => ColourScale::Signed,
         }
     }
 }
@@ -302,14 +318,21 @@ impl FrameFlags {
     }
 
     fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
-        let Some(path) = self.seen.network() else {
+        let (Some(path), Some(network)) = (self.seen.network(), self.seen.open()?) else {
             return Err(Error::Input(
-                "--rgb needs --depth, or --depth-network that sees it".into(),
+                "--rgb needs --depth, or --depth-network that estimates it".into(),
             ));
         };
         let (_, height, width) = rgb.dim();
-        let farther = self.seen.farther(&DepthNetwork::open(path, (height, width))?, rgb)?;
-        let depth = frame::relative(farther.view(), None, None).map_err(|e| Error::file(path, e))?;
+        let colours = rgb.as_standard_layout();
+        let nearer = quiet::caught(|| {
+            let estimator = network.estimator((height, width))?;
+            estimator.estimate(colours.as_slice().expect("standard layout"))
+        });
+        let nearer = nearer
+            .map_err(|why| Error::file(path, why))?
+            .map_err(|why| Error::file(path, why))?;
+        let depth = frame::relative(nearer.mapv(|v| -v).view(), None, None).map_err(|e| Error::file(path, e))?;
         frame::conditioned(rgb, &depth, &self.placement((height, width), display))
     }
 }

@@ -1,12 +1,14 @@
 //! Tests photos with embedded depth, built byte by byte from the specifications, and depth from the user's own network.
+use crate::depth_models;
 use crate::folder;
 
+use depth_models::{WEIGHTS, network};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use folder::Folder;
 use image::{DynamicImage, ImageFormat};
 use ndarray::Array3;
-use phasefront_cli::depth_network::{Colours, DepthNetwork};
+use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront_io::hologram;
 use phasefront_io::picture::photo;
 use prost::Message;
@@ -268,86 +270,6 @@ fn photos_that_cannot_be_used_get_one_line() {
     assert_eq!(errors.lines().count(), 1, "{errors}");
 }
 
-/// The weights of the small network.
-const WEIGHTS: [f32; 3] = [-0.25, 0.0, 1.0];
-
-/// Creates a depth network: one 1×1 convolution over the colours, for pictures of `sides`.
-fn network(sides: Option<(i64, i64)>, interleaved: bool) -> Vec<u8> {
-    let dim = |value: Option<i64>, name: &str| tensor_shape_proto::Dimension {
-        value: Some(match value {
-            Some(n) => tensor_shape_proto::dimension::Value::DimValue(n),
-            None => tensor_shape_proto::dimension::Value::DimParam(name.into()),
-        }),
-        ..Default::default()
-    };
-    let value = |name: &str, axes: Vec<tensor_shape_proto::Dimension>| ValueInfoProto {
-        name: name.into(),
-        r#type: Some(TypeProto {
-            value: Some(type_proto::Value::TensorType(type_proto::Tensor {
-                elem_type: tensor_proto::DataType::Float as i32,
-                shape: Some(TensorShapeProto { dim: axes }),
-            })),
-            ..Default::default()
-        }),
-        ..Default::default()
-    };
-    let (height, width) = (dim(sides.map(|s| s.0), "h"), dim(sides.map(|s| s.1), "w"));
-    let (one, three) = (dim(Some(1), ""), dim(Some(3), ""));
-    let mut nodes = Vec::new();
-    let mut from = "picture";
-    if interleaved {
-        nodes.push(NodeProto {
-            op_type: "Transpose".into(),
-            name: "planes".into(),
-            input: vec!["picture".into()],
-            output: vec!["planes".into()],
-            attribute: vec![AttributeProto {
-                name: "perm".into(),
-                r#type: attribute_proto::AttributeType::Ints as i32,
-                ints: vec![0, 3, 1, 2],
-                ..Default::default()
-            }],
-            ..Default::default()
-        });
-        from = "planes";
-    }
-    nodes.push(NodeProto {
-        op_type: "Conv".into(),
-        name: "see".into(),
-        input: vec![from.into(), "weights".into()],
-        output: vec!["seen".into()],
-        ..Default::default()
-    });
-    let picture = if interleaved {
-        vec![one.clone(), height.clone(), width.clone(), three]
-    } else {
-        vec![one.clone(), three, height.clone(), width.clone()]
-    };
-    ModelProto {
-        ir_version: 8,
-        opset_import: vec![OperatorSetIdProto {
-            version: 13,
-            ..Default::default()
-        }],
-        graph: Some(GraphProto {
-            name: "depth".into(),
-            input: vec![value("picture", picture)],
-            output: vec![value("seen", vec![one.clone(), one, height, width])],
-            node: nodes,
-            initializer: vec![TensorProto {
-                name: "weights".into(),
-                data_type: tensor_proto::DataType::Float as i32,
-                dims: vec![1, 3, 1, 1],
-                float_data: WEIGHTS.to_vec(),
-                ..Default::default()
-            }],
-            ..Default::default()
-        }),
-        ..Default::default()
-    }
-    .encode_to_vec()
-}
-
 #[test]
 fn a_network_that_the_user_brings_sees_depth() {
     let folder = Folder::new();
@@ -355,10 +277,9 @@ fn a_network_that_the_user_brings_sees_depth() {
     for interleaved in [false, true] {
         let path = folder.path("depth.onnx");
         fs::write(&path, network(Some((32, 48)), interleaved)).unwrap();
-        let seen = DepthNetwork::open(&path, (32, 48))
-            .unwrap()
-            .see(rgb.view(), Colours::Signed)
-            .unwrap();
+        let mut network = DepthNetwork::open(&path).unwrap();
+        network.colours = ColourScale::Signed;
+        let seen = network.estimator((32, 48)).unwrap().estimate(rgb.as_slice().unwrap()).unwrap();
         assert_eq!(seen.dim(), (32, 48));
         for ((y, x), value) in seen.indexed_iter() {
             let wanted: f32 = (0..3).map(|c| WEIGHTS[c] * (2.0 * rgb[(c, y, x)] - 1.0)).sum();
@@ -369,9 +290,13 @@ fn a_network_that_the_user_brings_sees_depth() {
         }
     }
     fs::write(folder.path("open.onnx"), network(None, false)).unwrap();
-    let open = DepthNetwork::open(&folder.path("open.onnx"), (32, 48)).unwrap();
-    let seen = open.see(rgb.view(), Colours::Unit).unwrap();
+    let mut network = DepthNetwork::open(&folder.path("open.onnx")).unwrap();
+    network.gives_distance = true;
+    let seen = network.estimator((32, 48)).unwrap().estimate(rgb.as_slice().unwrap()).unwrap();
     assert_eq!(seen.dim(), (448, 672));
+    network.gives_distance = false;
+    let nearer = network.estimator((32, 48)).unwrap().estimate(rgb.as_slice().unwrap()).unwrap();
+    assert_eq!(nearer, -seen);
 }
 
 #[test]

@@ -11,13 +11,19 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// One frame in memory: colour as rows of RGB bytes, depth as little-endian values of `format`.
+/// One frame in memory: colour as rows of RGB bytes, and depth unless a network estimates it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoFrame {
     colour: Vec<u8>,
     colour_shape: (usize, usize),
-    depth: Vec<u8>,
-    depth_shape: (usize, usize),
+    depth: Option<VideoDepth>,
+}
+
+/// The depth of a frame, as little-endian values of `format`.
+#[derive(Debug, Clone, PartialEq)]
+struct VideoDepth {
+    bytes: Vec<u8>,
+    shape: (usize, usize),
     format: DepthFormat,
 }
 
@@ -27,18 +33,20 @@ impl VideoFrame {
         self.colour_shape
     }
 
-    /// Returns the height and width of the depth image, (h, w).
-    pub fn depth_shape(&self) -> (usize, usize) {
-        self.depth_shape
+    /// Returns the height and width of the depth image, (h, w), if there is one.
+    pub fn depth_shape(&self) -> Option<(usize, usize)> {
+        self.depth.as_ref().map(|depth| depth.shape)
     }
 
     /// Adds the frame to the fingerprint in `hasher`.
     pub fn fingerprint(&self, hasher: &mut Fingerprint) {
-        let (colour, depth) = (self.colour_shape, self.depth_shape);
-        hasher.numbers(&[colour.0, colour.1, depth.0, depth.1]);
-        hasher.bytes(format!("{:?}", self.format).as_bytes());
+        hasher.numbers(&[self.colour_shape.0, self.colour_shape.1]);
         hasher.bytes(&self.colour);
-        hasher.bytes(&self.depth);
+        if let Some(VideoDepth { bytes, shape, format }) = &self.depth {
+            hasher.numbers(&[shape.0, shape.1]);
+            hasher.bytes(format!("{format:?}").as_bytes());
+            hasher.bytes(bytes);
+        }
     }
 
     /// Creates a frame from rows of RGB bytes, (H, W) = `colour_shape`, and big-endian 16-bit depth values of `unit`,
@@ -51,13 +59,15 @@ impl VideoFrame {
         unit: DepthUnit,
     ) -> Self {
         let little = depth.as_chunks::<2>().0.iter().flat_map(|[high, low]| [*low, *high]);
-        let (format, depth) = of_numbers(little.collect(), unit);
+        let (format, bytes) = of_numbers(little.collect(), unit);
         VideoFrame {
             colour,
             colour_shape,
-            depth,
-            depth_shape,
-            format,
+            depth: Some(VideoDepth {
+                bytes,
+                shape: depth_shape,
+                format,
+            }),
         }
     }
 
@@ -82,21 +92,20 @@ impl VideoFrame {
         Ok(VideoFrame {
             colour,
             colour_shape: (height, half),
-            depth: depth.flat_map(u16::to_le_bytes).collect(),
-            depth_shape: (height, half),
-            format: DepthFormat::NormalizedU16,
+            depth: Some(VideoDepth {
+                bytes: depth.flat_map(u16::to_le_bytes).collect(),
+                shape: (height, half),
+                format: DepthFormat::NormalizedU16,
+            }),
         })
     }
 
-    /// Creates a frame from rows of RGB bytes, (H, W) = `colour_shape`, and normalized depth, (h, w).
-    pub fn normalized(colour_shape: (usize, usize), colour: Vec<u8>, depth: &Array2<f32>) -> Self {
-        let (format, bytes) = depth_bytes(depth, DepthUnit::Normalized);
+    /// Creates a frame without depth from rows of RGB bytes, (H, W) = `colour_shape`.
+    pub fn without_depth(colour_shape: (usize, usize), colour: Vec<u8>) -> Self {
         VideoFrame {
             colour,
             colour_shape,
-            depth: bytes,
-            depth_shape: depth.dim(),
-            format,
+            depth: None,
         }
     }
 
@@ -105,20 +114,25 @@ impl VideoFrame {
     /// # Errors
     /// Returns an error if the depth is not normalized.
     pub fn invert(&mut self) -> Result<()> {
-        if self.format != DepthFormat::NormalizedU16 {
-            return Err(Error::Input(
+        match &mut self.depth {
+            Some(depth) if depth.format == DepthFormat::NormalizedU16 => {
+                depth.bytes.iter_mut().for_each(|byte| *byte = 255 - *byte);
+                Ok(())
+            }
+            _ => Err(Error::Input(
                 "--invert is for normalized depth; distances and disparities say which is near by --depth-unit".into(),
-            ));
+            )),
         }
-        self.depth.iter_mut().for_each(|byte| *byte = 255 - *byte);
-        Ok(())
     }
 
     /// Returns the fraction of depth readings that are nearer than `near_m` or farther than `far_m`.
     pub fn beyond(&self, near_m: f32, far_m: f32) -> f64 {
-        let metres = self.depth.chunks_exact(self.format.pixel_bytes());
+        let Some(VideoDepth { bytes, format, .. }) = &self.depth else {
+            return 0.0;
+        };
+        let metres = bytes.chunks_exact(format.pixel_bytes());
         let (mut all, mut beyond) = (0usize, 0usize);
-        for metres in metres.map(|pixel| self.format.reading(pixel).0).filter(|m| !m.is_nan()) {
+        for metres in metres.map(|pixel| format.reading(pixel).0).filter(|m| !m.is_nan()) {
             all += 1;
             beyond += usize::from(!(near_m..=far_m).contains(&metres));
         }
@@ -133,10 +147,13 @@ impl VideoFrame {
         let (height, width) = self.colour_shape;
         let plane = Plane::new(&self.colour, 3 * width, 3);
         let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[plane])?;
-        let (height, width) = self.depth_shape;
-        let pixel = self.format.pixel_bytes();
-        let plane = Plane::new(&self.depth, width * pixel, pixel);
-        let depth = DepthImage::new(self.format, width, height, plane)?;
+        let Some(depth) = &self.depth else {
+            return Ok(CameraFrame::without_depth(timestamp_ns, colour));
+        };
+        let (height, width) = depth.shape;
+        let pixel = depth.format.pixel_bytes();
+        let plane = Plane::new(&depth.bytes, width * pixel, pixel);
+        let depth = DepthImage::new(depth.format, width, height, plane)?;
         Ok(CameraFrame::new(timestamp_ns, colour, depth))
     }
 }
@@ -202,9 +219,11 @@ pub fn read_frame(colour: &Path, depth: &Path, unit: DepthUnit) -> Result<VideoF
     Ok(VideoFrame {
         colour: bytes,
         colour_shape,
-        depth: depth_bytes,
-        depth_shape: readings.dim(),
-        format,
+        depth: Some(VideoDepth {
+            bytes: depth_bytes,
+            shape: readings.dim(),
+            format,
+        }),
     })
 }
 
@@ -277,13 +296,15 @@ impl RawVideo {
                 colour.len() + depth.len()
             )));
         }
-        let (format, depth) = of_numbers(depth, self.unit);
+        let (format, bytes) = of_numbers(depth, self.unit);
         Ok(Some(VideoFrame {
             colour,
             colour_shape: self.colour,
-            depth,
-            depth_shape: self.depth,
-            format,
+            depth: Some(VideoDepth {
+                bytes,
+                shape: self.depth,
+                format,
+            }),
         }))
     }
 }
@@ -340,8 +361,9 @@ mod tests {
         let bytes: Vec<u8> = (0..44).collect();
         let mut pipe = &bytes[..];
         let first = raw.read(&mut pipe).unwrap().unwrap();
-        assert_eq!((first.shape(), first.colour[17], first.depth[0]), ((2, 3), 17, 18));
-        assert_eq!(raw.read(&mut pipe).unwrap().unwrap().depth, [40, 41, 42, 43]);
+        let depth = |frame: VideoFrame| frame.depth.unwrap().bytes;
+        assert_eq!((first.shape(), first.colour[17], depth(first)[0]), ((2, 3), 17, 18));
+        assert_eq!(depth(raw.read(&mut pipe).unwrap().unwrap()), [40, 41, 42, 43]);
         assert_eq!(raw.read(&mut pipe).unwrap(), None);
         let cut = raw.read(&mut &bytes[..30]).and_then(|_| raw.read(&mut &bytes[22..40]));
         assert!(cut.unwrap_err().to_string().contains("18 bytes into a frame of 22"));
@@ -351,6 +373,6 @@ mod tests {
         };
         let frame = units.read(&mut &bytes[..22]).unwrap().unwrap();
         let metres = f32::from(u16::from_le_bytes([18, 19])) / 5000.0;
-        assert_eq!(frame.depth[..4], metres.to_le_bytes());
+        assert_eq!(frame.depth.unwrap().bytes[..4], metres.to_le_bytes());
     }
 }

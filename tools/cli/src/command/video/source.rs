@@ -1,9 +1,7 @@
 //! The sources of frames: folders, films and pipes.
 
 use super::Video;
-use crate::flags::frame::SeenDepthFlags;
 use indicatif::ProgressBar;
-use phasefront_cli::depth_network::DepthNetwork;
 use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{progress_bar, progress_count};
 use phasefront_core::depth::DepthUnit;
@@ -15,13 +13,16 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// (H, W) of the colour, and of the depth if there is one.
+type Shapes = ((usize, usize), Option<(usize, usize)>);
+
 /// A source of frames that all have one size.
 pub(super) struct Source {
     input: Input,
     /// The name of the input.
     path: PathBuf,
     /// (H, W) of the colour and of the depth of the first frame.
-    shapes: Option<[(usize, usize); 2]>,
+    shapes: Option<Shapes>,
     given: usize,
     /// Fixed near and far, in metres.
     range_m: Option<(f32, f32)>,
@@ -58,12 +59,8 @@ enum FilmDepth {
     Film(Film),
     /// The right half of the pictures.
     Beside,
-    /// A network that estimates it, made for the first picture's size.
-    Network {
-        path: PathBuf,
-        flags: SeenDepthFlags,
-        network: Option<DepthNetwork>,
-    },
+    /// The session's depth network.
+    Network,
 }
 
 impl Source {
@@ -88,10 +85,13 @@ impl Source {
         let Some(frame) = self.input.next()? else {
             return Ok(None);
         };
-        let shapes = [frame.shape(), frame.depth_shape()];
+        let shapes = (frame.shape(), frame.depth_shape());
         let first = *self.shapes.get_or_insert(shapes);
         if shapes != first {
-            let said = |[(h, w), (dh, dw)]: [(usize, usize); 2]| format!("{w}×{h} with depth of {dw}×{dh}");
+            let said = |((h, w), depth): Shapes| match depth {
+                Some((dh, dw)) => format!("{w}×{h} with depth of {dw}×{dh}"),
+                None => format!("{w}×{h}"),
+            };
             return Err(Error::Input(format!(
                 "{}: is {}, the first frame {}; frames of a video have one size, and pictures of any size go to `phasefront hologram` with folders for --rgb and --depth",
                 self.name(self.given),
@@ -276,11 +276,7 @@ fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> 
             FilmDepth::Film(Film::open(depth, Pixels::Grey)?)
         }
         (None, true, None) => FilmDepth::Beside,
-        (None, false, Some(network)) => FilmDepth::Network {
-            path: network.into(),
-            flags: flags.seen.clone(),
-            network: None,
-        },
+        (None, false, Some(_)) => FilmDepth::Network,
         _ => {
             return Err(Error::file(
                 path,
@@ -333,34 +329,11 @@ impl FilmSource {
                 }
             },
             FilmDepth::Beside => VideoFrame::of_halves(colour.shape, &colour.bytes)?,
-            FilmDepth::Network { path, flags, network } => {
-                return see(path, flags, network, colour.shape, colour.bytes).map(Some);
-            }
+            FilmDepth::Network => return Ok(Some(VideoFrame::without_depth(colour.shape, colour.bytes))),
         };
         if self.invert {
             frame.invert()?;
         }
         Ok(Some(frame))
     }
-}
-
-/// Reads a frame, with the depth that `network` estimates.
-fn see(
-    path: &Path,
-    flags: &SeenDepthFlags,
-    network: &mut Option<DepthNetwork>,
-    shape: (usize, usize),
-    colour: Vec<u8>,
-) -> Result<VideoFrame> {
-    let (height, width) = shape;
-    let rgb = ndarray::Array3::from_shape_fn((3, height, width), |(c, y, x)| {
-        f32::from(colour[3 * (y * width + x) + c]) / 255.0
-    });
-    let network = match network {
-        Some(network) => network,
-        None => network.insert(DepthNetwork::open(path, shape)?),
-    };
-    let farther = flags.farther(network, &rgb)?;
-    let depth = frame::relative(farther.view(), None, None).map_err(|e| Error::file(path, e))?;
-    Ok(VideoFrame::normalized(shape, colour, &depth))
 }

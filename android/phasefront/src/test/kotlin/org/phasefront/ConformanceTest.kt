@@ -46,6 +46,8 @@ class ConformanceTest {
             "android-depth16" -> DepthFormat.ANDROID_DEPTH16
             "normalized-u8" -> DepthFormat.NORMALIZED_U8
             "normalized-u16" -> DepthFormat.NORMALIZED_U16
+            "relative-f32" -> DepthFormat.RELATIVE_F32
+            "relative-f16" -> DepthFormat.RELATIVE_F16
             else -> error(name)
         }
         val rotation = when (val degrees = case.getInt("rotation")) {

@@ -1,8 +1,7 @@
 //! Tests depth networks that would exhaust memory, run forever, or make tract panic. Each is refused with one line.
 #![allow(clippy::unwrap_used)]
 
-use ndarray::Array3;
-use phasefront_cli::depth_network::{Colours, DepthNetwork};
+use phasefront_core::depth_network::{ColourScale, DepthNetwork};
 use prost::Message;
 use std::path::Path;
 use tract_onnx::pb::*;
@@ -103,10 +102,10 @@ fn file(output: &str, nodes: Vec<NodeProto>, initializer: Vec<TensorProto>) -> V
     .encode_to_vec()
 }
 
-fn run(path: &Path) -> phasefront_io::Result<(usize, usize)> {
-    let rgb = Array3::from_elem((3, 16, 24), 0.5);
-    let seen = DepthNetwork::open(path, (16, 24))?.see(rgb.view(), Colours::Unit)?;
-    Ok(seen.dim())
+fn run(path: &Path) -> phasefront_core::runtime::error::Result<(usize, usize)> {
+    let mut network = DepthNetwork::open(path)?;
+    network.colours = ColourScale::Unit;
+    Ok(network.estimator((16, 24))?.estimate(&[0.5; 3 * 16 * 24])?.dim())
 }
 
 /// Returns networks that make tract 0.23 panic.

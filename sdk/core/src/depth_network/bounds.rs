@@ -1,7 +1,7 @@
 //! Bounds on the memory and time that tract may spend on a depth network, checked in advance, because a file of a few
 //! bytes may name a tensor of any size.
 
-use phasefront_core::method::network::bounds;
+use crate::method::network::bounds;
 use std::path::Path;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
@@ -23,13 +23,13 @@ const MOST_PRODUCTS: u64 = 1 << 44;
 /// more pass is enough.
 const MOST_PASSES: usize = 8;
 
-/// Decodes the messages of `file`, if there are not too many, and checks that its external data lies in the same
-/// folder.
+/// Decodes the messages of `file`, if there are not too many, and checks that its external data lies in the folder of
+/// `path`.
 ///
 /// # Errors
 /// Returns an error if there are too many parts or nodes, if there are branches or loops, or if other files cannot be
 /// read.
-pub(super) fn messages(file: &[u8], path: &Path) -> std::result::Result<ModelProto, String> {
+pub(super) fn messages(file: &[u8], path: Option<&Path>) -> std::result::Result<ModelProto, String> {
     bounds::check_parts(file).map_err(|why| why.to_string())?;
     let proto: ModelProto = prost_message(file)?;
     let graph = proto.graph.as_ref().ok_or("is no ONNX file: it holds no graph")?;
@@ -52,6 +52,12 @@ pub(super) fn messages(file: &[u8], path: &Path) -> std::result::Result<ModelPro
     let mut total = 0;
     for entry in (graph.initializer.iter().chain(tensors)).flat_map(|tensor| &tensor.external_data) {
         if entry.key == "location" {
+            let Some(path) = path else {
+                return Err(format!(
+                    "its weights are in {}; a network from memory must hold its weights itself",
+                    entry.value
+                ));
+            };
             let beside = path.with_file_name(&entry.value);
             let about = beside
                 .metadata()

@@ -1,0 +1,175 @@
+//! Depth of frames without depth, by the session's depth network. A live session runs it on its own thread, at the
+//! network's own rate: each frame takes the newest estimate. Other sessions run it for each frame.
+
+use super::SessionOptions;
+use super::live::lock;
+use super::stages::given_up;
+use ndarray::Array2;
+use phasefront_core::depth_network::{DepthEstimator, DepthNetwork};
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::error::{Error, Result};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::Builder;
+use std::time::Duration;
+
+/// The time after which a frame that waits for its estimate looks whether it was given up.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// The estimates of a session.
+pub(super) enum DepthEstimates {
+    EachFrame(Arc<DepthNetwork>, Option<((usize, usize), DepthEstimator)>),
+    OwnThread(Arc<Exchange>),
+}
+
+/// A picture to estimate, (3, H, W), and its (H, W).
+struct Picture {
+    rgb: Vec<f32>,
+    shape: (usize, usize),
+}
+
+#[derive(Default)]
+struct Slots {
+    picture: Option<Picture>,
+    /// Memory for the next picture.
+    spare: Vec<f32>,
+    newest: Option<Result<Arc<Array2<f32>>>>,
+    /// Whether the thread works on a picture.
+    busy: bool,
+    /// The number of times the past was forgotten. A picture from before gives no estimate.
+    epoch: u64,
+    ended: bool,
+}
+
+/// The hand-over between a session's frames and the thread of its depth network.
+#[derive(Default)]
+pub(super) struct Exchange {
+    slots: Mutex<Slots>,
+    changed: Condvar,
+}
+
+impl DepthEstimates {
+    /// Returns estimates for each frame, or `None` if the options have no depth network.
+    pub(super) fn for_each_frame(options: &SessionOptions) -> Option<Self> {
+        let network = options.depth_network.clone()?;
+        Some(DepthEstimates::EachFrame(network, None))
+    }
+
+    /// Starts the network's thread, or returns `None` if the options have no depth network.
+    ///
+    /// # Errors
+    /// Returns an error if the thread cannot be started.
+    pub(super) fn on_own_thread(options: &SessionOptions) -> Result<Option<Self>> {
+        let Some(network) = options.depth_network.clone() else {
+            return Ok(None);
+        };
+        let exchange = Arc::new(Exchange::default());
+        let of = exchange.clone();
+        Builder::new()
+            .name("phasefront depth".into())
+            .spawn(move || of.run(&network))
+            .map_err(|e| Error::Threads(Arc::new(e)))?;
+        Ok(Some(DepthEstimates::OwnThread(exchange)))
+    }
+
+    /// Returns the relative inverse depth for a frame with the picture `rgb`, (3, H, W) with (H, W) = `shape`: that of
+    /// the frame itself if it is `fresh` or each frame has its own, otherwise the newest there is.
+    ///
+    /// # Errors
+    /// Returns an error if the network does not estimate the picture, or if `cancel` is requested.
+    pub(super) fn estimate(
+        &mut self,
+        rgb: &[f32],
+        shape: (usize, usize),
+        fresh: bool,
+        cancel: &Cancel,
+    ) -> Result<Arc<Array2<f32>>> {
+        match self {
+            DepthEstimates::EachFrame(network, planned) => {
+                let planned = match planned {
+                    Some(planned) if planned.0 == shape => planned,
+                    _ => planned.insert((shape, network.estimator(shape)?)),
+                };
+                planned.1.estimate(rgb).map(Arc::new)
+            }
+            DepthEstimates::OwnThread(exchange) => exchange.estimate(rgb, shape, fresh, cancel),
+        }
+    }
+}
+
+impl Drop for DepthEstimates {
+    /// Ends the thread without waiting for it: an estimate cannot be given up.
+    fn drop(&mut self) {
+        if let DepthEstimates::OwnThread(exchange) = self {
+            lock(&exchange.slots).ended = true;
+            exchange.changed.notify_all();
+        }
+    }
+}
+
+impl Exchange {
+    fn estimate(&self, rgb: &[f32], shape: (usize, usize), fresh: bool, cancel: &Cancel) -> Result<Arc<Array2<f32>>> {
+        let mut slots = lock(&self.slots);
+        if fresh {
+            slots.epoch += 1;
+            slots.newest = None;
+        }
+        if !slots.busy || fresh {
+            let waiting = slots.picture.take().map(|picture| picture.rgb);
+            let mut copy = waiting.unwrap_or_else(|| std::mem::take(&mut slots.spare));
+            copy.clear();
+            copy.extend_from_slice(rgb);
+            slots.picture = Some(Picture { rgb: copy, shape });
+            self.changed.notify_all();
+        }
+        loop {
+            match &slots.newest {
+                Some(Ok(estimate)) => return Ok(estimate.clone()),
+                // The next frame tries again.
+                Some(Err(_)) => return slots.newest.take().expect("seen above"),
+                None => {
+                    given_up(cancel)?;
+                    slots = (self.changed.wait_timeout(slots, PATIENCE))
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0;
+                }
+            }
+        }
+    }
+
+    /// Estimates the pictures until the session ends.
+    fn run(&self, network: &DepthNetwork) {
+        let mut planned: Option<((usize, usize), DepthEstimator)> = None;
+        let mut slots = lock(&self.slots);
+        loop {
+            if slots.ended {
+                return;
+            }
+            let Some(picture) = slots.picture.take() else {
+                slots = (self.changed.wait(slots)).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            };
+            slots.busy = true;
+            let epoch = slots.epoch;
+            drop(slots);
+            if planned.as_ref().is_none_or(|(shape, _)| *shape != picture.shape) {
+                planned = None;
+            }
+            let estimator = match planned.take() {
+                Some((_, estimator)) => Ok(estimator),
+                None => network.estimator(picture.shape),
+            };
+            let estimate = estimator.and_then(|estimator| {
+                let estimate = estimator.estimate(&picture.rgb);
+                planned = Some((picture.shape, estimator));
+                estimate.map(Arc::new)
+            });
+            slots = lock(&self.slots);
+            slots.busy = false;
+            slots.spare = picture.rgb;
+            if slots.epoch == epoch {
+                slots.newest = Some(estimate);
+                self.changed.notify_all();
+            }
+        }
+    }
+}
