@@ -187,9 +187,9 @@ pub struct FrameInfo {
     pub timestamp_ns: i64,
     /// The colour image.
     pub colour: ColourInfo,
-    /// The depth image.
-    pub depth: DepthInfo,
-    /// The confidence map of the depth image; none if there is no map.
+    /// The depth image; none if the session's depth network estimates it.
+    pub depth: Option<DepthInfo>,
+    /// The confidence map of the depth image; none if there is no map or no depth image.
     pub confidence: Option<ConfidenceInfo>,
     /// The transformation of all images to upright ones.
     pub orientation: Orientation,
@@ -197,8 +197,8 @@ pub struct FrameInfo {
     pub cameras: Option<Cameras>,
 }
 
-/// The memory of a frame: the planes of the colour image (empty after the format's last plane), the depth image, and
-/// the confidence map (empty if there is no map).
+/// The memory of a frame: the planes of the colour image (empty after the format's last plane), the depth image and the
+/// confidence map (each empty if there is none).
 #[derive(Clone, Copy)]
 pub(crate) struct FrameMemory<'a> {
     pub(crate) colour: [&'a [u8]; 3],
@@ -241,19 +241,18 @@ impl FrameInfo {
         })?;
         let colour = ColourImage::new(format, self.colour.width, self.colour.height, &planes)?;
 
-        let DepthInfo {
-            format,
-            width,
-            height,
-            plane,
-        } = &self.depth;
-        let mut depth = DepthImage::new(*format, *width, *height, plane.plane(memory.depth))?;
-        if let Some(info) = &self.confidence {
-            let plane = info.plane.plane(memory.confidence);
-            depth = depth.with_confidence(info.format, info.width, info.height, plane)?;
+        let mut frame = CameraFrame::without_depth(timestamp_ns, colour);
+        if let Some(info) = &self.depth {
+            let plane = info.plane.plane(memory.depth);
+            let depth = DepthImage::new(info.format, info.width, info.height, plane)?;
+            frame.depth = Some(match &self.confidence {
+                Some(info) => {
+                    let plane = info.plane.plane(memory.confidence);
+                    depth.with_confidence(info.format, info.width, info.height, plane)?
+                }
+                None => depth,
+            });
         }
-
-        let mut frame = CameraFrame::new(timestamp_ns, colour, depth);
         frame.orientation = self.orientation;
         if let Some(cameras) = &self.cameras {
             frame.alignment = input::Alignment::Cameras(cameras.try_into()?);

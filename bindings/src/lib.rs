@@ -32,12 +32,14 @@ pub use frame::{Cameras, ColourFormat, ColourInfo, ConfidenceInfo, DepthInfo, Fr
 pub use hologram::{HologramInfo, OutputSize, RawHologram, RawMemory, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use modulator::{RawModulator, modulator_names};
-pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
+pub use network::{DeepPair, DepthNetwork, Network, NetworkInfo, built_in_pair};
 pub use options::{
     Brightness, EncoderOptions, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, phone_options,
     session_options,
 };
-pub use phasefront::input::{ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix};
+pub use phasefront::input::{
+    ColourScale, ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix,
+};
 pub use phasefront::output::{Layout, Placement};
 pub use phasefront::session::{Backend, Thermal};
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};

@@ -1,6 +1,7 @@
 //! Networks from files or bytes, and built-in networks.
 
 use crate::error::{PhasefrontError, guard};
+use phasefront::input::ColourScale;
 use phasefront_core::runtime::file;
 use std::path::Path;
 use std::sync::Arc;
@@ -10,6 +11,46 @@ use std::sync::Arc;
 #[uniffi(name = "HologramNetwork")]
 pub struct Network {
     pub(crate) core: Arc<phasefront::Network>,
+}
+
+/// The scaling that a depth network expects for colour values from 0 to 1.
+#[uniffi::remote(Enum)]
+pub enum ColourScale {
+    /// Normalized by the mean and the spread of ImageNet, as in the training of MiDaS, DPT and Depth Anything.
+    Imagenet,
+    /// From 0 to 1.
+    Unit,
+    /// From -1 to 1.
+    Signed,
+}
+
+/// A network that estimates relative inverse depth from colour alone, for frames without depth. It is immutable and can
+/// be used by several sessions.
+#[derive(Debug, uniffi::Object)]
+pub struct DepthNetwork {
+    pub(crate) core: Arc<phasefront::input::DepthNetwork>,
+}
+
+#[uniffi::export]
+impl DepthNetwork {
+    /// Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or (1, H, W, 3),
+    /// with colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.
+    ///
+    /// # Errors
+    /// Returns an error if the library does not read the file.
+    #[uniffi::constructor(default(colours = None, gives_distance = false))]
+    pub fn from_bytes(
+        onnx: &[u8],
+        colours: Option<ColourScale>,
+        gives_distance: bool,
+    ) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| {
+            let mut core = phasefront::input::DepthNetwork::from_onnx(onnx)?;
+            core.colours = colours.unwrap_or_default();
+            core.gives_distance = gives_distance;
+            Ok(Arc::new(DepthNetwork { core: Arc::new(core) }))
+        })
+    }
 }
 
 /// The properties of a network and of the display that it was trained for.

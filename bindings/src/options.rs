@@ -208,6 +208,10 @@ pub struct SessionOptions {
     pub most_pixels: usize,
     /// The backend that computes frames.
     pub backend: Backend,
+    /// The network that estimates the depth of frames without depth; none if all frames have depth. A live session runs
+    /// it on its own thread, at the network's own rate; other sessions run it for each frame.
+    #[uniffi(default = None)]
+    pub depth_network: Option<Arc<DepthNetwork>>,
 }
 
 /// The arrangement of the colours' levels in images for a modulator's driver.
@@ -359,6 +363,7 @@ impl SessionOptions {
             threads: core.threads.map(NonZeroUsize::get),
             most_pixels: core.most_pixels,
             backend: core.backend,
+            depth_network: None,
         }
     }
 }
@@ -425,6 +430,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             .collect();
         to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
+        to.depth_network = options.depth_network.as_ref().map(|network| network.core.clone());
         to.backend = options.backend;
         to.most_pixels = options.most_pixels;
         to.threads = match options.threads {

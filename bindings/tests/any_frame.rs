@@ -153,12 +153,12 @@ fn frame(random: &mut Random, timestamp_ns: i64) -> (FrameInfo, [Vec<u8>; 5]) {
             matrix: random.of(&[YuvMatrix::Bt601, YuvMatrix::Bt709]),
             video_range: random.often(0.5),
         },
-        depth: DepthInfo {
+        depth: Some(DepthInfo {
             format: depth_format,
             width: random.number(size.0),
             height: random.number(size.1),
             plane,
-        },
+        }),
         confidence,
         orientation: Orientation {
             rotation: random.of(&[

@@ -6,9 +6,9 @@
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
-    Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, DepthRange,
-    Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawPlanes, RawSession, Rotation,
-    RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml, session_options,
+    Brightness, ColourFormat, ColourInfo, ColourScale, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
+    DepthNetwork, DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawPlanes,
+    RawSession, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml, session_options,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -107,6 +107,10 @@ fn options(case: &Value) -> SessionOptions {
                 far_m: range[1].as_f64().unwrap() as f32,
             },
         },
+        depth_network: case["depth_network"].as_str().map(|file| {
+            let onnx = std::fs::read(folder().join(file)).unwrap();
+            DepthNetwork::from_bytes(&onnx, Some(ColourScale::Unit), false).unwrap()
+        }),
         ..session_options(target, Some(method)).unwrap()
     }
 }
@@ -134,23 +138,26 @@ fn info(frame: &Value) -> FrameInfo {
             },
             video_range: colour["video_range"].as_bool().unwrap(),
         },
-        depth: DepthInfo {
-            format: match depth["format"].as_str().unwrap() {
-                "metres-f32" => DepthFormat::MetresF32,
-                "metres-f16" => DepthFormat::MetresF16,
-                "disparity-f32" => DepthFormat::DisparityF32,
-                "disparity-f16" => DepthFormat::DisparityF16,
-                "millimetres-u16" => DepthFormat::MillimetresU16,
-                "android-depth16" => DepthFormat::AndroidDepth16,
-                "normalized-u8" => DepthFormat::NormalizedU8,
-                "normalized-u16" => DepthFormat::NormalizedU16,
-                "relative-f32" => DepthFormat::RelativeF32,
-                "relative-f16" => DepthFormat::RelativeF16,
-                other => panic!("{other}"),
-            },
-            width: int(&depth["width"]),
-            height: int(&depth["height"]),
-            plane: plane(&depth["plane"]),
+        depth: match depth {
+            Value::Null => None,
+            _ => Some(DepthInfo {
+                format: match depth["format"].as_str().unwrap() {
+                    "metres-f32" => DepthFormat::MetresF32,
+                    "metres-f16" => DepthFormat::MetresF16,
+                    "disparity-f32" => DepthFormat::DisparityF32,
+                    "disparity-f16" => DepthFormat::DisparityF16,
+                    "millimetres-u16" => DepthFormat::MillimetresU16,
+                    "android-depth16" => DepthFormat::AndroidDepth16,
+                    "normalized-u8" => DepthFormat::NormalizedU8,
+                    "normalized-u16" => DepthFormat::NormalizedU16,
+                    "relative-f32" => DepthFormat::RelativeF32,
+                    "relative-f16" => DepthFormat::RelativeF16,
+                    other => panic!("{other}"),
+                },
+                width: int(&depth["width"]),
+                height: int(&depth["height"]),
+                plane: plane(&depth["plane"]),
+            }),
         },
         confidence: match confidence {
             Value::Null => None,
@@ -411,13 +418,9 @@ mod write {
                     }
                     "normalized-u8" => vec![byte(normalized)],
                     "normalized-u16" => ((normalized * 65535.0) as u16).to_le_bytes().to_vec(),
-                    "relative-f32" => (if hole(x, y) {
-                        f32::NAN
-                    } else {
-                        1.0 - metres as f32
-                    })
-                    .to_le_bytes()
-                    .to_vec(),
+                    "relative-f32" => (if hole(x, y) { f32::NAN } else { 1.0 - metres as f32 })
+                        .to_le_bytes()
+                        .to_vec(),
                     "relative-f16" => f16_bits(5.0 - 2.0 * metres).to_le_bytes().to_vec(),
                     other => panic!("{other}"),
                 }
@@ -484,7 +487,7 @@ mod write {
         let still = |colour: Value, depth: Value| json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false});
         let case = |name: &str, frames: Vec<Value>| {
             json!({"name": name, "method": "network", "mode": "image", "display": display, "levels": 256, "encoding": "anti-alias", "lut": null,
-                   "calibration": null, "brightness": null, "range": null, "frames": frames})
+                   "calibration": null, "brightness": null, "range": null, "depth_network": null, "frames": frames})
         };
         let mut cases = Vec::new();
 
@@ -621,6 +624,11 @@ mod write {
             );
             cases.push(case(&format!("depth of a network, {format}"), vec![frame]));
         }
+
+        let mut one = case("depth of the session's own network", vec![]);
+        one["depth_network"] = json!("depth.onnx");
+        one["frames"] = json!([still(frames.colour("rgba", 64, 48, "bt601", false, 0.0), Value::Null)]);
+        cases.push(one);
 
         let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0).levels).collect();
         let folder = folder();

@@ -67,12 +67,12 @@ fn process(session: &RawSession) -> Result<(), PhasefrontError> {
             matrix: YuvMatrix::Bt601,
             video_range: false,
         },
-        depth: DepthInfo {
+        depth: Some(DepthInfo {
             format: DepthFormat::NormalizedU8,
             width: W,
             height: H,
             plane: plane(1),
-        },
+        }),
         confidence: None,
         orientation: Orientation {
             rotation: Rotation::Upright,

@@ -159,7 +159,7 @@ pub struct PfDepth {
     pub width: u32,
     /// The height of the sensor's image, in pixels.
     pub height: u32,
-    /// The plane.
+    /// The plane. Without data there is no depth, and the session's depth network estimates it.
     pub plane: PfPlane,
 }
 
@@ -248,6 +248,11 @@ impl PfFrame {
         } else {
             Some(self.confidence.info()?)
         };
+        let depth = if self.depth.plane.data.is_null() {
+            None
+        } else {
+            Some(self.depth.info()?)
+        };
         let cameras = if self.cameras.is_null() {
             None
         } else {
@@ -272,12 +277,7 @@ impl PfFrame {
                     matrix: pick(&YUV_MATRICES, self.colour.matrix, "colour.matrix")?,
                     video_range: self.colour.video_range,
                 },
-                depth: DepthInfo {
-                    format: pick(&DEPTH_FORMATS, self.depth.format, "depth.format")?,
-                    width: self.depth.width as usize,
-                    height: self.depth.height as usize,
-                    plane: (&self.depth.plane).into(),
-                },
+                depth,
                 confidence,
                 orientation: Orientation {
                     rotation: pick(&ROTATIONS, self.rotation, "rotation")?,
@@ -285,6 +285,17 @@ impl PfFrame {
                 },
                 cameras,
             },
+        })
+    }
+}
+
+impl PfDepth {
+    fn info(&self) -> Result<DepthInfo> {
+        Ok(DepthInfo {
+            format: pick(&DEPTH_FORMATS, self.format, "depth.format")?,
+            width: self.width as usize,
+            height: self.height as usize,
+            plane: (&self.plane).into(),
         })
     }
 }

@@ -1,6 +1,6 @@
 //! The options of a session.
 
-use crate::network::PfNetwork;
+use crate::network::{PfDepthNetwork, PfNetwork};
 use crate::pointer::{change, free, give, object, pick, read};
 use crate::status::{PfStatus, Result, call};
 use crate::target::PfTarget;
@@ -207,6 +207,22 @@ pub unsafe extern "C" fn pf_options_set_deep(options: *mut PfOptions, prefilter:
         try_set(options, |options| {
             let prefilter = read(prefilter, "prefilter")?.0.clone();
             options.encoding = Encoding::Deep { prefilter };
+            Ok(())
+        })
+    }
+}
+
+/// Sets the network that estimates the depth of frames without depth. A live session runs it on its own thread, at the
+/// network's own rate; other sessions run it for each frame.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_options_set_depth_network(
+    options: *mut PfOptions,
+    network: *const PfDepthNetwork,
+) -> PfStatus {
+    // SAFETY: the rules of this border.
+    unsafe {
+        try_set(options, |options| {
+            options.depth_network = Some(read(network, "network")?.0.clone());
             Ok(())
         })
     }

@@ -64,21 +64,24 @@ static PfPlane plane(const cJSON *json, const uint8_t *memory) {
 }
 
 static PfFrame frame_of(const cJSON *json, const uint8_t *memory) {
-    const cJSON *colour = of(json, "colour"), *depth = of(json, "depth");
+    const cJSON *colour = of(json, "colour");
     PfFrame frame = {.timestamp_ns = (uint64_t)number(json, "timestamp_ns"),
                      .colour = {.format = pick(text(colour, "format"), COLOURS, 5),
                                 .width = (uint32_t)number(colour, "width"),
                                 .height = (uint32_t)number(colour, "height"),
                                 .matrix = pick(text(colour, "matrix"), MATRICES, 2),
                                 .video_range = cJSON_IsTrue(of(colour, "video_range"))},
-                     .depth = {.format = pick(text(depth, "format"), DEPTHS, 8),
-                               .width = (uint32_t)number(depth, "width"),
-                               .height = (uint32_t)number(depth, "height"),
-                               .plane = plane(of(depth, "plane"), memory)},
                      .rotation = (uint32_t)number(json, "rotation") / 90,
                      .mirrored = cJSON_IsTrue(of(json, "mirrored"))};
     int planes = cJSON_GetArraySize(of(colour, "planes"));
     for (int i = 0; i < planes; i++) frame.colour.planes[i] = plane(cJSON_GetArrayItem(of(colour, "planes"), i), memory);
+    if (!is_null(json, "depth")) {
+        const cJSON *depth = of(json, "depth");
+        frame.depth = (PfDepth){.format = pick(text(depth, "format"), DEPTHS, 10),
+                                .width = (uint32_t)number(depth, "width"),
+                                .height = (uint32_t)number(depth, "height"),
+                                .plane = plane(of(depth, "plane"), memory)};
+    }
     if (!is_null(json, "confidence")) {
         const cJSON *confidence = of(json, "confidence");
         frame.confidence = (PfConfidence){.format = pick(text(confidence, "format"), CONFIDENCES, 2),
@@ -151,6 +154,15 @@ static PfOptions *options_of(const cJSON *json, const char *suite, const char *m
         float near_m = (float)cJSON_GetNumberValue(cJSON_GetArrayItem(of(json, "range"), 0));
         float far_m = (float)cJSON_GetNumberValue(cJSON_GetArrayItem(of(json, "range"), 1));
         ok(pf_options_set_depth_range(options, near_m, far_m), "range");
+    }
+    if (!is_null(json, "depth_network")) {
+        size_t length = 0;
+        uint8_t *onnx = read_file(suite, text(json, "depth_network"), &length);
+        PfDepthNetwork *depth_network = NULL;
+        ok(pf_depth_network_from_bytes(onnx, length, PF_COLOUR_SCALE_UNIT, false, &depth_network), "depth network");
+        ok(pf_options_set_depth_network(options, depth_network), "depth network");
+        pf_depth_network_free(depth_network);
+        free(onnx);
     }
     return options;
 }

@@ -17,9 +17,11 @@ from ._ffi import (
     Brightness,
     Cameras,
     ColourFormat,
+    ColourScale,
     ConfidenceFormat,
     DeepPair,
     DepthFormat,
+    DepthNetwork,
     DepthRange,
     Display,
     DisplayError,
@@ -68,7 +70,8 @@ from ._session import Dropped, Event, Failed, Processed, QualityChanged, Session
 from ._target import Target
 
 __all__ = [
-    "Backend", "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange",
+    "Backend", "Brightness", "Cameras", "ColourFormat", "ColourScale", "ConfidenceFormat", "DeepPair", "DepthFormat",
+    "DepthNetwork", "DepthRange",
     "Display", "DisplayError", "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "FileError", "Frame",
     "FrameError", "FrameTimes", "Hologram", "HologramInfo", "InternalError", "Intrinsics", "Layout", "LogLevel",
     "Method", "Modulator", "Network", "NetworkError", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",

@@ -121,7 +121,7 @@ class Frame:
             and chroma (H/2, W/2, 2), for YUV 420 the three planes. Halves are rounded up.
         depth: (h, w): metres in float32, float16 or float64, millimetres in uint16, or normalized in uint8 (0 nearest,
             255 farthest), unless `depth_format` is given. Except in normalized and relative depth, a value that is not finite
-            or not over 0 is no reading.
+            or not over 0 is no reading. Without depth, the session's depth network estimates it.
         timestamp_ns: The capture time in nanoseconds of any monotonic clock. Image sessions ignore it.
         colour_format: The memory layout of the colour image. Required for BGRA and for planes.
         depth_format: The meaning of the depth's numbers, if the default is wrong.
@@ -139,7 +139,7 @@ class Frame:
     def __init__(
         self,
         colour: ArrayLike,
-        depth: ArrayLike,
+        depth: ArrayLike | None = None,
         *,
         timestamp_ns: int = 0,
         colour_format: ColourFormat | None = None,
@@ -156,9 +156,11 @@ class Frame:
         planes = [_plane(what, image, "uint8", pixel) for (what, pixel), image in zip(channels, images)]
         self._colour = [plane[0] for plane in planes] + [Memory()] * (3 - len(planes))
 
-        array, depth_format = _depth(depth, depth_format)
-        self._depth, plane, width, height = _plane("depth", array, _DEPTH_TYPES[depth_format], 1)
-        depth_info = _ffi.DepthInfo(format=depth_format, width=width, height=height, plane=plane)
+        self._depth, depth_info = Memory(), None
+        if depth is not None:
+            array, depth_format = _depth(depth, depth_format)
+            self._depth, plane, width, height = _plane("depth", array, _DEPTH_TYPES[depth_format], 1)
+            depth_info = _ffi.DepthInfo(format=depth_format, width=width, height=height, plane=plane)
 
         self._confidence, confidence_info = Memory(), None
         if confidence is not None:

@@ -12,6 +12,7 @@ from . import _ffi
 from ._ffi import (
     Backend,
     Brightness,
+    DepthNetwork,
     DepthRange,
     Display,
     DropReason,
@@ -123,6 +124,7 @@ class Changes(TypedDict, total=False):
     threads: int | None
     most_pixels: int
     backend: Backend
+    depth_network: DepthNetwork | None
 
 
 def session_options(

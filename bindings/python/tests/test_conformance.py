@@ -9,8 +9,10 @@ from conftest import SUITE
 from phasefront import (
     Brightness,
     ColourFormat,
+    ColourScale,
     ConfidenceFormat,
     DepthFormat,
+    DepthNetwork,
     DepthRange,
     Encoding,
     Frame,
@@ -66,18 +68,18 @@ def frame_of(case, memory):
         if i > 0:
             width, height = (width + 1) // 2, (height + 1) // 2
         planes.append(view(memory, plane, width, height, "u1", values))
-    depth_format, dtype = DEPTH[depth["format"]]
     extra = {}
+    if depth is not None:
+        extra["depth_format"], dtype = DEPTH[depth["format"]]
+        extra["depth"] = view(memory, depth["plane"], depth["width"], depth["height"], dtype)
     if confidence is not None:
         formats = {"low-medium-high": ConfidenceFormat.LOW_MEDIUM_HIGH, "u8": ConfidenceFormat.U8}
         extra["confidence"] = view(memory, confidence["plane"], confidence["width"], confidence["height"], "u1")
         extra["confidence_format"] = formats[confidence["format"]]
     return Frame(
         planes if len(planes) > 1 else planes[0],
-        view(memory, depth["plane"], depth["width"], depth["height"], dtype),
         timestamp_ns=case["timestamp_ns"],
         colour_format=COLOUR[colour["format"]],
-        depth_format=depth_format,
         matrix={"bt601": YuvMatrix.BT601, "bt709": YuvMatrix.BT709}[colour["matrix"]],
         video_range=colour["video_range"],
         orientation=Orientation(rotation=TURN[case["rotation"]], mirrored=case["mirrored"]),
@@ -104,6 +106,9 @@ def made_of(case, memory, network):
         changes["brightness"] = Brightness.fixed(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.fixed(near_m=case["range"][0], far_m=case["range"][1])
+    if case["depth_network"] is not None:
+        onnx = (SUITE / case["depth_network"]).read_bytes()
+        changes["depth_network"] = DepthNetwork.from_bytes(onnx, ColourScale.UNIT)
     methods = {"network": network, "sweep": Method.sweep(), "auto": Method.auto(network=network)}
     method = methods[case["method"]] if case["method"] in methods else model(case["method"])
     options = session_options(method, target_of(case), **changes)

@@ -170,7 +170,7 @@ namespace Phasefront
         public ulong TimestampNs;
         /// <summary>The colour image.</summary>
         public ColourImage Colour;
-        /// <summary>The depth image.</summary>
+        /// <summary>The depth image. Leave it out if the session's depth network estimates it.</summary>
         public DepthImage Depth;
         /// <summary>The confidence map of the depth, or null.</summary>
         public ConfidenceMap? Confidence;

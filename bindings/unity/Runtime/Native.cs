@@ -132,6 +132,8 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_network_built_in(byte[] name, out IntPtr network);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_network_from_bytes(byte[] onnx, UIntPtr length, out IntPtr network);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_network_free(IntPtr network);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_depth_network_from_bytes(byte[] onnx, UIntPtr length, uint colours, [MarshalAs(UnmanagedType.I1)] bool givesDistance, out IntPtr network);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_depth_network_free(IntPtr network);
 
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_new(HologramTarget target, uint method, IntPtr network, out IntPtr options);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_options_free(IntPtr options);
@@ -142,6 +144,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_anti_alias(SessionOptions options, float sigma, uint width);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_band_limit(SessionOptions options, float k);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_deep(SessionOptions options, HologramNetwork prefilter);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_depth_network(SessionOptions options, DepthNetwork network);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_smoothed(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_fixed(SessionOptions options, float scale);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_frame_max(SessionOptions options);

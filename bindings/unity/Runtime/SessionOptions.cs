@@ -100,6 +100,10 @@ namespace Phasefront
         /// network.</summary>
         public void Deep(HologramNetwork prefilter) => Check(Native.pf_options_set_deep(this, prefilter));
 
+        /// <summary>The network that estimates the depth of frames without depth. A live session runs it on its own
+        /// thread, at the network's own rate; other sessions run it for each frame.</summary>
+        public DepthNetwork DepthNetwork { set => Check(Native.pf_options_set_depth_network(this, value)); }
+
         /// <summary>Makes full light follow the frame's largest amplitude smoothly. This is the default.</summary>
         public void SmoothedBrightness() => Check(Native.pf_options_set_brightness_smoothed(this));
 

@@ -89,4 +89,37 @@ namespace Phasefront
             return true;
         }
     }
+
+    /// <summary>The scaling that a depth network expects for colour values from 0 to 1.</summary>
+    public enum ColourScale : uint
+    {
+        /// <summary>Normalized by the mean and the spread of ImageNet: MiDaS, DPT, Depth Anything.</summary>
+        Imagenet = 0,
+        /// <summary>From 0 to 1.</summary>
+        Unit = 1,
+        /// <summary>From -1 to 1.</summary>
+        Signed = 2,
+    }
+
+    /// <summary>A network that estimates relative inverse depth from colour alone. Immutable. Many sessions can share
+    /// it.</summary>
+    public sealed class DepthNetwork : NativeObject
+    {
+        private DepthNetwork(IntPtr handle) : base(handle) { }
+
+        /// <summary>Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or
+        /// (1, H, W, 3), and gives one plane: inverse depth, or distance.</summary>
+        public static DepthNetwork FromBytes(byte[] onnx, ColourScale colours = ColourScale.Imagenet, bool givesDistance = false)
+        {
+            Check(Native.pf_depth_network_from_bytes(onnx, (UIntPtr)onnx.Length, (uint)colours, givesDistance, out var network));
+            return new DepthNetwork(network);
+        }
+
+        /// <summary>Frees the network.</summary>
+        protected override bool ReleaseHandle()
+        {
+            Native.pf_depth_network_free(handle);
+            return true;
+        }
+    }
 }

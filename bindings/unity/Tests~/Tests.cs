@@ -77,7 +77,6 @@ internal static class Tests
     {
         var frame = Object(json);
         var colour = Object(frame["colour"]);
-        var depth = Object(frame["depth"]);
         return new CameraFrame
         {
             TimestampNs = Convert.ToUInt64(frame["timestamp_ns"]),
@@ -90,16 +89,22 @@ internal static class Tests
                 VideoRange = (bool)colour["video_range"],
                 Planes = ((IEnumerable)colour["planes"]).Cast<object>().Select(plane => PlaneOf(plane, memory)).ToArray(),
             },
-            Depth = new DepthImage
-            {
-                Format = (DepthFormat)Array.IndexOf(Depths, depth["format"]),
-                Width = Int(depth["width"]),
-                Height = Int(depth["height"]),
-                Plane = PlaneOf(depth["plane"], memory),
-            },
+            Depth = frame["depth"] == null ? default : DepthOf(frame["depth"], memory),
             Confidence = frame["confidence"] == null ? (ConfidenceMap?)null : ConfidenceOf(frame["confidence"], memory),
             Rotation = (Rotation)(Int(frame["rotation"]) / 90),
             Mirrored = (bool)frame["mirrored"],
+        };
+    }
+
+    private static DepthImage DepthOf(object json, byte[] memory)
+    {
+        var depth = Object(json);
+        return new DepthImage
+        {
+            Format = (DepthFormat)Array.IndexOf(Depths, depth["format"]),
+            Width = Int(depth["width"]),
+            Height = Int(depth["height"]),
+            Plane = PlaneOf(depth["plane"], memory),
         };
     }
 
@@ -126,7 +131,7 @@ internal static class Tests
 
     private static HologramNetwork Model(string models, string file) => HologramNetwork.FromBytes(File.ReadAllBytes(Path.Combine(models, file)));
 
-    private static SessionOptions OptionsOf(IDictionary<string, object> one, HologramTarget target, string models)
+    private static SessionOptions OptionsOf(IDictionary<string, object> one, HologramTarget target, string suite, string models)
     {
         var name = (string)one["method"];
         var method = name == "sweep" ? HologramMethod.Sweep : name == "auto" ? HologramMethod.Auto : HologramMethod.Trained;
@@ -155,6 +160,11 @@ internal static class Tests
                 var range = ((IEnumerable)one["range"]).Cast<object>().Select(Convert.ToSingle).ToArray();
                 options.DepthRange(range[0], range[1]);
             }
+            if (one["depth_network"] != null)
+            {
+                var onnx = File.ReadAllBytes(Path.Combine(suite, (string)one["depth_network"]));
+                using (var depth = DepthNetwork.FromBytes(onnx, ColourScale.Unit)) options.DepthNetwork = depth;
+            }
             return options;
         }
     }
@@ -171,7 +181,7 @@ internal static class Tests
         IDictionary<string, object> one, string suite, string models, byte[] memory, List<byte> got, List<byte> seen)
     {
         using (var target = TargetOf(one, suite))
-        using (var options = OptionsOf(one, target, models))
+        using (var options = OptionsOf(one, target, suite, models))
         using (var session = HologramSession.Open(options, (RunningMode)Array.IndexOf(Modes, one["mode"])))
         {
             foreach (var frame in (IEnumerable)one["frames"])

@@ -127,14 +127,14 @@ extension Orientation {
     public static let upright = Orientation(rotation: .upright, mirrored: false)
 }
 
-/// A colour image and a depth image of the same moment.
+/// A colour image and a depth image of the same moment. The session's depth network estimates depth that is missing.
 public struct CameraFrame: Sendable {
     /// The capture time in nanoseconds of any monotonic clock.
     public var timestampNs: Int64
     /// The colour image.
     public var colour: ColourImage
-    /// The depth image.
-    public var depth: DepthImage
+    /// The depth image; nil if the session's depth network estimates it.
+    public var depth: DepthImage?
     /// The rotation that brings both images upright.
     public var orientation: Orientation
     /// The two cameras, if they are apart; nil if both images show the same field of view.
@@ -142,7 +142,7 @@ public struct CameraFrame: Sendable {
 
     /// Creates a frame of both images. By default they are upright and share a field of view.
     public init(
-        timestampNs: Int64, colour: ColourImage, depth: DepthImage, orientation: Orientation = .upright,
+        timestampNs: Int64, colour: ColourImage, depth: DepthImage?, orientation: Orientation = .upright,
         cameras: Cameras? = nil
     ) {
         self.timestampNs = timestampNs
@@ -158,16 +158,19 @@ public struct CameraFrame: Sendable {
             colour: ColourInfo(
                 format: colour.format, width: colour.width, height: colour.height,
                 planes: colour.planes.map(\.info), matrix: colour.matrix, videoRange: colour.videoRange),
-            depth: DepthInfo(
-                format: depth.format, width: depth.width, height: depth.height, plane: depth.plane.info),
-            confidence: depth.confidence.map {
+            depth: depth.map {
+                DepthInfo(format: $0.format, width: $0.width, height: $0.height, plane: $0.plane.info)
+            },
+            confidence: depth?.confidence.map {
                 ConfidenceInfo(format: $0.format, width: $0.width, height: $0.height, plane: $0.plane.info)
             },
             orientation: orientation,
             cameras: cameras)
     }
 
-    var confidenceBytes: Data { depth.confidence?.plane.bytes ?? Data() }
+    var depthBytes: Data { depth?.plane.bytes ?? Data() }
+
+    var confidenceBytes: Data { depth?.confidence?.plane.bytes ?? Data() }
 
     /// Returns the bytes of colour plane `index`, or no bytes if there is no such plane.
     func colourBytes(_ index: Int) -> Data {

@@ -47,7 +47,7 @@ public final class HologramSession: Sendable {
         try Hologram(
             raw.process(
                 lumaOrColour: frame.colourBytes(0), chroma: frame.colourBytes(1), chromaV: frame.colourBytes(2),
-                depth: frame.depth.plane.bytes, confidence: frame.confidenceBytes, info: frame.info))
+                depth: frame.depthBytes, confidence: frame.confidenceBytes, info: frame.info))
     }
 
     /// Returns the hologram of `frame`, in an image or a video session, without blocking the caller's thread. The frame's
@@ -71,7 +71,7 @@ public final class HologramSession: Sendable {
     public func submit(_ frame: CameraFrame) throws -> DropReason? {
         try raw.submit(
             lumaOrColour: frame.colourBytes(0), chroma: frame.colourBytes(1), chromaV: frame.colourBytes(2),
-            depth: frame.depth.plane.bytes, confidence: frame.confidenceBytes, info: frame.info)
+            depth: frame.depthBytes, confidence: frame.confidenceBytes, info: frame.info)
     }
 
     /// Processes an empty frame, so that the first real frame is as fast as the later ones. Blocks until it is done.

@@ -13,7 +13,7 @@ final class ConformanceTests: XCTestCase {
         let name, method, mode, display, encoding: String
         let levels: Int
         let lut: [UInt8]?
-        let calibration: String?
+        let calibration, depth_network: String?
         let brightness: Float?
         let range: [Float]?
         let frames: [Still]
@@ -22,7 +22,7 @@ final class ConformanceTests: XCTestCase {
     private struct Still: Decodable {
         let timestamp_ns: Int64
         let colour: Colours
-        let depth: Image
+        let depth: Image?
         let confidence: Image?
         let rotation: Int
         let mirrored: Bool
@@ -74,9 +74,11 @@ final class ConformanceTests: XCTestCase {
             format: try XCTUnwrap(Self.colours[still.colour.format]), width: still.colour.width,
             height: still.colour.height, planes: still.colour.planes.map { $0.plane(frames) },
             matrix: try XCTUnwrap(Self.matrices[still.colour.matrix]), videoRange: still.colour.video_range)
-        let depth = DepthImage(
-            format: try XCTUnwrap(Self.depths[still.depth.format]), width: still.depth.width,
-            height: still.depth.height, plane: still.depth.plane.plane(frames), confidence: confidence)
+        let depth = try still.depth.map {
+            DepthImage(
+                format: try XCTUnwrap(Self.depths[$0.format]), width: $0.width, height: $0.height,
+                plane: $0.plane.plane(frames), confidence: confidence)
+        }
         let rotation = try XCTUnwrap(Self.rotations[still.rotation])
         return CameraFrame(
             timestampNs: still.timestamp_ns, colour: colour, depth: depth,
@@ -122,6 +124,10 @@ final class ConformanceTests: XCTestCase {
         options.encoding = try encoding(one.encoding)
         if let scale = one.brightness { options.brightness = .fixed(scale: scale) }
         if let range = one.range { options.depthRange = .fixed(nearM: range[0], farM: range[1]) }
+        if let file = one.depth_network {
+            let onnx = try Data(contentsOf: Self.root.appendingPathComponent("tests/conformance/\(file)"))
+            options.depthNetwork = try DepthNetwork.fromBytes(onnx: onnx, colours: .unit)
+        }
         let session = try HologramSession(options, mode: try XCTUnwrap(Self.modes[one.mode]))
         var all = Data()
         for still in one.frames {

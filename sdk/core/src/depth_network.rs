@@ -51,7 +51,8 @@ impl DepthNetwork {
     /// # Errors
     /// Returns [`Error::Network`] in the cases of [`Self::from_onnx`], and if a file cannot be read.
     pub fn open(path: &Path) -> Result<Self> {
-        let bytes = file::read(path, MOST_DEPTH_NETWORK).map_err(|why| Error::Network(format!("cannot be read: {why}")))?;
+        let bytes =
+            file::read(path, MOST_DEPTH_NETWORK).map_err(|why| Error::Network(format!("cannot be read: {why}")))?;
         Self::read(&bytes, Some(path))
     }
 
@@ -132,7 +133,9 @@ impl DepthEstimator {
 
 impl Debug for DepthEstimator {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("DepthEstimator").field("picture", &self.picture).finish_non_exhaustive()
+        f.debug_struct("DepthEstimator")
+            .field("picture", &self.picture)
+            .finish_non_exhaustive()
     }
 }
 
@@ -142,7 +145,9 @@ fn plan(mut model: InferenceModel, picture: &Picture) -> TractResult<Arc<TypedRu
         .get(..1)
         .ok_or_else(|| TractError::msg("it has no output"))?
         .to_vec();
-    model = model.with_input_fact(0, picture.fact())?.with_output_outlets(&outputs)?;
+    model = model
+        .with_input_fact(0, picture.fact())?
+        .with_output_outlets(&outputs)?;
     bounds::analyse(&mut model)?;
     let model = model.into_typed()?;
     bounds::check_sizes(&model)?;

@@ -54,7 +54,10 @@ impl OwnedFrame {
             timestamp_ns: frame.timestamp_ns,
             colour: (frame.colour.format(), frame.colour.shape()),
             depth: frame.depth.map(|depth| (depth.format(), depth.shape())),
-            confidence: frame.depth.and_then(|depth| depth.confidence()).map(|(format, _)| format),
+            confidence: frame
+                .depth
+                .and_then(|depth| depth.confidence())
+                .map(|(format, _)| format),
             orientation: frame.orientation,
             alignment: frame.alignment,
         };

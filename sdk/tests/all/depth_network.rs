@@ -52,16 +52,27 @@ fn a_network_in_the_session_equals_its_depth_handed_in() {
 fn frames_without_depth_need_a_network_that_runs() {
     let scene = Scene::new(H, W, 10);
     let frame = CameraFrame::without_depth(1, scene.colour());
-    let why = ImageSession::new(options(W, H)).unwrap().process(&frame).unwrap_err().to_string();
+    let why = ImageSession::new(options(W, H))
+        .unwrap()
+        .process(&frame)
+        .unwrap_err()
+        .to_string();
     assert!(why.contains("no depth") && why.contains("a depth network"), "{why}");
     let mut numbers = with_network(H, W);
     // Not a number for any colour.
     let mut file = network(Some((H as i64, W as i64)), false);
-    let at = file.windows(4).position(|bytes| bytes == WEIGHTS[2].to_le_bytes()).unwrap();
+    let at = file
+        .windows(4)
+        .position(|bytes| bytes == WEIGHTS[2].to_le_bytes())
+        .unwrap();
     file[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
     numbers.depth_network = Some(Arc::new(DepthNetwork::from_onnx(&file).unwrap()));
     for _ in 0..2 {
-        let why = VideoSession::new(numbers.clone()).unwrap().process(&frame).unwrap_err().to_string();
+        let why = VideoSession::new(numbers.clone())
+            .unwrap()
+            .process(&frame)
+            .unwrap_err()
+            .to_string();
         assert!(why.contains("not finite") && !why.contains('\n'), "{why}");
     }
     assert!(DepthNetwork::from_onnx(b"no network").is_err());
@@ -86,7 +97,11 @@ fn a_live_session_runs_the_network_at_its_own_rate() {
         session.reset();
         let frame = CameraFrame::without_depth(i as u64 + 1, scene.colour());
         session.submit(&frame).unwrap();
-        assert_eq!(next().levels(), image.process(&frame).unwrap().levels(), "after reset {i}");
+        assert_eq!(
+            next().levels(),
+            image.process(&frame).unwrap().levels(),
+            "after reset {i}"
+        );
     }
     // The square moves; after enough frames that stand still, the depth is that of the new place.
     session.reset();
@@ -94,7 +109,9 @@ fn a_live_session_runs_the_network_at_its_own_rate() {
     let mut places = BTreeSet::new();
     for i in 0..400u64 {
         let scene = &scenes[usize::from(i > 0)];
-        session.submit(&CameraFrame::without_depth(1 + i * 33_000_000, scene.colour())).unwrap();
+        session
+            .submit(&CameraFrame::without_depth(1 + i * 33_000_000, scene.colour()))
+            .unwrap();
         places.insert(place(&next()));
         if i > 0 && places.len() > 1 {
             break;

@@ -168,7 +168,12 @@ impl DepthStream {
     ) -> Result<DepthReport> {
         let (height, width) = estimate.dim();
         let bytes: Vec<u8> = estimate.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let image = DepthImage::new(DepthFormat::RelativeF32, width, height, Plane::new(&bytes, 4 * width, 4))?;
+        let image = DepthImage::new(
+            DepthFormat::RelativeF32,
+            width,
+            height,
+            Plane::new(&bytes, 4 * width, 4),
+        )?;
         let layout = Layout {
             format: image.format(),
             sensor: image.shape(),

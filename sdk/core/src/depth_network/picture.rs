@@ -201,12 +201,25 @@ mod tests {
                 interleaved,
                 bytes,
             };
-            let tensor = picture.tensor(&rgb).expect("a tensor").cast_to::<f32>().expect("numbers").into_owned();
+            let tensor = picture
+                .tensor(&rgb)
+                .expect("a tensor")
+                .cast_to::<f32>()
+                .expect("numbers")
+                .into_owned();
             let values = tensor.to_plain_array_view::<f32>().expect("an array");
             for (i, value) in rgb.iter().enumerate() {
                 let (colour, y, x) = (i / (height * width), i / width % height, i % width);
-                let index = if interleaved { [0, y, x, colour] } else { [0, colour, y, x] };
-                let expected = if bytes { (value * 255.0).round() } else { 2.0 * value - 1.0 };
+                let index = if interleaved {
+                    [0, y, x, colour]
+                } else {
+                    [0, colour, y, x]
+                };
+                let expected = if bytes {
+                    (value * 255.0).round()
+                } else {
+                    2.0 * value - 1.0
+                };
                 assert_eq!(values[index], expected);
             }
         }

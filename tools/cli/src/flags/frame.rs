@@ -11,8 +11,8 @@ use phasefront_io::film::sequence;
 use phasefront_io::frame::Captured;
 use phasefront_io::frame::fit::{Fit, Placement};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
-use phasefront_io::picture::{self, photo};
 use phasefront_io::input::quiet;
+use phasefront_io::picture::{self, photo};
 use phasefront_io::{Error, Result, frame, output};
 use std::path::{Path, PathBuf};
 

@@ -2,9 +2,9 @@
 use crate::depth_models;
 use crate::folder;
 
-use depth_models::{WEIGHTS, network};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use depth_models::{WEIGHTS, network};
 use folder::Folder;
 use image::{DynamicImage, ImageFormat};
 use ndarray::Array3;
@@ -279,7 +279,11 @@ fn a_network_that_the_user_brings_sees_depth() {
         fs::write(&path, network(Some((32, 48)), interleaved)).unwrap();
         let mut network = DepthNetwork::open(&path).unwrap();
         network.colours = ColourScale::Signed;
-        let seen = network.estimator((32, 48)).unwrap().estimate(rgb.as_slice().unwrap()).unwrap();
+        let seen = network
+            .estimator((32, 48))
+            .unwrap()
+            .estimate(rgb.as_slice().unwrap())
+            .unwrap();
         assert_eq!(seen.dim(), (32, 48));
         for ((y, x), value) in seen.indexed_iter() {
             let wanted: f32 = (0..3).map(|c| WEIGHTS[c] * (2.0 * rgb[(c, y, x)] - 1.0)).sum();
@@ -292,10 +296,18 @@ fn a_network_that_the_user_brings_sees_depth() {
     fs::write(folder.path("open.onnx"), network(None, false)).unwrap();
     let mut network = DepthNetwork::open(&folder.path("open.onnx")).unwrap();
     network.gives_distance = true;
-    let seen = network.estimator((32, 48)).unwrap().estimate(rgb.as_slice().unwrap()).unwrap();
+    let seen = network
+        .estimator((32, 48))
+        .unwrap()
+        .estimate(rgb.as_slice().unwrap())
+        .unwrap();
     assert_eq!(seen.dim(), (448, 672));
     network.gives_distance = false;
-    let nearer = network.estimator((32, 48)).unwrap().estimate(rgb.as_slice().unwrap()).unwrap();
+    let nearer = network
+        .estimator((32, 48))
+        .unwrap()
+        .estimate(rgb.as_slice().unwrap())
+        .unwrap();
     assert_eq!(nearer, -seen);
 }
 

@@ -10,7 +10,7 @@ use phasefront_io::film::video::{self, RawVideo, VideoFrame};
 use phasefront_io::film::{self, Film, Pixels};
 use phasefront_io::{Error, Result, frame, output};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// (H, W) of the colour, and of the depth if there is one.

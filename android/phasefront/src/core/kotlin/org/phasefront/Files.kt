@@ -12,6 +12,22 @@ public fun HologramNetwork.Companion.fromBytes(onnx: ByteBuffer): HologramNetwor
 )
 
 /**
+ * Reads a depth network from the bytes of an ONNX file that holds its own weights: [onnx], a direct buffer, from its
+ * position to its limit. It takes colours of the scale [colours], and gives inverse depth, or distance.
+ *
+ * @throws PhasefrontException.Network if the library does not read it. The message names the problem.
+ */
+public fun DepthNetwork.Companion.fromBytes(
+    onnx: ByteBuffer,
+    colours: ColourScale = ColourScale.IMAGENET,
+    givesDistance: Boolean = false,
+): DepthNetwork = fromMemory(
+    onnx.direct { PhasefrontException.Network("depth network: it is $it; a direct one is needed, from ByteBuffer.allocateDirect") },
+    colours,
+    givesDistance,
+)
+
+/**
  * Reads a calibrated display from the bytes of a file that `phasefront calibrate pack` wrote: [file], a direct buffer,
  * from its position to its limit.
  *

@@ -90,7 +90,7 @@ public class DepthImage(
 public val DepthFormat.pixelBytes: Int
     get() = when (this) {
         DepthFormat.NORMALIZED_U8 -> 1
-        DepthFormat.METRES_F32, DepthFormat.DISPARITY_F32 -> 4
+        DepthFormat.METRES_F32, DepthFormat.DISPARITY_F32, DepthFormat.RELATIVE_F32 -> 4
         else -> 2
     }
 
@@ -99,7 +99,8 @@ public class CameraFrame(
     /** The capture time in nanoseconds of any monotonic clock. */
     public val timestampNs: Long,
     public val colour: ColourImage,
-    public val depth: DepthImage,
+    /** The depth image; null if the session's depth network estimates it. */
+    public val depth: DepthImage?,
     /** The rotation that brings both images upright. */
     public val orientation: Orientation = Orientation(Rotation.UPRIGHT, false),
     /** The two cameras, if they are apart; null if both images show the same field of view. */
@@ -115,13 +116,8 @@ public class CameraFrame(
             matrix = colour.matrix,
             videoRange = colour.videoRange,
         ),
-        depth = DepthInfo(
-            format = depth.format,
-            width = size("depth", depth.width),
-            height = size("depth", depth.height),
-            plane = depth.plane.info("depth"),
-        ),
-        confidence = depth.confidence?.let {
+        depth = depth?.let { DepthInfo(it.format, size("depth", it.width), size("depth", it.height), it.plane.info("depth")) },
+        confidence = depth?.confidence?.let {
             ConfidenceInfo(it.format, size("confidence", it.width), size("confidence", it.height), it.plane.info("confidence"))
         },
         orientation = orientation,
@@ -130,9 +126,9 @@ public class CameraFrame(
 
     internal fun colourBytes(index: Int): ByteBuffer = colour.planes.getOrNull(index)?.bytes("colour") ?: empty
 
-    internal fun depthBytes(): ByteBuffer = depth.plane.bytes("depth")
+    internal fun depthBytes(): ByteBuffer = depth?.plane?.bytes("depth") ?: empty
 
-    internal fun confidenceBytes(): ByteBuffer = depth.confidence?.plane?.bytes("confidence") ?: empty
+    internal fun confidenceBytes(): ByteBuffer = depth?.confidence?.plane?.bytes("confidence") ?: empty
 
     private fun size(what: String, pixels: Int): Int {
         if (pixels < 0) throw PhasefrontException.Frame("frame: $what has a side of $pixels pixels; it must be at least 1")

@@ -28,7 +28,7 @@ class ConformanceTest {
 
     private fun frame(case: JSONObject): CameraFrame {
         val colour = case.getJSONObject("colour")
-        val depth = case.getJSONObject("depth")
+        val depth = case.optJSONObject("depth")
         val confidence = case.optJSONObject("confidence")?.let {
             val format = when (val name = it.getString("format")) {
                 "low-medium-high" -> ConfidenceFormat.LOW_MEDIUM_HIGH
@@ -37,7 +37,8 @@ class ConformanceTest {
             }
             ConfidenceMap(format, it.getInt("width"), it.getInt("height"), plane(it.getJSONObject("plane")))
         }
-        val depthFormat = when (val name = depth.getString("format")) {
+        val depthFormat = when (val name = depth?.getString("format")) {
+            null -> null
             "metres-f32" -> DepthFormat.METRES_F32
             "metres-f16" -> DepthFormat.METRES_F16
             "disparity-f32" -> DepthFormat.DISPARITY_F32
@@ -67,13 +68,7 @@ class ConformanceTest {
                 YuvMatrix.valueOf(colour.getString("matrix").uppercase()),
                 colour.getBoolean("video_range"),
             ),
-            DepthImage(
-                depthFormat,
-                depth.getInt("width"),
-                depth.getInt("height"),
-                plane(depth.getJSONObject("plane")),
-                confidence,
-            ),
+            depth?.let { DepthImage(depthFormat!!, it.getInt("width"), it.getInt("height"), plane(it.getJSONObject("plane")), confidence) },
             Orientation(rotation, case.getBoolean("mirrored")),
         )
     }
@@ -86,6 +81,9 @@ class ConformanceTest {
     }
 
     private fun model(file: String): HologramNetwork = HologramNetwork.fromFile(folder.resolve("../../models/$file").path)
+
+    private fun depthNetwork(file: String): DepthNetwork =
+        DepthNetwork.fromBytes(folder.resolve(file).readBytes().let { direct(it.size).put(it).flip() }, ColourScale.UNIT)
 
     private fun target(case: JSONObject): HologramTarget {
         if (!case.isNull("calibration")) return HologramTarget.fromFile(folder.resolve(case.getString("calibration")).path)
@@ -104,6 +102,7 @@ class ConformanceTest {
         brightness = if (case.isNull("brightness")) Brightness.Smoothed else Brightness.Fixed(case.getDouble("brightness").toFloat()),
         depthRange = case.optJSONArray("range")?.let { DepthRange.Fixed(it.getDouble(0).toFloat(), it.getDouble(1).toFloat()) }
             ?: DepthRange.Percentiles,
+        depthNetwork = if (case.isNull("depth_network")) null else depthNetwork(case.getString("depth_network")),
     )
 
     /** Returns the levels of a case's frames and appends their displayed images to [seen]. */
