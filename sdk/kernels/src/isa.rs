@@ -13,11 +13,11 @@ pub enum Isa {
     Avx2,
     /// x86-64 AVX-512 (F, BW), for f32 only.
     Avx512,
-    /// x86-64 AVX-512 with VNNI, for int8 only.
+    /// x86-64 AVX-512 with VNNI, for integers only.
     Avx512Vnni,
     /// x86-64 AMX tiles with int8, in addition to AVX-512, for int8 only.
     Amx,
-    /// ARM64 NEON, for f32 only.
+    /// ARM64 NEON, for f32 and 16-bit integers.
     Neon,
     /// ARM64 NEON with signed dot products, for int8 only.
     NeonDotprod,
@@ -139,6 +139,17 @@ impl Isa {
     /// Returns the f32 kernels to choose from, fastest first. The last is always [`Isa::Portable`].
     pub fn f32() -> Vec<Isa> {
         Self::of(|isa| matches!(isa, Isa::Avx512 | Isa::Avx2 | Isa::Neon | Isa::Simd128 | Isa::Portable))
+    }
+
+    /// Returns the kernels of [`fir`](crate::fir) to choose from, fastest first. The last is always [`Isa::Portable`].
+    pub fn fir() -> Vec<Isa> {
+        let has = |isa| {
+            matches!(
+                isa,
+                Isa::Avx512Vnni | Isa::Avx2 | Isa::Neon | Isa::Simd128 | Isa::Portable
+            )
+        };
+        Self::of(has)
     }
 
     fn of(has_kernels: impl Fn(Isa) -> bool) -> Vec<Isa> {

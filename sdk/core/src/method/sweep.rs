@@ -8,6 +8,8 @@
 //! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)) instead of a Fourier
 //!   transform;
 //! - a point between two planes is on both, with a share on each ([`shares`](self));
+//! - the wave is in 16-bit fixed point, so that all instruction sets give the same bits
+//!   ([`fir`](phasefront_kernels::fir));
 //! - a tile of the frame processes only the planes with points in the tile and its halo, and crosses the others in one
 //!   step;
 //! - the last step goes from the front plane directly to the midpoint, or on to the display.
@@ -32,6 +34,7 @@ use hidden::{Hidden, HiddenScratch};
 use num_complex::Complex32;
 use phasefront_kernels::Isa;
 use phasefront_kernels::fir::Fir;
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 pub use shares::MEET;
 use shares::Slot;
@@ -64,7 +67,7 @@ pub struct Sweep {
     pub hidden_layers: usize,
     /// Whether points between two planes are on both. Otherwise each point is moved to its plane, as in SM-LBM.
     pub between_planes: bool,
-    /// The number of pixels along each side of a tile, a multiple of 16.
+    /// The largest number of pixels along each side of a tile, a multiple of 16. Tiles of a frame are of equal size.
     pub tile: usize,
 }
 
@@ -88,8 +91,8 @@ impl Sweep {
         }
     }
 
-    /// The default number of pixels along each side of a tile.
-    pub const TILE: usize = 256;
+    /// The default largest number of pixels along each side of a tile.
+    pub const TILE: usize = 320;
 
     /// The range of planes that [`Sweep::for_display`] chooses from.
     pub const DEFAULT_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
@@ -173,6 +176,7 @@ pub struct SweepPlan {
 
 /// The working memory of a [`SweepPlan`] for one frame at a time, for the thread pool in which it was made.
 pub struct SweepScratch {
+    positions: Vec<f32>,
     slots: Vec<Slot>,
     sources: Vec<u32>,
     hidden: HiddenScratch,
@@ -205,14 +209,7 @@ impl SweepPlan {
         // Fitting is the only slow part of planning, and colours are independent.
         let filters = optics.par_iter().map(|optics| Filters::new(optics, sweep.taps / 2));
         let filters: Vec<Filters> = filters.collect();
-        let way_m = |k: usize| optics[0].home_m.abs() + k as f64 * optics[0].step_m;
-        let layout = Layout::new(
-            sweep.tile,
-            sweep.planes,
-            |k| reach_px(display, way_m(k)).ceil() as usize,
-            |k| reach_px(display, k as f64 * optics[0].step_m).ceil() as usize,
-            &filters,
-        );
+        let layout = Layout::new((height, width), sweep, &optics, &filters);
         Ok(SweepPlan {
             height,
             width,
@@ -277,16 +274,11 @@ impl SweepPlan {
         let size = self.height * self.width;
         let layers = self.sweep.hidden_layers;
         SweepScratch {
+            positions: vec![0.0; size],
             slots: vec![0; size],
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
-            tiles: Workers::new(|| {
-                let mut scratch = self.layout.scratch();
-                // Each point can be on two planes.
-                let all = (layers + 1) * size;
-                scratch.reserve(2 * self.layout.most_points(layers + 1).min(all));
-                scratch
-            }),
+            tiles: Workers::new(|| TileScratch::new(&self.layout, layers + 1)),
             cancel: Cancel::default(),
         }
     }
@@ -305,12 +297,16 @@ impl SweepPlan {
         assert_eq!(field.len(), self.filters.len() * size);
         let (rgb, depth) = frame.values();
         const PART: usize = 1 << 14;
-        (scratch.slots.par_chunks_mut(PART))
+        let parts = (scratch.slots.par_chunks_mut(PART)).zip(scratch.positions.par_chunks_mut(PART));
+        parts
             .zip(depth.par_chunks(PART))
-            .for_each(|(slots, depth)| {
-                for (slot, d) in slots.iter_mut().zip(depth) {
-                    *slot = self.sweep.slot(*d);
-                }
+            .for_each(|((slots, positions), depth)| {
+                wide!(
+                    for ((slot, position), d) in slots.iter_mut().zip(positions).zip(depth) {
+                        *position = self.sweep.position(*d);
+                        *slot = Sweep::slot(*position);
+                    }
+                );
             });
         let layers = self.sweep.hidden_layers;
         if layers > 0 {
@@ -318,7 +314,7 @@ impl SweepPlan {
         }
         let surfaces = Surfaces {
             rgb,
-            depth,
+            positions: &scratch.positions,
             slots: &scratch.slots,
             hidden: &scratch.sources[..layers * size],
             height: self.height,

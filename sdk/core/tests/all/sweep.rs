@@ -68,6 +68,12 @@ fn farthest(a: &[Complex32], b: &[Complex32]) -> f32 {
     distances.fold(0.0, f32::max)
 }
 
+/// Returns the root mean square of the difference.
+fn error(a: &[Complex32], b: &[Complex32]) -> f32 {
+    let squares: f32 = a.iter().zip(b).map(|(a, b)| (a - b).norm_sqr()).sum();
+    (squares / a.len() as f32).sqrt()
+}
+
 #[test]
 fn the_sweep_is_its_oracle() {
     for (height, width, sweep, z_m) in [
@@ -119,9 +125,14 @@ fn the_sweep_is_its_oracle() {
             let frame = frame(height, width).for_display(&display);
             let plan = SweepPlan::new(height, width, &display, sweep, z_m).unwrap();
             let slow = reference::field(&frame, &display, sweep, z_m).unwrap();
-            let worst = farthest(&run(&plan, &frame), &slow);
+            let fast = run(&plan, &frame);
+            let (worst, error) = (farthest(&fast, &slow), error(&fast, &slow));
             let colours = display.colours();
-            assert!(worst < 1e-3, "{width}×{height} {sweep:?} {z_m} {colours}: {worst}");
+            println!("{worst} {error}");
+            assert!(
+                worst < 1e-3 && error < 3e-4,
+                "{width}×{height} {sweep:?} {z_m} {colours}: {worst}"
+            );
         }
     }
 }
@@ -141,8 +152,10 @@ fn the_worst_frames_are_right() {
         let frame = RgbdFrame::new(frame(height, width).rgb().to_owned(), depth).unwrap();
         let plan = SweepPlan::new(height, width, &display(), sweep(), 0.0).unwrap();
         let slow = reference::field(&frame, &display(), sweep(), 0.0).unwrap();
-        let worst = farthest(&run(&plan, &frame), &slow);
-        assert!(worst < 1e-3, "case {case}: {worst}");
+        let fast = run(&plan, &frame);
+        let (worst, error) = (farthest(&fast, &slow), error(&fast, &slow));
+        println!("{worst} {error}");
+        assert!(worst < 1e-3 && error < 3e-4, "case {case}: {worst} {error}");
     }
 }
 
@@ -180,11 +193,11 @@ fn slopes_have_no_stripes() {
         run(&SweepPlan::new(height, width, &display(), sweep, 0.0).unwrap(), &frame)
     };
     let truth = of(300, false);
-    let error = |field: Vec<Complex32>| {
+    let amplitude_error = |field: Vec<Complex32>| {
         let squares = field.iter().zip(&truth).map(|(a, b)| (a.norm() - b.norm()).powi(2));
         (squares.sum::<f32>() / truth.len() as f32).sqrt()
     };
-    let (between, moved) = (error(of(9, true)), error(of(9, false)));
+    let (between, moved) = (amplitude_error(of(9, true)), amplitude_error(of(9, false)));
     assert!(between < 0.3 * moved, "{between} {moved}");
 }
 
@@ -312,8 +325,11 @@ fn tiles_are_the_whole_frame() {
     };
     let whole = of(512);
     for tile in [32, 64, 144] {
-        let worst = farthest(&of(tile), &whole);
-        assert!(worst < 1e-4, "tiles of {tile}: {worst}");
+        // The difference is rounding, because tiles merge other steps.
+        let tiles = of(tile);
+        let (worst, error) = (farthest(&tiles, &whole), error(&tiles, &whole));
+        println!("{worst} {error}");
+        assert!(worst < 2e-3 && error < 4e-4, "tiles of {tile}: {worst} {error}");
     }
 }
 
@@ -325,7 +341,7 @@ fn instruction_sets_give_the_same_bits() {
         run(&plan.on(isa).unwrap(), &frame)
     };
     let plain = of(Isa::Portable);
-    for isa in Isa::f32() {
+    for isa in Isa::fir() {
         assert!(of(isa) == plain, "{isa}");
     }
 }

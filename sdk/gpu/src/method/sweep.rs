@@ -439,7 +439,7 @@ mod tests {
         }
     }
 
-    /// Compares the sweep with the CPU, at the default volume and on other displays.
+    /// Compares the sweep with the CPU's, which is rounded to 16 bits, at the default volume and on other displays.
     #[test]
     fn whole_frames_are_those_of_the_cpu() {
         let default = Display::default();
@@ -461,7 +461,7 @@ mod tests {
             plan.field(&frame, &mut expected, &mut plan.scratch()).unwrap();
             let worst = apart(&field, &expected);
             println!("{size:?} {sweep:?} {z_m}: {worst}");
-            assert!(worst < 1e-4, "{size:?} {sweep:?} {z_m}: {worst}");
+            assert!(worst < 4e-3, "{size:?} {sweep:?} {z_m}: {worst}");
         }
     }
 

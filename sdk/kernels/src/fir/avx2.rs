@@ -1,61 +1,90 @@
-//! The filter for AVX2 with FMA: 8 values per register.
+//! The filter for AVX2: 8 pixels per register.
 #![allow(unsafe_code)]
 
-use super::{Kernel, Lanes, Run, Taps};
+use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
 use std::arch::x86_64::*;
 
-/// Returns the kernel if the processor supports it.
-pub(super) fn kernel() -> Option<Kernel> {
-    (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(run as Kernel)
+/// Returns the kernels if the processor supports it.
+pub(super) fn kernels() -> Option<Kernels> {
+    is_x86_feature_detected!("avx2").then_some(Kernels { one, two })
 }
 
 /// # Safety
-/// The contract of [`super::filter`].
-#[target_feature(enable = "avx2,fma")]
-unsafe fn run(taps: &Taps, run: Run<'_>) {
+/// The contract of [`super::one`].
+#[target_feature(enable = "avx2")]
+unsafe fn one(taps: &Taps, run: Run<1>) {
     // SAFETY: the caller upholds this function's contract.
-    unsafe { super::filter::<__m256, 2>(taps, run) }
+    unsafe { super::one::<__m256i, 4>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::two`].
+#[target_feature(enable = "avx2")]
+unsafe fn two(taps: &Taps, run: Run<2>) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::two::<__m256i, 2>(taps, run) }
 }
 
 #[expect(
     clippy::undocumented_unsafe_blocks,
-    reason = "all run inside `run` alone, which has the instructions"
+    reason = "all run inside the functions above, which have the instructions"
 )]
-impl Lanes for __m256 {
+impl Lanes for __m256i {
     const LANES: usize = 8;
+    type Sums = [Self; 2];
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        unsafe { _mm256_set1_ps(value) }
+    unsafe fn load(from: *const Pixel) -> Self {
+        unsafe { _mm256_loadu_si256(from.cast()) }
     }
 
     #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        unsafe { _mm256_loadu_ps(from) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        unsafe { _mm256_storeu_ps(to, self) }
+    unsafe fn store(self, to: *mut Pixel) {
+        unsafe { _mm256_storeu_si256(to.cast(), self) }
     }
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        unsafe { _mm256_add_ps(self, other) }
+        unsafe { _mm256_add_epi16(self, other) }
     }
 
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        unsafe { _mm256_mul_ps(self, other) }
+    fn sums(start: i32) -> Self::Sums {
+        unsafe { [_mm256_set1_epi32(start); 2] }
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        unsafe { _mm256_fmadd_ps(a, b, self) }
+    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+        unsafe {
+            let [c, d] = [word(tap[0]), word(tap[1])];
+            [
+                _mm256_add_epi32(re, _mm256_madd_epi16(self, c)),
+                _mm256_add_epi32(im, _mm256_madd_epi16(self, d)),
+            ]
+        }
     }
 
     #[inline(always)]
-    fn minus(self, a: Self, b: Self) -> Self {
-        unsafe { _mm256_fnmadd_ps(a, b, self) }
+    fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
+        unsafe {
+            let shift = _mm_cvtsi32_si128(shift as i32);
+            let [re, im] = [_mm256_sra_epi32(re, shift), _mm256_sra_epi32(im, shift)];
+            // Each 128-bit lane has four real and four imaginary parts.
+            let order =
+                _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
+            let parts = _mm256_shuffle_epi8(_mm256_packs_epi32(re, im), order);
+            _mm256_max_epi16(
+                _mm256_min_epi16(parts, _mm256_set1_epi16(MOST)),
+                _mm256_set1_epi16(LEAST),
+            )
+        }
     }
+}
+
+/// Returns a tap's two factors in all lanes.
+#[inline(always)]
+fn word(factors: [i16; 2]) -> __m256i {
+    let word = u32::from(factors[0].cast_unsigned()) | u32::from(factors[1].cast_unsigned()) << 16;
+    // SAFETY: runs inside the functions above.
+    unsafe { _mm256_set1_epi32(word.cast_signed()) }
 }

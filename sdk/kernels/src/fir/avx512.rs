@@ -1,61 +1,86 @@
-//! The filter for AVX-512: 16 values per register.
+//! The filter for AVX-512 with VNNI: 16 pixels per register.
 #![allow(unsafe_code)]
 
-use super::{Kernel, Lanes, Run, Taps};
+use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
 use std::arch::x86_64::*;
 
-/// Returns the kernel if the processor supports it.
-pub(super) fn kernel() -> Option<Kernel> {
-    is_x86_feature_detected!("avx512f").then_some(run as Kernel)
+/// Returns the kernels if the processor supports it.
+pub(super) fn kernels() -> Option<Kernels> {
+    crate::x86::avx512_vnni::available().then_some(Kernels { one, two })
 }
 
 /// # Safety
-/// The contract of [`super::filter`].
-#[target_feature(enable = "avx512f")]
-unsafe fn run(taps: &Taps, run: Run<'_>) {
+/// The contract of [`super::one`].
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+unsafe fn one(taps: &Taps, run: Run<1>) {
     // SAFETY: the caller upholds this function's contract.
-    unsafe { super::filter::<__m512, 4>(taps, run) }
+    unsafe { super::one::<__m512i, 4>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::two`].
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+unsafe fn two(taps: &Taps, run: Run<2>) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::two::<__m512i, 2>(taps, run) }
 }
 
 #[expect(
     clippy::undocumented_unsafe_blocks,
-    reason = "all run inside `run` alone, which has the instructions"
+    reason = "all run inside the functions above, which have the instructions"
 )]
-impl Lanes for __m512 {
+impl Lanes for __m512i {
     const LANES: usize = 16;
+    type Sums = [Self; 2];
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        unsafe { _mm512_set1_ps(value) }
+    unsafe fn load(from: *const Pixel) -> Self {
+        unsafe { _mm512_loadu_si512(from.cast()) }
     }
 
     #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        unsafe { _mm512_loadu_ps(from) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        unsafe { _mm512_storeu_ps(to, self) }
+    unsafe fn store(self, to: *mut Pixel) {
+        unsafe { _mm512_storeu_si512(to.cast(), self) }
     }
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        unsafe { _mm512_add_ps(self, other) }
+        unsafe { _mm512_add_epi16(self, other) }
     }
 
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        unsafe { _mm512_mul_ps(self, other) }
+    fn sums(start: i32) -> Self::Sums {
+        unsafe { [_mm512_set1_epi32(start); 2] }
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        unsafe { _mm512_fmadd_ps(a, b, self) }
+    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+        unsafe {
+            let [c, d] = [word(tap[0]), word(tap[1])];
+            [_mm512_dpwssd_epi32(re, self, c), _mm512_dpwssd_epi32(im, self, d)]
+        }
     }
 
     #[inline(always)]
-    fn minus(self, a: Self, b: Self) -> Self {
-        unsafe { _mm512_fnmadd_ps(a, b, self) }
+    fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
+        unsafe {
+            let shift = _mm_cvtsi32_si128(shift as i32);
+            let [re, im] = [_mm512_sra_epi32(re, shift), _mm512_sra_epi32(im, shift)];
+            // Each 128-bit lane has four real and four imaginary parts.
+            let order = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
+            let parts = _mm512_shuffle_epi8(_mm512_packs_epi32(re, im), order);
+            _mm512_max_epi16(
+                _mm512_min_epi16(parts, _mm512_set1_epi16(MOST)),
+                _mm512_set1_epi16(LEAST),
+            )
+        }
     }
+}
+
+/// Returns a tap's two factors in all lanes.
+#[inline(always)]
+fn word(factors: [i16; 2]) -> __m512i {
+    let word = u32::from(factors[0].cast_unsigned()) | u32::from(factors[1].cast_unsigned()) << 16;
+    // SAFETY: runs inside the functions above.
+    unsafe { _mm512_set1_epi32(word.cast_signed()) }
 }

@@ -1,54 +1,75 @@
-//! The filter for NEON: 4 values per register. NEON is part of every ARM64 processor.
+//! The filter for NEON: 8 pixels per pair of registers, real and imaginary. NEON is part of every ARM64 processor.
 #![allow(unsafe_code)]
 
-use super::{Lanes, Run, Taps};
+use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
 use std::arch::aarch64::*;
 
-/// Filters a run.
-///
+pub(super) const KERNELS: Kernels = Kernels { one, two };
+
 /// # Safety
-/// The contract of [`super::filter`].
-pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
+/// The contract of [`super::one`].
+unsafe fn one(taps: &Taps, run: Run<1>) {
     // SAFETY: the caller upholds this function's contract.
-    unsafe { super::filter::<float32x4_t, 4>(taps, run) }
+    unsafe { super::one::<int16x8x2_t, 2>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::two`].
+unsafe fn two(taps: &Taps, run: Run<2>) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::two::<int16x8x2_t, 1>(taps, run) }
 }
 
 #[expect(clippy::undocumented_unsafe_blocks, reason = "NEON is always there")]
-impl Lanes for float32x4_t {
-    const LANES: usize = 4;
+impl Lanes for int16x8x2_t {
+    const LANES: usize = 8;
+    /// The lower and upper halves of the real parts, then of the imaginary parts.
+    type Sums = [[int32x4_t; 2]; 2];
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        unsafe { vdupq_n_f32(value) }
+    unsafe fn load(from: *const Pixel) -> Self {
+        unsafe { vld2q_s16(from.cast()) }
     }
 
     #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
-        unsafe { vld1q_f32(from) }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        unsafe { vst1q_f32(to, self) }
+    unsafe fn store(self, to: *mut Pixel) {
+        unsafe { vst2q_s16(to.cast(), self) }
     }
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        unsafe { vaddq_f32(self, other) }
+        unsafe { int16x8x2_t(vaddq_s16(self.0, other.0), vaddq_s16(self.1, other.1)) }
     }
 
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        unsafe { vmulq_f32(self, other) }
+    fn sums(start: i32) -> Self::Sums {
+        unsafe { [[vdupq_n_s32(start); 2]; 2] }
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        unsafe { vfmaq_f32(self, a, b) }
+    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+        [products(self, tap[0], re), products(self, tap[1], im)]
     }
 
     #[inline(always)]
-    fn minus(self, a: Self, b: Self) -> Self {
-        unsafe { vfmsq_f32(self, a, b) }
+    fn narrow(sums: Self::Sums, shift: u32) -> Self {
+        let [re, im] = sums.map(|sums| unsafe {
+            let [lower, upper] = sums.map(|sums| vshlq_s32(sums, vdupq_n_s32(-(shift as i32))));
+            let parts = vqmovn_high_s32(vqmovn_s32(lower), upper);
+            vmaxq_s16(vminq_s16(parts, vdupq_n_s16(MOST)), vdupq_n_s16(LEAST))
+        });
+        int16x8x2_t(re, im)
+    }
+}
+
+/// Adds re·a + im·b to the sums.
+#[inline(always)]
+fn products(pixels: int16x8x2_t, [a, b]: [i16; 2], [lower, upper]: [int32x4_t; 2]) -> [int32x4_t; 2] {
+    let int16x8x2_t(re, im) = pixels;
+    // SAFETY: NEON is always there.
+    unsafe {
+        let lower = vmlal_n_s16(lower, vget_low_s16(re), a);
+        let upper = vmlal_high_n_s16(upper, re, a);
+        [vmlal_n_s16(lower, vget_low_s16(im), b), vmlal_high_n_s16(upper, im, b)]
     }
 }

@@ -1,57 +1,64 @@
 //! The filter in plain Rust: the definition that the others are tested against.
-//!
-//! It is slow if the processor has no fused multiply-add, because the language then computes it in software. x86
-//! processors without one are older than AVX2.
 #![allow(unsafe_code)]
 
-use super::{Lanes, Run, Taps};
+use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
 
 const LANES: usize = 8;
 
+pub(super) const KERNELS: Kernels = Kernels { one, two };
+
 /// # Safety
-/// The contract of [`super::filter`].
-pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
+/// The contract of [`super::one`].
+unsafe fn one(taps: &Taps, run: Run<1>) {
     // SAFETY: the caller upholds this function's contract.
-    unsafe { super::filter::<[f32; LANES], 1>(taps, run) }
+    unsafe { super::one::<[Pixel; LANES], 1>(taps, run) }
 }
 
-impl Lanes for [f32; LANES] {
+/// # Safety
+/// The contract of [`super::two`].
+unsafe fn two(taps: &Taps, run: Run<2>) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::two::<[Pixel; LANES], 1>(taps, run) }
+}
+
+impl Lanes for [Pixel; LANES] {
     const LANES: usize = LANES;
+    type Sums = [[i32; 2]; LANES];
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        [value; LANES]
+    unsafe fn load(from: *const Pixel) -> Self {
+        // SAFETY: the caller upholds this function's contract.
+        unsafe { from.cast::<Self>().read() }
     }
 
     #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
+    unsafe fn store(self, to: *mut Pixel) {
         // SAFETY: the caller upholds this function's contract.
-        unsafe { from.cast::<Self>().read_unaligned() }
-    }
-
-    #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
-        // SAFETY: the caller upholds this function's contract.
-        unsafe { to.cast::<Self>().write_unaligned(self) }
+        unsafe { to.cast::<Self>().write(self) }
     }
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        std::array::from_fn(|i| self[i] + other[i])
+        std::array::from_fn(|i| Pixel::new(self[i].re() + other[i].re(), self[i].im() + other[i].im()))
     }
 
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        std::array::from_fn(|i| self[i] * other[i])
+    fn sums(start: i32) -> Self::Sums {
+        [[start; 2]; LANES]
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        std::array::from_fn(|i| a[i].mul_add(b[i], self[i]))
+    fn multiply(self, tap: &Tap, sums: Self::Sums) -> Self::Sums {
+        let product = |pixel: Pixel, [a, b]: [i16; 2]| pixel.re() * i32::from(a) + pixel.im() * i32::from(b);
+        std::array::from_fn(|i| std::array::from_fn(|part| sums[i][part].wrapping_add(product(self[i], tap[part]))))
     }
 
     #[inline(always)]
-    fn minus(self, a: Self, b: Self) -> Self {
-        std::array::from_fn(|i| (-a[i]).mul_add(b[i], self[i]))
+    fn narrow(sums: Self::Sums, shift: u32) -> Self {
+        sums.map(|[re, im]| Pixel::new(saturated(re >> shift), saturated(im >> shift)))
     }
+}
+
+fn saturated(value: i32) -> i32 {
+    value.clamp(LEAST.into(), MOST.into())
 }

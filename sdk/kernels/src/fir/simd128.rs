@@ -1,55 +1,69 @@
-//! The filter for WebAssembly: 4 values per register. WebAssembly has no fused multiply-add, so products are rounded
-//! separately and results differ from the other instruction sets' in the last bits.
+//! The filter for WebAssembly: 4 pixels per register.
 
-use super::{Lanes, Run, Taps};
+use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
 use std::arch::wasm32::*;
 
-/// Filters a run.
-///
+pub(super) const KERNELS: Kernels = Kernels { one, two };
+
 /// # Safety
-/// The contract of [`super::filter`].
-pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
+/// The contract of [`super::one`].
+unsafe fn one(taps: &Taps, run: Run<1>) {
     // SAFETY: the caller upholds this function's contract.
-    unsafe { super::filter::<v128, 4>(taps, run) }
+    unsafe { super::one::<v128, 4>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::two`].
+unsafe fn two(taps: &Taps, run: Run<2>) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::two::<v128, 2>(taps, run) }
 }
 
 impl Lanes for v128 {
     const LANES: usize = 4;
+    type Sums = [Self; 2];
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        f32x4_splat(value)
-    }
-
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self {
+    unsafe fn load(from: *const Pixel) -> Self {
         // SAFETY: the caller upholds this function's contract.
         unsafe { v128_load(from.cast()) }
     }
 
     #[inline(always)]
-    unsafe fn store(self, to: *mut f32) {
+    unsafe fn store(self, to: *mut Pixel) {
         // SAFETY: the caller upholds this function's contract.
         unsafe { v128_store(to.cast(), self) }
     }
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        f32x4_add(self, other)
+        i16x8_add(self, other)
     }
 
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        f32x4_mul(self, other)
+    fn sums(start: i32) -> Self::Sums {
+        [i32x4_splat(start); 2]
     }
 
     #[inline(always)]
-    fn plus(self, a: Self, b: Self) -> Self {
-        f32x4_add(self, f32x4_mul(a, b))
+    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+        [
+            i32x4_add(re, i32x4_dot_i16x8(self, word(tap[0]))),
+            i32x4_add(im, i32x4_dot_i16x8(self, word(tap[1]))),
+        ]
     }
 
     #[inline(always)]
-    fn minus(self, a: Self, b: Self) -> Self {
-        f32x4_sub(self, f32x4_mul(a, b))
+    fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
+        let parts = i16x8_narrow_i32x4(i32x4_shr(re, shift), i32x4_shr(im, shift));
+        let parts = i16x8_shuffle::<0, 4, 1, 5, 2, 6, 3, 7>(parts, parts);
+        i16x8_max(i16x8_min(parts, i16x8_splat(MOST)), i16x8_splat(LEAST))
     }
+}
+
+/// Returns a tap's two factors in all lanes.
+#[inline(always)]
+fn word(factors: [i16; 2]) -> v128 {
+    let word = u32::from(factors[0].cast_unsigned()) | u32::from(factors[1].cast_unsigned()) << 16;
+    i32x4_splat(word.cast_signed())
 }

@@ -15,56 +15,39 @@ pub const MEET: f32 = 0.65;
 
 /// The planes of a point: twice the plane's index if the point is on one plane, and one more than twice the front
 /// plane's index if it is between two.
-pub(super) type Slot = u16;
+pub(super) type Slot = i16;
 
 impl Sweep {
     /// Returns the position of normalized `depth` among the planes: k on plane k, where 0 is the nearest. Points before
     /// the first plane are on it, and points behind the last are on that one.
+    #[inline(always)]
     pub(super) fn position(&self, depth: f32) -> f32 {
         let position = depth * self.planes as f32;
         let position = if self.between_planes {
             position - 0.5
         } else {
-            position.floor()
+            position as i32 as f32
         };
         position.clamp(0.0, (self.planes - 1) as f32)
     }
 
-    /// Returns the planes of a point of normalized `depth`.
-    pub(super) fn slot(&self, depth: f32) -> Slot {
-        let position = self.position(depth);
-        (position.floor() + position.ceil()) as Slot
-    }
-}
-
-/// The share of points on one of their planes as a linear function of their depth, up to 1.
-#[derive(Clone, Copy)]
-pub(super) struct Share {
-    at_zero: f32,
-    slope: f32,
-}
-
-impl Share {
-    /// Returns the share on plane `k` among `planes` of points between it and the next plane in front of it or behind
-    /// it.
-    pub(super) fn on(k: usize, planes: usize, behind_plane: bool) -> Self {
-        // 1 on the plane, 0 on the other.
-        let (towards, gain) = if behind_plane {
-            (-1.0, 1.0 / MEET)
-        } else {
-            (1.0, 1.0 / (1.0 - MEET))
-        };
-        Share {
-            at_zero: gain * (1.0 - towards * (k as f32 + 0.5)),
-            slope: gain * towards * planes as f32,
-        }
-    }
-
-    /// Returns the share of a point of normalized `depth`.
+    /// Returns the planes of a point at `position`.
     #[inline(always)]
-    pub(super) fn of(self, depth: f32) -> f32 {
-        (self.at_zero + self.slope * depth).clamp(0.0, 1.0)
+    pub(super) fn slot(position: f32) -> Slot {
+        let front = position as i32;
+        (2 * front + i32::from(position > front as f32)) as Slot
     }
+}
+
+/// Returns the share of a point at `position` on plane `k`.
+#[inline(always)]
+pub(super) fn share(position: f32, k: f32) -> f32 {
+    // `f32::min` also considers NaN, which costs more.
+    let least = |a: f32, b: f32| if a < b { a } else { b };
+    let behind = position - k;
+    let (as_rear, as_front) = ((1.0 + behind) * (1.0 / (1.0 - MEET)), (1.0 - behind) * (1.0 / MEET));
+    let share = least(as_rear, as_front);
+    least(if share > 0.0 { share } else { 0.0 }, 1.0)
 }
 
 #[cfg(test)]
@@ -75,16 +58,11 @@ mod tests {
 
     /// Returns the planes and shares of a point by the rule that tiles use.
     fn shares(sweep: &Sweep, depth: f32) -> Vec<(usize, f32)> {
-        let slot = usize::from(sweep.slot(depth));
-        if slot.is_multiple_of(2) {
-            return vec![(slot / 2, 1.0)];
-        }
-        [true, false]
-            .map(|behind_plane| {
-                let k = slot / 2 + usize::from(!behind_plane);
-                (k, Share::on(k, sweep.planes, behind_plane).of(depth))
-            })
-            .to_vec()
+        let position = sweep.position(depth);
+        let slot = Sweep::slot(position) as usize;
+        (slot / 2..=slot.div_ceil(2))
+            .map(|k| (k, share(position, k as f32)))
+            .collect()
     }
 
     #[test]

@@ -5,16 +5,21 @@
 //! there is no light farther from the points behind a plane than the distance it can have spread. Each row's field is
 //! therefore computed only from the leftmost to the rightmost pixel that light can reach, its [`Span`].
 
-use super::filters::Filters;
+use super::Sweep;
+use super::filters::{Filters, Optics};
 use super::hidden::NOTHING;
-use super::shares::{Share, Slot};
+use super::shares::{Slot, share};
 use num_complex::Complex32;
-use phasefront_kernels::fir::{Fir, RUN};
+use phasefront_kernels::fir::{Fir, Pixel, RUN, Taps};
+use phasefront_kernels::wide;
 use std::ops::Range;
 
 /// The number of pixels beyond light's reach that are also computed, because a fitted filter's light spreads slightly
 /// farther.
 pub const MARGIN: usize = 10;
+
+/// The units of a wave of amplitude 1. Parts of more than 2 saturate.
+const UNIT: f32 = 8192.0;
 
 /// A half-open range of pixels in a row. It is empty if the second bound is not greater than the first.
 type Span = [usize; 2];
@@ -29,8 +34,8 @@ fn join(a: Span, b: Span) -> Span {
 pub(super) struct Surfaces<'a> {
     /// The colours, (C, H, W).
     pub(super) rgb: &'a [f32],
-    /// The normalized depth, (H, W).
-    pub(super) depth: &'a [f32],
+    /// The position of each pixel's point among the planes, (H, W).
+    pub(super) positions: &'a [f32],
     /// The planes of each pixel's point, (H, W).
     pub(super) slots: &'a [Slot],
     /// The pixels that the hidden layers continue, (layers, H, W).
@@ -41,107 +46,73 @@ pub(super) struct Surfaces<'a> {
 
 /// The properties that all tiles of a plan share.
 pub(super) struct Layout {
-    tile: usize,
-    /// The distance around the tile within which the points of each plane matter.
-    halos: Vec<usize>,
+    /// The rows and columns of a tile.
+    side: (usize, usize),
+    /// The distance around the tile within which the points of each plane matter, for each colour.
+    halos: Vec<Vec<usize>>,
+    /// The same for any colour.
+    widest: Vec<usize>,
     /// The distance from the edge of the buffer to the tile.
     border: usize,
     stride: usize,
     longest: usize,
-    /// The spread of light over each number of planes.
-    spread: Vec<usize>,
+    /// The spread of light over each number of planes, for each colour.
+    spread: Vec<Vec<usize>>,
 }
 
 impl Layout {
-    /// Creates the layout of tiles of `tile`² pixels. `reach(k)` is the spread of light from plane k to the hologram,
-    /// `spread(k)` its spread to plane 0.
-    pub(super) fn new(
-        tile: usize,
-        planes: usize,
-        reach: impl Fn(usize) -> usize,
-        spread: impl Fn(usize) -> usize,
-        filters: &[Filters],
-    ) -> Self {
-        let halos: Vec<usize> = (0..planes).map(|k| reach(k) + MARGIN).collect();
-        let part = (filters.iter().map(Filters::longest_part)).max().unwrap_or(0);
-        let end = (0..planes)
-            .flat_map(|k| filters.iter().map(move |f| f.end(k - f.before_end(k)).len() - 1))
-            .max()
-            .unwrap_or(0);
-        let widest = halos.last().copied().unwrap_or(0);
-        let border = (widest + part).max(end).next_multiple_of(RUN);
+    /// Creates the layout of tiles in a frame of `shape`.
+    pub(super) fn new(shape: (usize, usize), sweep: Sweep, optics: &[Optics], filters: &[Filters]) -> Self {
+        let planes = sweep.planes;
+        // Light passes from plane k to plane 0, and from there to the hologram.
+        let halo = |optics: &Optics, k: usize| optics.reach(optics.home_m.abs() + k as f64 * optics.step_m) + MARGIN;
+        let halos: Vec<Vec<usize>> = (optics.iter())
+            .map(|optics| (0..planes).map(|k| halo(optics, k)).collect())
+            .collect();
+        let widest: Vec<usize> = (0..planes)
+            .map(|k| halos.iter().map(|halos| halos[k]).max().unwrap_or(0))
+            .collect();
+        let part = filters.iter().map(Filters::longest_part).max().unwrap_or(0);
+        let ends = (0..planes).flat_map(|k| filters.iter().map(move |f| f.end(k - f.before_end(k)).radius()));
+        let end = ends.max().unwrap_or(0);
+        let border = (widest[planes - 1] + part).max(end).next_multiple_of(RUN);
+        // Tiles of equal size, because the halo of a small rest costs as much as that of a whole tile.
+        let side = |size: usize| size.div_ceil(size.div_ceil(sweep.tile));
+        let side = (side(shape.0), side(shape.1).next_multiple_of(RUN));
+        let spread = |optics: &Optics| (0..planes).map(|k| optics.reach(k as f64 * optics.step_m)).collect();
         Layout {
-            tile,
+            side,
             halos,
+            widest,
             border,
-            stride: (tile + 2 * border).next_multiple_of(RUN) + RUN,
+            stride: side.1 + 2 * border + RUN,
             longest: part.max(end),
-            spread: (0..planes).map(spread).collect(),
+            spread: optics.iter().map(spread).collect(),
         }
     }
 
     /// Returns the number of tiles down and across a frame.
     pub(super) fn count(&self, height: usize, width: usize) -> (usize, usize) {
-        (height.div_ceil(self.tile), width.div_ceil(self.tile))
-    }
-
-    pub(super) fn scratch(&self) -> TileScratch {
-        let rows = self.rows();
-        let plane = || Aligned::new(rows * self.stride);
-        let ring = || Aligned::new(self.ring_values());
-        let line = || Aligned::new(self.stride + 2 * self.longest);
-        let places = || vec![[0; 2]; self.longest + 1];
-        let kept = || vec![0.0; rows * self.longest];
-        TileScratch {
-            field: [plane(), plane()],
-            line: [line(), line()],
-            kept: [kept(), kept()],
-            ring: [ring(), ring()],
-            places: [places(), places()],
-            starts: vec![0; self.halos.len() + 1],
-            found: Vec::new(),
-            points: Vec::new(),
-            point_spans: vec![NOWHERE; self.halos.len() * rows],
-            lit: vec![NOWHERE; rows],
-            wider: vec![NOWHERE; rows],
-        }
-    }
-
-    /// Returns the largest number of values in a ring: all rows of the longest filter.
-    fn ring_values(&self) -> usize {
-        (1..=self.longest)
-            .map(|radius| (2 * radius + 1) * strip(radius))
-            .max()
-            .unwrap_or(RUN)
+        (height.div_ceil(self.side.0), width.div_ceil(self.side.1))
     }
 
     /// Returns the number of rows of the buffer.
     fn rows(&self) -> usize {
-        self.tile + 2 * self.border
-    }
-
-    /// Returns the largest number of points that a tile of `layers` layers can hold.
-    pub(super) fn most_points(&self, layers: usize) -> usize {
-        let side = self.tile + 2 * self.halos.last().copied().unwrap_or(0);
-        side * side * layers
+        self.side.0 + 2 * self.border
     }
 }
 
 /// The working memory of one tile at a time.
 pub(super) struct TileScratch {
-    /// Real and imaginary parts, in rows of `stride`.
-    field: [Aligned; 2],
-    /// A row of a strip before it is filtered.
-    line: [Aligned; 2],
-    /// The unfiltered last columns of the previous strip in each row.
-    kept: [Vec<f32>; 2],
-    /// The last rows filtered along x.
-    ring: [Aligned; 2],
-    /// The positions of the taps' values along x and along y.
-    places: [Vec<[usize; 2]>; 2],
+    /// The wave, in rows of `stride`.
+    field: Aligned,
+    /// The last rows filtered along x, in rows of `stride`.
+    ring: Aligned,
     /// The start of each plane's points, and the end.
     starts: Vec<u32>,
     found: Vec<(u16, Points)>,
+    /// The index in `found` of the latest points of each plane.
+    latest: Vec<u32>,
     points: Vec<Points>,
     /// The span of each plane's points in each row.
     point_spans: Vec<Span>,
@@ -150,49 +121,50 @@ pub(super) struct TileScratch {
     wider: Vec<Span>,
 }
 
-/// Values that start at a cache line, which makes the kernels faster.
-struct Aligned(Vec<f32>);
+/// Pixels that start at a cache line, which makes the kernels faster.
+struct Aligned(Vec<Pixel>);
 
 impl Aligned {
     const LINE: usize = 64;
 
     fn new(length: usize) -> Self {
-        Aligned(vec![0.0; length + Self::LINE / size_of::<f32>()])
+        Aligned(vec![Pixel::ZERO; length + Self::LINE / size_of::<Pixel>()])
     }
 
-    fn values(&mut self) -> &mut [f32] {
+    fn pixels(&mut self) -> &mut [Pixel] {
         let start = self.0.as_ptr().align_offset(Self::LINE);
-        &mut self.0[start.min(Self::LINE / size_of::<f32>())..]
+        &mut self.0[start.min(Self::LINE / size_of::<Pixel>())..]
     }
 }
 
 impl TileScratch {
-    pub(super) fn reserve(&mut self, points: usize) {
-        self.found.reserve_exact(points);
-        self.points.reserve_exact(points);
+    /// Creates working memory for the tiles of frames of `layers` layers.
+    pub(super) fn new(layout: &Layout, layers: usize) -> Self {
+        let (rows, stride, planes) = (layout.rows(), layout.stride, layout.widest.len());
+        // Each point can be on two planes.
+        let points = 2 * layers * rows * stride;
+        TileScratch {
+            field: Aligned::new(rows * stride),
+            ring: Aligned::new((2 * layout.longest + 2) * stride),
+            starts: vec![0; planes + 1],
+            found: Vec::with_capacity(points),
+            latest: vec![0; planes],
+            points: Vec::with_capacity(points),
+            point_spans: vec![NOWHERE; planes * rows],
+            lit: vec![NOWHERE; rows],
+            wider: vec![NOWHERE; rows],
+        }
     }
 }
 
-/// Where points are relative to a plane that they are on.
-#[derive(Clone, Copy, Default, PartialEq)]
-enum Side {
-    #[default]
-    On,
-    /// Between the plane and the next one in front of it.
-    Before,
-    /// Between the plane and the next one behind it.
-    Behind,
-}
-
-/// Neighbouring points of one plane in a row.
+/// Neighbouring points in a row, some of which are on a plane.
 #[derive(Clone, Copy, Default)]
 struct Points {
     /// The position of the first point in the field.
     at: u32,
-    /// The index of the first point's colour in the frame. The colours of the others follow it.
+    /// The index of the first point's colour and position in the frame. Those of the others follow it.
     from: u32,
-    count: u16,
-    side: Side,
+    count: u32,
 }
 
 /// A tile of a frame.
@@ -209,13 +181,13 @@ impl<'a> Tile<'a> {
     /// Returns tile `index` of a frame, counted by rows.
     pub(super) fn of(layout: &'a Layout, fir: Fir, surfaces: Surfaces<'a>, index: usize) -> Self {
         let (_, across) = layout.count(surfaces.height, surfaces.width);
-        let side = |i: usize, size: usize| i * layout.tile..((i + 1) * layout.tile).min(size);
+        let part = |i: usize, side: usize, size: usize| i * side..((i + 1) * side).min(size);
         Tile {
             layout,
             fir,
             surfaces,
-            rows: side(index / across, surfaces.height),
-            columns: side(index % across, surfaces.width),
+            rows: part(index / across, layout.side.0, surfaces.height),
+            columns: part(index % across, layout.side.1, surfaces.width),
         }
     }
 
@@ -224,6 +196,7 @@ impl<'a> Tile<'a> {
     pub(super) fn gather(&self, scratch: &mut TileScratch) {
         scratch.starts.fill(0);
         scratch.found.clear();
+        scratch.latest.fill(u32::MAX);
         scratch.point_spans.fill(NOWHERE);
         let Surfaces { slots, hidden, .. } = self.surfaces;
         let layers = hidden.len() / slots.len();
@@ -244,7 +217,7 @@ impl<'a> Tile<'a> {
             points[*start as usize] = *found;
             *start += 1;
         }
-        starts.copy_within(0..self.layout.halos.len(), 1);
+        starts.copy_within(0..self.layout.widest.len(), 1);
         starts[0] = 0;
     }
 
@@ -257,94 +230,96 @@ impl<'a> Tile<'a> {
             width,
             ..
         } = self.surfaces;
-        let widest = self.layout.halos.last().copied().unwrap_or(0);
+        let widest = self.layout.widest.last().copied().unwrap_or(0);
         let around =
             |side: &Range<usize>, size: usize| side.start.saturating_sub(widest)..(side.end + widest).min(size);
         let columns = around(&self.columns, width);
         for y in around(&self.rows, height) {
             let row = y * width;
-            match layer {
-                0 => {
-                    let slots = &slots[row..][..width];
-                    let mut x = columns.start;
-                    while x < columns.end {
-                        let slot = slots[x];
-                        let same = slots[x..columns.end].iter().take_while(|s| **s == slot);
-                        let count = same.count();
-                        self.add(slot, y, x..x + count, row + x, scratch);
-                        x += count;
-                    }
-                }
-                _ => {
-                    let sources = &hidden[(layer - 1) * slots.len() + row..][..width];
-                    let mut x = columns.start;
-                    while x < columns.end {
-                        let source = sources[x];
-                        let mut count = 1;
-                        if source != NOTHING {
-                            let slot = slots[source as usize];
-                            while x + count < columns.end
-                                && sources[x + count] == source + count as u32
-                                && slots[source as usize + count] == slot
-                            {
-                                count += 1;
-                            }
-                            self.add(slot, y, x..x + count, source as usize, scratch);
+            if layer == 0 {
+                // Runs of whole registers cost less than runs of the points that are on one plane.
+                let slots = &slots[row..][..width];
+                let planes = |x: usize| match slots[x..].first_chunk::<RUN>() {
+                    Some(run) => range(run),
+                    None => range(&slots[x..]),
+                };
+                let mut x = columns.start / RUN * RUN;
+                while x < columns.end {
+                    let of = planes(x);
+                    let more = (x + RUN..columns.end).step_by(RUN).take_while(|x| planes(*x) == of);
+                    let end = (x + RUN + more.count() * RUN).min(width);
+                    let run = &slots[x..end];
+                    if of[1] - of[0] <= 2 {
+                        self.add(of, (y, x), row + x, run.len(), scratch);
+                    } else {
+                        for slot in run.chunk_by(|a, b| a == b) {
+                            self.add([slot[0]; 2], (y, x), row + x, run.len(), scratch);
                         }
-                        x += count;
                     }
+                    x = end;
+                }
+            } else {
+                let sources = &hidden[(layer - 1) * slots.len() + row..][..width];
+                for (x, source) in sources[columns.clone()]
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, s)| **s != NOTHING)
+                {
+                    let source = *source as usize;
+                    self.add([slots[source]; 2], (y, columns.start + x), source, 1, scratch);
                 }
             }
         }
     }
 
-    /// Adds the points of row `y` and `columns` of the frame to their planes. The colour of the first point is at
-    /// `from`.
-    fn add(&self, slot: Slot, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
-        let plane = slot / 2;
-        if slot.is_multiple_of(2) {
-            self.add_to(plane, Side::On, y, columns, from, scratch);
-        } else {
-            self.add_to(plane, Side::Behind, y, columns.clone(), from, scratch);
-            self.add_to(plane + 1, Side::Before, y, columns, from, scratch);
-        }
-    }
-
-    /// Adds points that are within the halo of `plane`.
-    fn add_to(&self, plane: u16, side: Side, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
+    /// Adds `count` points from pixel (y, x) of the frame on to the planes from the least to the most of two slots. The
+    /// colour and position of the first point are at `from`.
+    fn add(
+        &self,
+        [least, most]: [Slot; 2],
+        (y, x): (usize, usize),
+        from: usize,
+        count: usize,
+        scratch: &mut TileScratch,
+    ) {
         let &Layout { border, stride, .. } = self.layout;
-        let k = usize::from(plane);
-        let halo = self.layout.halos[k];
-        let in_halo = y + halo >= self.rows.start && y < self.rows.end + halo;
-        let start = columns.start.max(self.columns.start.saturating_sub(halo));
-        let end = columns.end.min(self.columns.end + halo);
-        if !in_halo || start >= end {
-            return;
-        }
-        let y = y + border - self.rows.start;
-        let x = start + border - self.columns.start;
-        scratch.found.push((
-            plane,
-            Points {
+        for k in least as usize / 2..=(most as usize).div_ceil(2) {
+            let halo = self.layout.widest[k];
+            if y + halo < self.rows.start
+                || y >= self.rows.end + halo
+                || x + count + halo <= self.columns.start
+                || x >= self.columns.end + halo
+            {
+                continue;
+            }
+            let (y, x) = (y + border - self.rows.start, x + border - self.columns.start);
+            let points = Points {
                 at: (y * stride + x) as u32,
-                from: (from + start - columns.start) as u32,
-                count: (end - start) as u16,
-                side,
-            },
-        ));
-        scratch.starts[k + 1] += 1;
-        let span = &mut scratch.point_spans[k * self.layout.rows() + y];
-        *span = join(*span, [x, x + end - start]);
+                from: from as u32,
+                count: count as u32,
+            };
+            let span = &mut scratch.point_spans[k * self.layout.rows() + y];
+            *span = join(*span, [x, x + count]);
+            if let Some((on, latest)) = scratch.found.get_mut(scratch.latest[k] as usize)
+                && *on == k as u16
+                && points.at.wrapping_sub(latest.at) == points.from.wrapping_sub(latest.from)
+                && points.at - latest.at <= latest.count
+            {
+                latest.count = points.at - latest.at + points.count;
+                continue;
+            }
+            scratch.latest[k] = scratch.found.len() as u32;
+            scratch.found.push((k as u16, points));
+            scratch.starts[k + 1] += 1;
+        }
     }
 
     /// Sweeps one colour over the gathered points. [`Tile::store`] reads the result.
     pub(super) fn sweep(&self, colour: usize, filters: &Filters, scratch: &mut TileScratch) {
-        for part in &mut scratch.field {
-            part.values().fill(0.0);
-        }
+        scratch.field.pixels().fill(Pixel::ZERO);
         scratch.lit.fill(NOWHERE);
         let occupied = |starts: &[u32], k: usize| starts[k] < starts[k + 1];
-        let Some(mut at) = (0..self.layout.halos.len())
+        let Some(mut at) = (0..self.layout.widest.len())
             .rev()
             .find(|k| occupied(&scratch.starts, *k))
         else {
@@ -352,10 +327,10 @@ impl<'a> Tile<'a> {
         };
         self.scatter(colour, at, scratch);
         while let Some(next) = (0..at).rev().find(|k| occupied(&scratch.starts, *k)) {
-            at = self.cross(at, next, filters, scratch);
+            at = self.cross(colour, [at, next], filters, scratch);
             self.scatter(colour, at, scratch);
         }
-        at = self.cross(at, at - filters.before_end(at), filters, scratch);
+        at = self.cross(colour, [at, at - filters.before_end(at)], filters, scratch);
         // The whole tile, because unlit pixels must also be written.
         let end = self.layout.border..self.layout.border + self.rows.len();
         scratch.lit[end].fill([0, usize::MAX]);
@@ -363,12 +338,12 @@ impl<'a> Tile<'a> {
     }
 
     /// Propagates from plane `at` to plane `to` through empty space.
-    fn cross(&self, mut at: usize, to: usize, filters: &Filters, scratch: &mut TileScratch) -> usize {
+    fn cross(&self, colour: usize, [mut at, to]: [usize; 2], filters: &Filters, scratch: &mut TileScratch) -> usize {
         while at > to {
             let (taps, steps) = filters.part(at - to);
             at -= steps;
-            widen(&mut scratch.lit, &mut scratch.wider, self.layout.spread[steps]);
-            self.filter(taps, self.layout.halos[at], scratch);
+            widen(&mut scratch.lit, &mut scratch.wider, self.layout.spread[colour][steps]);
+            self.filter(taps, self.layout.halos[colour][at], scratch);
         }
         at
     }
@@ -387,38 +362,30 @@ impl<'a> Tile<'a> {
                 *lit = join(*lit, around);
             }
         }
-        let [re, im] = scratch.field.each_mut().map(Aligned::values);
-        for points in &scratch.points[points] {
-            let (at, from) = (points.at as usize, points.from as usize);
-            let count = usize::from(points.count);
-            let (re, im) = (&mut re[at..at + count], &mut im[at..at + count]);
-            let light = &rgb[from..from + count];
-            if points.side == Side::On {
-                re.copy_from_slice(light);
-                im.fill(0.0);
-                continue;
+        let field = scratch.field.pixels();
+        let positions = self.surfaces.positions;
+        wide!({
+            for points in &scratch.points[points] {
+                let (at, from) = (points.at as usize, points.from as usize);
+                let count = points.count as usize;
+                let field = &mut field[at..at + count];
+                let points = rgb[from..from + count].iter().zip(&positions[from..from + count]);
+                for (pixel, (light, position)) in field.iter_mut().zip(points) {
+                    *pixel = blend(*pixel, round(light * UNIT), share(*position, k as f32));
+                }
             }
-            let share = Share::on(k, self.layout.halos.len(), points.side == Side::Behind);
-            let depth = &self.surfaces.depth[from..from + count];
-            for (((re, im), light), depth) in re.iter_mut().zip(im).zip(light).zip(depth) {
-                let share = share.of(*depth);
-                *re += share * (light - *re);
-                *im -= share * *im;
-            }
-        }
+        });
     }
 
     /// Filters the field in place where it is lit, in the tile and `halo` around it.
     ///
-    /// Columns are processed in strips, narrow enough that the rows in use stay in the nearest cache. Within a strip,
-    /// each row is filtered along x into the ring. Once the neighbours below are there too, it is filtered along y back
-    /// into the field.
-    fn filter(&self, taps: &[[f32; 2]], halo: usize, scratch: &mut TileScratch) {
-        let border = self.layout.border;
-        let radius = taps.len() - 1;
+    /// Each row is filtered along x into the ring. Once the rows below are there too, it is filtered along y back into
+    /// the field.
+    fn filter(&self, taps: &Taps, halo: usize, scratch: &mut TileScratch) {
+        let &Layout { border, stride, .. } = self.layout;
+        let radius = taps.radius();
         let rows = border - halo..border + self.rows.len() + halo;
         let (left, right) = (border - halo, border + self.columns.len() + halo);
-        let mut columns = NOWHERE;
         for (y, span) in scratch.lit.iter_mut().enumerate() {
             let [from, to] = [span[0].max(left), span[1].min(right)];
             // Rounding to whole lines is free because they are as fast as partial ones.
@@ -426,126 +393,81 @@ impl<'a> Tile<'a> {
                 true => [from / RUN * RUN, to.next_multiple_of(RUN)],
                 false => NOWHERE,
             };
-            columns = join(columns, *span);
         }
         // Rows filtered along x are also needed by the rows around them.
         widen_down(&scratch.lit, &mut scratch.wider, radius);
-        let step = strip(radius);
-        for start in (columns[0]..columns[1]).step_by(step) {
-            let strip = Strip {
-                columns: start..(start + step).min(columns[1]),
-                first: start == columns[0],
-                last: start + step >= columns[1],
-            };
-            self.filter_strip(taps, rows.clone(), &strip, scratch);
-        }
-    }
-
-    fn filter_strip(&self, taps: &[[f32; 2]], rows: Range<usize>, strip: &Strip, scratch: &mut TileScratch) {
-        let stride = self.layout.stride;
-        let radius = taps.len() - 1;
-        let TileScratch {
-            field,
-            line,
-            kept,
-            ring,
-            places,
-            lit,
-            wider,
-            ..
-        } = scratch;
-        let mut field = field.each_mut().map(Aligned::values);
-        let mut line = line.each_mut().map(Aligned::values);
-        let [ring_re, ring_im] = ring.each_mut().map(Aligned::values);
-        let [along, down] = places.each_mut().map(|places| &mut places[..=radius]);
-        let Range { start, end } = strip.columns;
-        let cut = |[from, to]: Span| [from.max(start), to.min(end)];
-        let pitch = end - start;
-        let slots = 2 * radius + 1;
-        // The slot of `row` in the ring.
-        let mut slot = 0;
+        let (field, ring) = (scratch.field.pixels(), scratch.ring.pixels());
+        let slots = 2 * radius + 2;
         for row in rows.start - radius..rows.end + radius {
-            let at = row * stride;
-            let [from, to] = cut(wider[row]);
+            let [from, to] = scratch.wider[row];
             if from < to {
-                let out = slot * pitch + from - start..slot * pitch + to - start;
-                let out = [&mut ring_re[out.clone()], &mut ring_im[out]];
-                let centre = |along: &mut [[usize; 2]], centre: usize| {
-                    for (j, place) in along.iter_mut().enumerate() {
-                        *place = [centre - j, centre + j];
-                    }
-                };
-                // The number of columns before the strip that the filter reads.
-                let overwritten = (start + radius).saturating_sub(from);
-                if strip.first || overwritten == 0 {
-                    centre(along, at + from);
-                    let [re, im] = &field;
-                    self.fir.filter(taps, [re, im], along, out);
-                } else {
-                    for ((field, line), kept) in field.iter().zip(&mut line).zip(&*kept) {
-                        let (before, rest) = line.split_at_mut(overwritten);
-                        before.copy_from_slice(&kept[row * radius..][radius - overwritten..radius]);
-                        let length = to - start + radius;
-                        rest[..length].copy_from_slice(&field[at + start..][..length]);
-                    }
-                    centre(along, radius);
-                    self.fir.filter(taps, [line[0], line[1]], along, out);
-                }
-            }
-            if !strip.last {
-                for (field, kept) in field.iter().zip(&mut *kept) {
-                    kept[row * radius..][..radius].copy_from_slice(&field[at + end - radius..at + end]);
-                }
+                let slot = &mut ring[row % slots * stride..][..stride];
+                let source = &field[row * stride + from - radius..row * stride + to + radius];
+                self.fir.along(taps, source, &mut slot[from..to]);
             }
             // Row r needs rows up to r + radius, which is the latest one.
-            if let Some(row) = row.checked_sub(radius).filter(|row| *row >= rows.start) {
-                let [from, to] = cut(lit[row]);
+            let Some(row) = row.checked_sub(radius).filter(|row| rows.contains(row)) else {
+                continue;
+            };
+            let is_second = (row - rows.start) % 2 == 1;
+            if !is_second && row + 1 < rows.end {
+                // It is filtered with the next row.
+                continue;
+            }
+            let first = row - usize::from(is_second);
+            let [from, to] = scratch.lit[first];
+            if is_second && from < to && scratch.lit[row] == scratch.lit[first] {
+                let (first_out, out) = field[first * stride..].split_at_mut(stride);
+                let out = [&mut first_out[from..to], &mut out[from..to]];
+                self.fir.down_two(taps, ring, stride, first % slots, from, out);
+                continue;
+            }
+            for row in first..=row {
+                let [from, to] = scratch.lit[row];
                 if from < to {
-                    let place = |slot: usize| slot * pitch + from - start;
-                    let wrapped = |i: usize| if i < slots { i } else { i - slots };
-                    // The centre was filtered `radius` rows ago.
-                    let centre = wrapped(slot + slots - radius);
-                    for (j, places) in down.iter_mut().enumerate() {
-                        *places = [centre + slots - j, centre + j].map(|i| place(wrapped(i)));
-                    }
-                    let out = row * stride + from..row * stride + to;
-                    let [re, im] = &mut field;
-                    let out = [&mut re[out.clone()], &mut im[out]];
-                    self.fir.filter(taps, [ring_re, ring_im], down, out);
+                    let out = &mut field[row * stride..][from..to];
+                    self.fir.down(taps, ring, stride, row % slots, from, out);
                 }
             }
-            slot = if slot + 1 < slots { slot + 1 } else { 0 };
         }
     }
 
     /// Writes the swept tile into a colour's plane of the frame.
     pub(super) fn store(&self, plane: &mut [Complex32], scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
-        let [re, im] = scratch.field.each_mut().map(Aligned::values);
+        let field = scratch.field.pixels();
         for (i, y) in self.rows.clone().enumerate() {
             let at = (border + i) * stride + border;
             let out = &mut plane[y * self.surfaces.width..][self.columns.clone()];
-            let parts = re[at..].iter().zip(&im[at..]);
-            for (out, (re, im)) in out.iter_mut().zip(parts) {
-                *out = Complex32::new(*re, *im);
-            }
+            wide!(for (out, pixel) in out.iter_mut().zip(&field[at..]) {
+                *out = Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT);
+            });
         }
     }
 }
 
-/// Columns of the field that are filtered together. After the first strip, the columns that the previous strip has
-/// overwritten are kept for it.
-struct Strip {
-    columns: Range<usize>,
-    first: bool,
-    last: bool,
+/// Returns the least and the most of slots.
+#[inline(always)]
+fn range(slots: &[Slot]) -> [Slot; 2] {
+    let least = slots.iter().fold(Slot::MAX, |least, slot| least.min(*slot));
+    let most = slots.iter().fold(0, |most, slot| most.max(*slot));
+    [least, most]
 }
 
-/// Returns the number of columns of a strip. It lets the rows of a filter's ring stay in the nearest cache, but is at
-/// least the filter's radius.
-fn strip(radius: usize) -> usize {
-    const RING: usize = 3072;
-    (RING / (2 * radius + 1)).max(radius).max(2 * RUN).next_multiple_of(RUN)
+/// Rounds a value of 0 to 2¹⁶ to the nearest integer.
+#[inline(always)]
+fn round(value: f32) -> i32 {
+    // With this addend, the integer is in the lower bits of the sum. A conversion would not be vectorised as well.
+    const ADDEND: f32 = (3 << 22) as f32;
+    (value + ADDEND).to_bits().cast_signed() - ADDEND.to_bits().cast_signed()
+}
+
+/// Replaces a share of `pixel` with the same share of `light`.
+#[inline(always)]
+fn blend(pixel: Pixel, light: i32, share: f32) -> Pixel {
+    let share = round(share * 32768.0);
+    let part = |part: i32, light: i32| part + ((share * (light - part) + 16384) >> 15);
+    Pixel::new(part(pixel.re(), light), part(pixel.im(), 0))
 }
 
 /// Widens spans by `by` pixels in all directions. `wider` is working memory.
