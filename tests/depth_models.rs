@@ -4,10 +4,10 @@ use prost::Message;
 use tract_onnx::pb::*;
 
 /// The weights of the small network.
-pub const WEIGHTS: [f32; 3] = [-0.25, 0.0, 1.0];
+pub(crate) const WEIGHTS: [f32; 3] = [-0.25, 0.0, 1.0];
 
 /// Creates a depth network: one 1×1 convolution over the colours, for pictures of `sides`.
-pub fn network(sides: Option<(i64, i64)>, interleaved: bool) -> Vec<u8> {
+pub(crate) fn network(sides: Option<(i64, i64)>, interleaved: bool) -> Vec<u8> {
     let dim = |value: Option<i64>, name: &str| tensor_shape_proto::Dimension {
         value: Some(match value {
             Some(n) => tensor_shape_proto::dimension::Value::DimValue(n),

@@ -1,7 +1,7 @@
 //! The options of a session.
 
 use crate::error::{PhasefrontError, guard};
-use crate::network::Network;
+use crate::network::{DepthNetwork, Network};
 use crate::target::Target;
 use phasefront::Sweep;
 use phasefront::input::DepthRange;

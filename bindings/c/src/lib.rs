@@ -33,14 +33,17 @@ pub use modulator::{
     PfModulator, pf_modulator_free, pf_modulator_from_toml, pf_modulator_named, pf_modulator_output_size,
     pf_modulator_target, pf_modulator_write_output,
 };
-pub use network::{PfNetwork, pf_network_built_in, pf_network_free, pf_network_from_bytes, pf_network_from_file};
+pub use network::{
+    PfColourScale, PfDepthNetwork, PfNetwork, pf_depth_network_free, pf_depth_network_from_bytes, pf_network_built_in,
+    pf_network_free, pf_network_from_bytes, pf_network_from_file,
+};
 pub use options::{
     PfBackend, PfMethod, PfOptions, PfQualityLevel, pf_options_clear_quality_levels, pf_options_free, pf_options_new,
     pf_options_push_quality_level, pf_options_set_anti_alias, pf_options_set_backend, pf_options_set_band_limit,
     pf_options_set_brightness_fixed, pf_options_set_brightness_frame_max, pf_options_set_brightness_smoothed,
-    pf_options_set_dark_threshold, pf_options_set_deep, pf_options_set_depth_range, pf_options_set_double_phase,
-    pf_options_set_least_confidence, pf_options_set_local_steps, pf_options_set_midpoint_steps,
-    pf_options_set_most_pixels, pf_options_set_target_rate_hz, pf_options_set_threads,
+    pf_options_set_dark_threshold, pf_options_set_deep, pf_options_set_depth_network, pf_options_set_depth_range,
+    pf_options_set_double_phase, pf_options_set_least_confidence, pf_options_set_local_steps,
+    pf_options_set_midpoint_steps, pf_options_set_most_pixels, pf_options_set_target_rate_hz, pf_options_set_threads,
 };
 pub use session::{
     PfDropReason, PfListener, PfQualityChange, PfQualityReason, PfRunningMode, PfSession, PfStatistics, PfThermal,

@@ -2,6 +2,8 @@
 //! process-wide handler, are separate programs beside it.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../../../tests/depth_models.rs"]
+mod depth_models;
 #[path = "../../../../tests/driver.rs"]
 mod driver;
 #[path = "../../../../tests/folder.rs"]

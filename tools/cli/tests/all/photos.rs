@@ -11,10 +11,8 @@ use ndarray::Array3;
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront_io::hologram;
 use phasefront_io::picture::photo;
-use prost::Message;
 use std::fs;
 use std::io::Cursor;
-use tract_onnx::pb::*;
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 32;
