@@ -496,6 +496,21 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawmodulator_target(uint64_t ptr, RustC
 void uniffi_phasefront_ffi_fn_method_rawmodulator_write_output(uint64_t ptr, uint64_t hologram, int32_t image, RustBuffer to, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_DEPTHNETWORK
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_DEPTHNETWORK
+uint64_t uniffi_phasefront_ffi_fn_clone_depthnetwork(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_DEPTHNETWORK
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_DEPTHNETWORK
+void uniffi_phasefront_ffi_fn_free_depthnetwork(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_DEPTHNETWORK_FROM_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_DEPTHNETWORK_FROM_BYTES
+uint64_t uniffi_phasefront_ffi_fn_constructor_depthnetwork_from_bytes(ForeignBytes onnx, RustBuffer colours, int8_t gives_distance, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_HOLOGRAMNETWORK
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_HOLOGRAMNETWORK
 uint64_t uniffi_phasefront_ffi_fn_clone_hologramnetwork(uint64_t handle, RustCallStatus *_Nonnull out_status
@@ -1296,6 +1311,12 @@ uint16_t uniffi_phasefront_ffi_checksum_constructor_rawmodulator_from_toml(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWMODULATOR_NAMED
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWMODULATOR_NAMED
 uint16_t uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_DEPTHNETWORK_FROM_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_DEPTHNETWORK_FROM_BYTES
+uint16_t uniffi_phasefront_ffi_checksum_constructor_depthnetwork_from_bytes(void
     
 );
 #endif

@@ -122,6 +122,11 @@ typedef enum PfDepthFormat {
   PF_DEPTH_FORMAT_NORMALIZED_U8 = 6,
   // 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
   PF_DEPTH_FORMAT_NORMALIZED_U16 = 7,
+  // Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
+  // are not finite mean no reading.
+  PF_DEPTH_FORMAT_RELATIVE_F32 = 8,
+  // Relative inverse depth as 16-bit floats.
+  PF_DEPTH_FORMAT_RELATIVE_F16 = 9,
 } PfDepthFormat;
 
 // The memory layout of a confidence map.
@@ -202,6 +207,10 @@ typedef enum PfLayout {
   // One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
   PF_LAYOUT_GREY16 = 5,
 } PfLayout;
+
+// A network that estimates relative inverse depth from colour alone. It is immutable and can be used by several
+// sessions.
+typedef struct PfDepthNetwork PfDepthNetwork;
 
 // The hologram of one frame: modulator levels of its colours.
 typedef struct PfHologram PfHologram;
@@ -407,7 +416,7 @@ typedef struct PfDepth {
   uint32_t width;
   // The height of the sensor's image, in pixels.
   uint32_t height;
-  // The plane.
+  // The plane. Without data there is no depth, and the session's depth network estimates it.
   struct PfPlane plane;
 } PfDepth;
 
@@ -587,6 +596,18 @@ enum PfStatus pf_network_from_file(const char *path, struct PfNetwork **network)
 // Frees a network. Sessions and options that use it are not affected.
 void pf_network_free(struct PfNetwork *network);
 
+// Reads a depth network from the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W)
+// or (1, H, W, 3), with colours of the scale `colours`, a PfColourScale, and gives one plane: inverse depth, or
+// distance if `gives_distance`.
+enum PfStatus pf_depth_network_from_bytes(const uint8_t *onnx,
+                                          size_t length,
+                                          uint32_t colours,
+                                          bool gives_distance,
+                                          struct PfDepthNetwork **network);
+
+// Frees a depth network. Sessions and options that use it are not affected.
+void pf_depth_network_free(struct PfDepthNetwork *network);
+
 // Creates the default options for `target`: holograms at its modulator's resolution by `method`, a PfMethod. `network`
 // is the method's network, or NULL for methods without one.
 enum PfStatus pf_options_new(const struct PfTarget *target,
@@ -621,6 +642,10 @@ enum PfStatus pf_options_set_band_limit(struct PfOptions *options, float k);
 // Selects double phase after a pre-filter network (DDPM), which was trained together with the hologram network for the
 // offset of the display.
 enum PfStatus pf_options_set_deep(struct PfOptions *options, const struct PfNetwork *prefilter);
+
+// Sets the network that estimates the depth of frames without depth. A live session runs it on its own thread, at the
+// network's own rate; other sessions run it for each frame.
+enum PfStatus pf_options_set_depth_network(struct PfOptions *options, const struct PfDepthNetwork *network);
 
 // Maps an amplitude near the frame's largest to full light. It changes smoothly from frame to frame. This is the
 // default.

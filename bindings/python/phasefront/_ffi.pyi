@@ -39,8 +39,8 @@ class ConfidenceFormat(enum.Enum):
     U8 = 1
 
 class DepthFormat(enum.Enum):
-    """The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
-    are not finite mean no reading.
+    """The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers
+    and numbers that are not finite mean no reading.
 
     Values:
         METRES_F32: Metres as 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
@@ -51,6 +51,8 @@ class DepthFormat(enum.Enum):
         ANDROID_DEPTH16: Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits. It differs from millimetres in all 16 bits.
         NORMALIZED_U8: Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
         NORMALIZED_U16: 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
+        RELATIVE_F32: Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that are not finite mean no reading.
+        RELATIVE_F16: Relative inverse depth as 16-bit floats.
     """
     METRES_F32 = 0
     METRES_F16 = 1
@@ -60,6 +62,8 @@ class DepthFormat(enum.Enum):
     ANDROID_DEPTH16 = 5
     NORMALIZED_U8 = 6
     NORMALIZED_U16 = 7
+    RELATIVE_F32 = 8
+    RELATIVE_F16 = 9
 
 class Encoding:
     """The conversion of a field to phases.
@@ -268,6 +272,18 @@ class Backend(enum.Enum):
     """
     CPU = 0
     GPU = 1
+
+class ColourScale(enum.Enum):
+    """The scaling that a depth network expects for colour values from 0 to 1.
+
+    Values:
+        IMAGENET: Normalized by the mean and the spread of ImageNet, as in the training of MiDaS, DPT and Depth Anything.
+        UNIT: From 0 to 1.
+        SIGNED: From -1 to 1.
+    """
+    IMAGENET = 0
+    UNIT = 1
+    SIGNED = 2
 
 class DropReason(enum.Enum):
     """The reason why a session dropped a frame without an error.
@@ -604,18 +620,18 @@ class FrameInfo:
     Fields:
         timestamp_ns: The time at which the frame was taken, in nanoseconds of any clock that runs forward.
         colour: The colour image.
-        depth: The depth image.
-        confidence: The confidence map of the depth image; none if there is no map.
+        depth: The depth image; none if the session's depth network estimates it.
+        confidence: The confidence map of the depth image; none if there is no map or no depth image.
         orientation: The transformation of all images to upright ones.
         cameras: The correspondence of the pixels of depth and colour; none if both images have the same field of view.
     """
     timestamp_ns: int
     colour: ColourInfo
-    depth: DepthInfo
+    depth: DepthInfo | None
     confidence: ConfidenceInfo | None
     orientation: Orientation
     cameras: Cameras | None
-    def __init__(self, *, timestamp_ns: int, colour: ColourInfo, depth: DepthInfo, confidence: ConfidenceInfo | None, orientation: Orientation, cameras: Cameras | None) -> None: ...
+    def __init__(self, *, timestamp_ns: int, colour: ColourInfo, depth: DepthInfo | None, confidence: ConfidenceInfo | None, orientation: Orientation, cameras: Cameras | None) -> None: ...
 
 class FrameTimes:
     """The time that each stage of a frame took, in milliseconds.
@@ -758,6 +774,7 @@ class SessionOptions:
         threads: The number of threads to compute with, at most 256; none for as many as the device has.
         most_pixels: The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a session is a multiple of it.
         backend: The backend that computes frames.
+        depth_network: The network that estimates the depth of frames without depth; none if all frames have depth. A live session runs it on its own thread, at the network's own rate; other sessions run it for each frame.
     """
     target: Target
     quality_levels: list[QualityLevel]
@@ -773,7 +790,8 @@ class SessionOptions:
     threads: int | None
     most_pixels: int
     backend: Backend
-    def __init__(self, *, target: Target, quality_levels: list[QualityLevel], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend) -> None: ...
+    depth_network: DepthNetwork | None
+    def __init__(self, *, target: Target, quality_levels: list[QualityLevel], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend, depth_network: DepthNetwork | None = ...) -> None: ...
 
 class Statistics:
     """The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
@@ -908,6 +926,19 @@ class Target:
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def display(self) -> Display:
         """Returns the display."""
+
+class DepthNetwork:
+    """A network that estimates relative inverse depth from colour alone, for frames without depth. It is immutable and can
+    be used by several sessions.
+    """
+    @classmethod
+    def from_bytes(cls, onnx: bytes, colours: ColourScale | None = ..., gives_distance: bool = False) -> DepthNetwork:
+        """Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or (1, H, W, 3),
+        with colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.
+
+        Errors: Returns an error if the library does not read the file.
+        """
+    def __init__(self, *args: object, **kwargs: object) -> None: ...
 
 class LogListener:
     """A receiver of log messages, which is called on any thread. It may call the library. On a thread that computes for a

@@ -640,6 +640,140 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
 
 
 /**
+ * A network that estimates relative inverse depth from colour alone, for frames without depth. It is immutable and can
+ * be used by several sessions.
+ */
+public protocol DepthNetworkProtocol: AnyObject, Sendable {
+    
+}
+/**
+ * A network that estimates relative inverse depth from colour alone, for frames without depth. It is immutable and can
+ * be used by several sessions.
+ */
+open class DepthNetwork: DepthNetworkProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_depthnetwork(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_depthnetwork(handle, $0) }
+    }
+
+    
+    /**
+     * Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or (1, H, W, 3),
+     * with colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.
+     *
+     * # Errors
+     * Returns an error if the library does not read the file.
+     */
+public static func fromBytes(onnx: Data, colours: ColourScale? = nil, givesDistance: Bool = false)throws  -> DepthNetwork  {
+    return try  FfiConverterTypeDepthNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(onnx) { onnxFb in
+    uniffi_phasefront_ffi_fn_constructor_depthnetwork_from_bytes(
+        onnxFb,
+        FfiConverterOptionTypeColourScale.lower(colours),
+        FfiConverterBool.lower(givesDistance),uniffiCallStatus
+    )
+        }
+})
+}
+    
+
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeDepthNetwork: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = DepthNetwork
+
+    public static func lift(_ handle: UInt64) throws -> DepthNetwork {
+        return DepthNetwork(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: DepthNetwork) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> DepthNetwork {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: DepthNetwork, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeDepthNetwork_lift(_ handle: UInt64) throws -> DepthNetwork {
+    return try FfiConverterTypeDepthNetwork.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeDepthNetwork_lower(_ value: DepthNetwork) -> UInt64 {
+    return FfiConverterTypeDepthNetwork.lower(value)
+}
+
+
+
+
+
+
+/**
  * A hologram network. It is immutable and can be used by several sessions.
  */
 public protocol HologramNetworkProtocol: AnyObject, Sendable {
@@ -3778,11 +3912,11 @@ public struct FrameInfo: Equatable, Hashable {
      */
     public var colour: ColourInfo
     /**
-     * The depth image.
+     * The depth image; none if the session's depth network estimates it.
      */
-    public var depth: DepthInfo
+    public var depth: DepthInfo?
     /**
-     * The confidence map of the depth image; none if there is no map.
+     * The confidence map of the depth image; none if there is no map or no depth image.
      */
     public var confidence: ConfidenceInfo?
     /**
@@ -3804,10 +3938,10 @@ public struct FrameInfo: Equatable, Hashable {
          * The colour image.
          */colour: ColourInfo, 
         /**
-         * The depth image.
-         */depth: DepthInfo, 
+         * The depth image; none if the session's depth network estimates it.
+         */depth: DepthInfo?, 
         /**
-         * The confidence map of the depth image; none if there is no map.
+         * The confidence map of the depth image; none if there is no map or no depth image.
          */confidence: ConfidenceInfo?, 
         /**
          * The transformation of all images to upright ones.
@@ -3841,7 +3975,7 @@ public struct FfiConverterTypeFrameInfo: FfiConverterRustBuffer {
             try FrameInfo(
                 timestampNs: FfiConverterInt64.read(from: &buf), 
                 colour: FfiConverterTypeColourInfo.read(from: &buf), 
-                depth: FfiConverterTypeDepthInfo.read(from: &buf), 
+                depth: FfiConverterOptionTypeDepthInfo.read(from: &buf), 
                 confidence: FfiConverterOptionTypeConfidenceInfo.read(from: &buf), 
                 orientation: FfiConverterTypeOrientation.read(from: &buf), 
                 cameras: FfiConverterOptionTypeCameras.read(from: &buf)
@@ -3851,7 +3985,7 @@ public struct FfiConverterTypeFrameInfo: FfiConverterRustBuffer {
     public static func write(_ value: FrameInfo, into buf: inout [UInt8]) {
         FfiConverterInt64.write(value.timestampNs, into: &buf)
         FfiConverterTypeColourInfo.write(value.colour, into: &buf)
-        FfiConverterTypeDepthInfo.write(value.depth, into: &buf)
+        FfiConverterOptionTypeDepthInfo.write(value.depth, into: &buf)
         FfiConverterOptionTypeConfidenceInfo.write(value.confidence, into: &buf)
         FfiConverterTypeOrientation.write(value.orientation, into: &buf)
         FfiConverterOptionTypeCameras.write(value.cameras, into: &buf)
@@ -5132,6 +5266,11 @@ public struct SessionOptions {
      * The backend that computes frames.
      */
     public var backend: Backend
+    /**
+     * The network that estimates the depth of frames without depth; none if all frames have depth. A live session runs
+     * it on its own thread, at the network's own rate; other sessions run it for each frame.
+     */
+    public var depthNetwork: DepthNetwork?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -5182,7 +5321,11 @@ public struct SessionOptions {
          */mostPixels: Int = 33554432, 
         /**
          * The backend that computes frames.
-         */backend: Backend) {
+         */backend: Backend, 
+        /**
+         * The network that estimates the depth of frames without depth; none if all frames have depth. A live session runs
+         * it on its own thread, at the network's own rate; other sessions run it for each frame.
+         */depthNetwork: DepthNetwork? = nil) {
         self.target = target
         self.qualityLevels = qualityLevels
         self.quality = quality
@@ -5197,6 +5340,7 @@ public struct SessionOptions {
         self.threads = threads
         self.mostPixels = mostPixels
         self.backend = backend
+        self.depthNetwork = depthNetwork
     }
 
     
@@ -5228,7 +5372,8 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
                 threads: FfiConverterOptionTypeInt.read(from: &buf), 
                 mostPixels: FfiConverterTypeInt.read(from: &buf), 
-                backend: FfiConverterTypeBackend.read(from: &buf)
+                backend: FfiConverterTypeBackend.read(from: &buf), 
+                depthNetwork: FfiConverterOptionTypeDepthNetwork.read(from: &buf)
         )
     }
 
@@ -5247,6 +5392,7 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         FfiConverterOptionTypeInt.write(value.threads, into: &buf)
         FfiConverterTypeInt.write(value.mostPixels, into: &buf)
         FfiConverterTypeBackend.write(value.backend, into: &buf)
+        FfiConverterOptionTypeDepthNetwork.write(value.depthNetwork, into: &buf)
     }
 }
 
@@ -5710,6 +5856,91 @@ public func FfiConverterTypeColourFormat_lower(_ value: ColourFormat) -> RustBuf
 
 
 /**
+ * The scaling that a depth network expects for colour values from 0 to 1.
+ */
+
+public enum ColourScale: Equatable, Hashable {
+    
+    /**
+     * Normalized by the mean and the spread of ImageNet, as in the training of MiDaS, DPT and Depth Anything.
+     */
+    case imagenet
+    /**
+     * From 0 to 1.
+     */
+    case unit
+    /**
+     * From -1 to 1.
+     */
+    case signed
+
+
+
+
+
+}
+
+#if compiler(>=6)
+extension ColourScale: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeColourScale: FfiConverterRustBuffer {
+    typealias SwiftType = ColourScale
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> ColourScale {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+        
+        case 1: return .imagenet
+        
+        case 2: return .unit
+        
+        case 3: return .signed
+        
+        default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: ColourScale, into buf: inout [UInt8]) {
+        switch value {
+        
+        
+        case .imagenet:
+            writeInt(&buf, Int32(1))
+        
+        
+        case .unit:
+            writeInt(&buf, Int32(2))
+        
+        
+        case .signed:
+            writeInt(&buf, Int32(3))
+        
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeColourScale_lift(_ buf: RustBuffer) throws -> ColourScale {
+    return try FfiConverterTypeColourScale.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeColourScale_lower(_ value: ColourScale) -> RustBuffer {
+    return FfiConverterTypeColourScale.lower(value)
+}
+
+
+
+/**
  * The memory layout of a confidence map.
  */
 
@@ -5785,8 +6016,8 @@ public func FfiConverterTypeConfidenceFormat_lower(_ value: ConfidenceFormat) ->
 
 
 /**
- * The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
- * are not finite mean no reading.
+ * The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers
+ * and numbers that are not finite mean no reading.
  */
 
 public enum DepthFormat: Equatable, Hashable {
@@ -5824,6 +6055,15 @@ public enum DepthFormat: Equatable, Hashable {
      * 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
      */
     case normalizedU16
+    /**
+     * Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
+     * are not finite mean no reading.
+     */
+    case relativeF32
+    /**
+     * Relative inverse depth as 16-bit floats.
+     */
+    case relativeF16
 
 
 
@@ -5860,6 +6100,10 @@ public struct FfiConverterTypeDepthFormat: FfiConverterRustBuffer {
         case 7: return .normalizedU8
         
         case 8: return .normalizedU16
+        
+        case 9: return .relativeF32
+        
+        case 10: return .relativeF16
         
         default: throw UniffiInternalError.unexpectedEnumCase
         }
@@ -5899,6 +6143,14 @@ public struct FfiConverterTypeDepthFormat: FfiConverterRustBuffer {
         
         case .normalizedU16:
             writeInt(&buf, Int32(8))
+        
+        
+        case .relativeF32:
+            writeInt(&buf, Int32(9))
+        
+        
+        case .relativeF16:
+            writeInt(&buf, Int32(10))
         
         }
     }
@@ -7547,6 +7799,30 @@ fileprivate struct FfiConverterOptionDouble: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionTypeDepthNetwork: FfiConverterRustBuffer {
+    typealias SwiftType = DepthNetwork?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeDepthNetwork.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeDepthNetwork.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeLogListener: FfiConverterRustBuffer {
     typealias SwiftType = LogListener?
 
@@ -7683,6 +7959,54 @@ fileprivate struct FfiConverterOptionTypeConfidenceInfo: FfiConverterRustBuffer 
         switch try readInt(&buf) as Int8 {
         case 0: return nil
         case 1: return try FfiConverterTypeConfidenceInfo.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterOptionTypeDepthInfo: FfiConverterRustBuffer {
+    typealias SwiftType = DepthInfo?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeDepthInfo.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeDepthInfo.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterOptionTypeColourScale: FfiConverterRustBuffer {
+    typealias SwiftType = ColourScale?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeColourScale.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeColourScale.read(from: &buf)
         default: throw UniffiInternalError.unexpectedOptionalTag
         }
     }
@@ -8181,6 +8505,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named() != 2724) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_depthnetwork_from_bytes() != 8526) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_hologramnetwork_built_in() != 26010) {
