@@ -16,7 +16,7 @@ fn every_call_is_guarded() {
                 "call(|| ",
                 "free(",
                 "set(options, ",
-                "encode(options, ",
+                "encode(",
                 "brighten(options, ",
                 "with(session, ",
             ];

@@ -120,7 +120,8 @@ fn sweeps_are_those_of_the_cpu() {
         let gpu = ImageSession::new(gpu).unwrap();
         let expected = cpu.process(&frame_at(1)).unwrap();
         let made = gpu.process(&frame_at(1)).unwrap();
-        assert!((made.scale() - expected.scale()).abs() < 1e-3 * expected.scale());
+        let (scale, wanted) = (made.scale(), expected.scale());
+        assert!((scale - wanted).abs() < 2e-3 * wanted, "{word}: {scale} for {wanted}");
         // The CPU's sweep is rounded to 16 bits.
         let share = differing(made.levels(), expected.levels(), 0.01);
         assert!(share < 0.1, "{word}: {share}");

@@ -278,7 +278,7 @@ impl SweepPlan {
             slots: vec![0; size],
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
-            tiles: Workers::new(|| TileScratch::new(&self.layout, layers + 1)),
+            tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers + 1)),
             cancel: Cancel::default(),
         }
     }

@@ -138,11 +138,11 @@ impl Aligned {
 }
 
 impl TileScratch {
-    /// Creates working memory for the tiles of frames of `layers` layers.
-    pub(super) fn new(layout: &Layout, layers: usize) -> Self {
+    /// Creates working memory for the tiles of frames of `pixels` pixels in `layers` layers.
+    pub(super) fn new(layout: &Layout, pixels: usize, layers: usize) -> Self {
         let (rows, stride, planes) = (layout.rows(), layout.stride, layout.widest.len());
-        // Each point can be on two planes.
-        let points = 2 * layers * rows * stride;
+        // Each point can be on two planes. Most of a small frame's buffer lies outside the frame.
+        let points = 2 * layers * pixels.min(rows * stride);
         TileScratch {
             field: Aligned::new(rows * stride),
             ring: Aligned::new((2 * layout.longest + 2) * stride),
