@@ -40,7 +40,7 @@ pub struct Row {
     pub method: &'static str,
     /// The number of convolution layers; 0 without a network.
     pub layers: usize,
-    /// The precision: `f32` or `int8`.
+    /// The precision: `f32` or `int8` of a network, `int16` of the sweep.
     pub precision: String,
     /// The backend: always `cpu`.
     pub backend: &'static str,
@@ -144,15 +144,14 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         macs / stage_ms[name] / 1e6
     });
     let isa = pipeline.method().engine().and_then(|engine| engine.isa);
-    let precision = network.map_or(Precision::F32, |network| network.precision());
-    let peak = isa.and_then(|isa| match precision {
+    let peak = isa.and_then(|isa| match network?.precision() {
         Precision::Int8 => int8_peak(isa, PEAK_TIME),
         _ => f32_peak(isa, PEAK_TIME),
     });
     Ok(Row {
         method: name,
         layers: network.map_or(0, |network| network.layers()),
-        precision: precision.to_string(),
+        precision: network.map_or("int16".to_owned(), |network| network.precision().to_string()),
         backend: "cpu",
         kernels: (pipeline.method().engine()).map_or("", |engine| engine.name).to_owned(),
         width,
