@@ -6,8 +6,8 @@
 //! crate follows these rules:
 //!
 //! - Images are passed as `&[u8]`, which UniFFI passes without a copy. Results are objects whose memory is read in
-//!   place, at an address that is valid as long as the object, and images are written into memory of the caller. Nothing
-//!   is passed pixel by pixel.
+//!   place, at an address that is valid as long as the object, and images are written into memory of the caller.
+//!   Nothing is passed pixel by pixel.
 //! - Every call that can fail returns a result. A panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 

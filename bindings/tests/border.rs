@@ -1,5 +1,5 @@
-//! Checks that no panic escapes to the other languages: each exported function that can fail runs inside `guard`, and the
-//! others are few and listed here.
+//! Checks that no panic escapes to the other languages: each exported function that can fail runs inside `guard`, and
+//! the others are few and listed here.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;

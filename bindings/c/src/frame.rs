@@ -64,8 +64,8 @@ pub enum PfDepthFormat {
     NormalizedU8 = 6,
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16 = 7,
-    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
-    /// are not finite mean no reading.
+    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
+    /// that are not finite mean no reading.
     RelativeF32 = 8,
     /// Relative inverse depth as 16-bit floats.
     RelativeF16 = 9,

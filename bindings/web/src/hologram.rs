@@ -182,7 +182,8 @@ thread_local! {
     static IMAGE: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Lets `write` fill an image of (H, bytes of a row) and copies it into `to`, whose rows begin `row_stride` bytes apart.
+/// Lets `write` fill an image of (H, bytes of a row) and copies it into `to`, whose rows begin `row_stride` bytes
+/// apart.
 pub(crate) fn copied(
     to: &Uint8Array,
     row_stride: u32,

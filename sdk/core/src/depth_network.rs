@@ -37,8 +37,8 @@ pub struct DepthNetwork {
 }
 
 impl DepthNetwork {
-    /// Reads the bytes of an ONNX file that holds its own weights. The network takes colours by [`ColourScale::Imagenet`]
-    /// and gives inverse depth, unless the fields are set otherwise.
+    /// Reads the bytes of an ONNX file that holds its own weights. The network takes colours by
+    /// [`ColourScale::Imagenet`] and gives inverse depth, unless the fields are set otherwise.
     ///
     /// # Errors
     /// Returns [`Error::Network`] if tract does not read the file, or if it has too many parts.

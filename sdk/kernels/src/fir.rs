@@ -1,5 +1,5 @@
-//! Symmetric complex filters along one axis of a plane, in 16-bit fixed point: half of a separable propagation step of a
-//! wave.
+//! Symmetric complex filters along one axis of a plane, in 16-bit fixed point: half of a separable propagation step of
+//! a wave.
 //!
 //! A pixel of a wave is a real and an imaginary part of 15 bits, so that two pixels can be added in 16. Mirrored pixels
 //! are added first and multiplied by their common tap. Products are summed exactly in 32 bits, and only the sum is
@@ -26,8 +26,8 @@ pub const LEAST: i16 = -1 << 14;
 /// See [`LEAST`].
 pub const MOST: i16 = (1 << 14) - 1;
 
-/// A wave at a pixel, in units that the caller chooses: the real part in the lower half, the imaginary part in the upper.
-/// Both are from [`LEAST`] to [`MOST`].
+/// A wave at a pixel, in units that the caller chooses: the real part in the lower half, the imaginary part in the
+/// upper. Both are from [`LEAST`] to [`MOST`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Pixel(u32);
@@ -128,8 +128,8 @@ trait Lanes: Copy {
 }
 
 /// The arguments of a kernel. The pixels of the taps are in `slots` slots, `pitch` pixels apart: the centre's in slot
-/// `centre`, those of tap j in the jth slots before and behind it. Slots wrap around. The centre of the second output, if
-/// there is one, is in the slot behind the first's.
+/// `centre`, those of tap j in the jth slots before and behind it. Slots wrap around. The centre of the second output,
+/// if there is one, is in the slot behind the first's.
 #[derive(Clone, Copy)]
 struct Run<const ROWS: usize> {
     source: *const Pixel,

@@ -1,6 +1,6 @@
 //! The picture that a depth network takes. The file's own input defines its number type, the axis of its three colours
-//! (NCHW or NHWC) and its size. If the size is open, the picture nearly keeps its proportions: its shorter side is about
-//! [`DEFAULT_SIDE`], and both sides are multiples of [`MULTIPLE`].
+//! (NCHW or NHWC) and its size. If the size is open, the picture nearly keeps its proportions: its shorter side is
+//! about [`DEFAULT_SIDE`], and both sides are multiples of [`MULTIPLE`].
 
 use super::{ColourScale, one_line};
 use crate::frame::Axis;

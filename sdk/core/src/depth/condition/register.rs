@@ -1,6 +1,7 @@
 //! Registration: finds the shift between depth and colour from their edges, and by how many readings near surfaces are
 //! too wide, as sensors that compare windows of two pictures make them. The difference between two neighbouring
-//! readings marks an edge of depth between them. Shift and growth are right where the most colour edges lie under these.
+//! readings marks an edge of depth between them. Shift and growth are right where the most colour edges lie under
+//! these.
 //!
 //! Growth moves an edge toward what is behind it, so the evidence of each diagonal direction is summed separately.
 //! Colour is sampled at up to four places per reading along each axis, so a shift is found to a quarter of a reading.
