@@ -13,7 +13,7 @@ maven() {
 # generate_kotlin GENERATOR LIBRARY FOLDER: generates Kotlin for JVMs and for Android by UniFFI, into FOLDER/jvm and
 # FOLDER/android.
 generate_kotlin() {
-    "$1" generate "$2" --language kotlin --no-format --config bindings/generators.toml --out-dir "$3/jvm" &&
+    "$1" generate "$2" --language kotlin --no-format --config bindings/uniffi.toml --out-dir "$3/jvm" &&
         "$1" generate "$2" --language kotlin --no-format --config android/uniffi.toml --out-dir "$3/android" &&
         tests/snippets kotlin "$3/snippets"
 }

@@ -144,8 +144,8 @@ impl RawHologram {
         let (near_m, far_m) = self.core.range_m().unzip();
         HologramInfo {
             timestamp_ns: self.core.timestamp_ns() as i64,
-            width: width,
-            height: height,
+            width,
+            height,
             colours: self.core.colours(),
             scale: self.core.scale(),
             near_m,
@@ -252,8 +252,8 @@ impl RawHologram {
         let (height, width) = self.core.shape();
         Arc::new(RawPlanes {
             numbers,
-            width: width,
-            height: height,
+            width,
+            height,
             colours: self.core.colours(),
         })
     }

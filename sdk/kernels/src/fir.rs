@@ -433,7 +433,7 @@ mod tests {
     #[test]
     fn every_kernel_is_the_definition() {
         for isa in Isa::fir() {
-            let fir = Fir::new(isa).unwrap();
+            let fir = Fir::new(isa).expect("an available set has kernels");
             for (radius, length, largest) in [(1, 16, 0.1), (5, 96, 0.3), (17, 80, 0.2), (5, 176, 0.9), (40, 32, 0.1)] {
                 let taps = taps(radius, largest);
                 let row = noise(length + 2 * radius, 7);

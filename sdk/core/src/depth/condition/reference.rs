@@ -58,7 +58,13 @@ fn colour_edges((h, w): (usize, usize), samples: usize, crop: Crop, rgb: ArrayVi
         let sum = a.zip(b).map_or(0.0, |(a, b)| (0..3).map(|c| (a[c] - b[c]).abs()).sum());
         f64::from(sum / (sum + register::HALF))
     };
-    let before = |i: usize| if samples % 2 == 0 { i.saturating_sub(1) } else { i };
+    let before = |i: usize| {
+        if samples.is_multiple_of(2) {
+            i.saturating_sub(1)
+        } else {
+            i
+        }
+    };
     let edges = [false, true].map(|down| {
         Array2::from_shape_fn((rows, columns), |(y, x)| match down {
             false => change(colour(y, before(x)), colour(y, (x + 1).min(columns - 1))),
@@ -120,6 +126,19 @@ fn evidence(
     (sum, weights)
 }
 
+/// Gives holes the depth of the surface with their colour, from their rims inward.
+fn fill(readings: &mut Array2<f32>, colours: &impl Fn(usize, usize) -> Vec<[f64; 3]>) {
+    for pass in 0..fill::PASSES {
+        let before = readings.clone();
+        for (at, value) in readings.indexed_iter_mut().filter(|(_, value)| value.is_nan()) {
+            if pass >= fill::ALIKE_PASSES || has_alike(&before, at, colours) {
+                *value = surface(rim(&before, at, colours)).0;
+            }
+        }
+    }
+    fill_nearest(readings).expect("there is a reading");
+}
+
 /// Conditions the part `crop` of `depth`, (h, w), which lies beside `rgb`, (3, H, W), as `misfit` says, and returns
 /// (H, W). `depth` has NaN for no reading and at least one reading.
 pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>, misfit: Misfit) -> Array2<f32> {
@@ -135,15 +154,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
     };
     let mut readings = narrowed(depth, misfit.growth);
     let mut filled = readings.mapv(f32::is_nan);
-    for pass in 0..fill::PASSES {
-        let before = readings.clone();
-        for (at, value) in readings.indexed_iter_mut().filter(|(_, value)| value.is_nan()) {
-            if pass >= fill::ALIKE_PASSES || has_alike(&before, at, &colours) {
-                *value = surface(rim(&before, at, &colours)).0;
-            }
-        }
-    }
-    fill_nearest(&mut readings).expect("there is a reading");
+    fill(&mut readings, &colours);
     let planes = (
         rgb.as_slice().expect("standard layout"),
         readings.as_slice().expect("standard layout"),
