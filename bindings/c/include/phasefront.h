@@ -122,8 +122,8 @@ typedef enum PfDepthFormat {
   PF_DEPTH_FORMAT_NORMALIZED_U8 = 6,
   // 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
   PF_DEPTH_FORMAT_NORMALIZED_U16 = 7,
-  // Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
-  // are not finite mean no reading.
+  // Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
+  // that are not finite mean no reading.
   PF_DEPTH_FORMAT_RELATIVE_F32 = 8,
   // Relative inverse depth as 16-bit floats.
   PF_DEPTH_FORMAT_RELATIVE_F16 = 9,
@@ -207,6 +207,16 @@ typedef enum PfLayout {
   // One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
   PF_LAYOUT_GREY16 = 5,
 } PfLayout;
+
+// The scaling that a depth network expects for colour values from 0 to 1.
+typedef enum PfColourScale {
+  // Normalized by the mean and the spread of ImageNet, as in the training of MiDaS, DPT and Depth Anything.
+  PF_COLOUR_SCALE_IMAGENET = 0,
+  // From 0 to 1.
+  PF_COLOUR_SCALE_UNIT = 1,
+  // From -1 to 1.
+  PF_COLOUR_SCALE_SIGNED = 2,
+} PfColourScale;
 
 // A network that estimates relative inverse depth from colour alone. It is immutable and can be used by several
 // sessions.

@@ -6056,8 +6056,8 @@ public enum DepthFormat: Equatable, Hashable {
      */
     case normalizedU16
     /**
-     * Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that
-     * are not finite mean no reading.
+     * Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
+     * that are not finite mean no reading.
      */
     case relativeF32
     /**
