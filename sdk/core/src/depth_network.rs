@@ -11,7 +11,7 @@ use ndarray::Array2;
 use picture::Picture;
 use std::fmt::{Debug, Formatter};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use tract_onnx::prelude::*;
 
 /// The scaling that a network expects for colour values from 0 to 1.
@@ -34,6 +34,14 @@ pub struct DepthNetwork {
     /// Whether the network gives distance rather than inverse depth.
     pub gives_distance: bool,
     model: Arc<InferenceModel>,
+    /// The latest plan. A session that changes its quality level needs it again.
+    planned: Arc<Mutex<Option<Planned>>>,
+}
+
+/// A network planned for pictures of (h, w) = `to`.
+struct Planned {
+    to: (usize, usize),
+    plan: Arc<TypedRunnableModel>,
 }
 
 impl DepthNetwork {
@@ -72,6 +80,7 @@ impl DepthNetwork {
             colours: ColourScale::default(),
             gives_distance: false,
             model: Arc::new(flat(read)?),
+            planned: Arc::default(),
         })
     }
 
@@ -81,12 +90,20 @@ impl DepthNetwork {
     /// Returns [`Error::Network`] if it is not a network for depth, or if it would take too much memory or time.
     #[doc(hidden)]
     pub fn estimator(&self, shape: (usize, usize)) -> Result<DepthEstimator> {
-        let planned = caught(|| {
-            let picture = Picture::of(&self.model, shape, self.colours)?;
-            let plan = plan((*self.model).clone(), &picture).map_err(|why| not_run(&why))?;
-            Ok((picture, plan))
-        });
-        let (picture, plan) = flat(planned)?;
+        let picture = flat(caught(|| Picture::of(&self.model, shape, self.colours)))?;
+        let mut planned = self.planned.lock().unwrap_or_else(PoisonError::into_inner);
+        let plan = match &*planned {
+            Some(Planned { to, plan }) if *to == picture.to() => plan.clone(),
+            _ => {
+                let model = (*self.model).clone();
+                let plan = flat(caught(|| plan(model, &picture).map_err(|why| not_run(&why))))?;
+                *planned = Some(Planned {
+                    to: picture.to(),
+                    plan: plan.clone(),
+                });
+                plan
+            }
+        };
         Ok(DepthEstimator {
             picture,
             plan,

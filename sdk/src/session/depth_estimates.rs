@@ -17,8 +17,29 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 /// The estimates of a session.
 pub(super) enum DepthEstimates {
-    EachFrame(Arc<DepthNetwork>, Option<((usize, usize), DepthEstimator)>),
+    EachFrame(Planned),
     OwnThread(Arc<Exchange>),
+}
+
+/// A network, planned for the latest picture's shape.
+pub(super) struct Planned {
+    network: Arc<DepthNetwork>,
+    latest: Option<((usize, usize), DepthEstimator)>,
+}
+
+impl Planned {
+    fn new(network: Arc<DepthNetwork>) -> Self {
+        Planned { network, latest: None }
+    }
+
+    fn estimate(&mut self, rgb: &[f32], shape: (usize, usize)) -> Result<Arc<Array2<f32>>> {
+        let latest = match self.latest.take() {
+            Some(latest) if latest.0 == shape => latest,
+            _ => (shape, self.network.estimator(shape)?),
+        };
+        let (_, estimator) = self.latest.insert(latest);
+        estimator.estimate(rgb).map(Arc::new)
+    }
 }
 
 /// A picture to estimate, (3, H, W), and its (H, W).
@@ -51,7 +72,7 @@ impl DepthEstimates {
     /// Returns estimates for each frame, or `None` if the options have no depth network.
     pub(super) fn for_each_frame(options: &SessionOptions) -> Option<Self> {
         let network = options.depth_network.clone()?;
-        Some(DepthEstimates::EachFrame(network, None))
+        Some(DepthEstimates::EachFrame(Planned::new(network)))
     }
 
     /// Starts the network's thread, or returns `None` if the options have no depth network.
@@ -66,7 +87,7 @@ impl DepthEstimates {
         let of = exchange.clone();
         Builder::new()
             .name("phasefront depth".into())
-            .spawn(move || of.run(&network))
+            .spawn(move || of.run(Planned::new(network)))
             .map_err(|e| Error::Threads(Arc::new(e)))?;
         Ok(Some(DepthEstimates::OwnThread(exchange)))
     }
@@ -84,13 +105,7 @@ impl DepthEstimates {
         cancel: &Cancel,
     ) -> Result<Arc<Array2<f32>>> {
         match self {
-            DepthEstimates::EachFrame(network, planned) => {
-                let planned = match planned {
-                    Some(planned) if planned.0 == shape => planned,
-                    _ => planned.insert((shape, network.estimator(shape)?)),
-                };
-                planned.1.estimate(rgb).map(Arc::new)
-            }
+            DepthEstimates::EachFrame(planned) => planned.estimate(rgb, shape),
             DepthEstimates::OwnThread(exchange) => exchange.estimate(rgb, shape, fresh, cancel),
         }
     }
@@ -137,8 +152,7 @@ impl Exchange {
     }
 
     /// Estimates the pictures until the session ends.
-    fn run(&self, network: &DepthNetwork) {
-        let mut planned: Option<((usize, usize), DepthEstimator)> = None;
+    fn run(&self, mut planned: Planned) {
         let mut slots = lock(&self.slots);
         loop {
             if slots.ended {
@@ -151,18 +165,7 @@ impl Exchange {
             slots.busy = true;
             let epoch = slots.epoch;
             drop(slots);
-            if planned.as_ref().is_none_or(|(shape, _)| *shape != picture.shape) {
-                planned = None;
-            }
-            let estimator = match planned.take() {
-                Some((_, estimator)) => Ok(estimator),
-                None => network.estimator(picture.shape),
-            };
-            let estimate = estimator.and_then(|estimator| {
-                let estimate = estimator.estimate(&picture.rgb);
-                planned = Some((picture.shape, estimator));
-                estimate.map(Arc::new)
-            });
+            let estimate = planned.estimate(&picture.rgb, picture.shape);
             slots = lock(&self.slots);
             slots.busy = false;
             slots.spare = picture.rgb;

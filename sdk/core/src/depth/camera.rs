@@ -37,11 +37,8 @@ impl<'a> CameraFrame<'a> {
     /// Creates a frame of aligned, upright images.
     pub fn new(timestamp_ns: u64, colour: ColourImage<'a>, depth: DepthImage<'a>) -> Self {
         CameraFrame {
-            timestamp_ns,
-            colour,
             depth: Some(depth),
-            orientation: Orientation::default(),
-            alignment: Alignment::Aligned,
+            ..CameraFrame::without_depth(timestamp_ns, colour)
         }
     }
 

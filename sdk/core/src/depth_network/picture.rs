@@ -97,6 +97,11 @@ impl Picture {
         })
     }
 
+    /// Returns the (h, w) that the network takes.
+    pub(super) fn to(&self) -> (usize, usize) {
+        self.to
+    }
+
     fn shape(&self) -> [usize; 4] {
         let (height, width) = self.to;
         if self.interleaved {

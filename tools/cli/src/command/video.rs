@@ -276,7 +276,7 @@ impl Video {
             None => DepthRange::Percentiles,
             Some((near_m, far_m)) => DepthRange::Fixed { near_m, far_m },
         };
-        options.depth_network = self.seen.open()?.map(Arc::new);
+        options.depth_network = self.seen.open((height, width))?.map(Arc::new);
         if let Some(device) = self.backend.device()? {
             options.backend = Backend::Gpu;
             options.gpu.device = device;

@@ -78,8 +78,8 @@ impl SeenDepthFlags {
         self.invert
     }
 
-    /// Opens the network that the flags name, if there is one.
-    pub(crate) fn open(&self) -> Result<Option<DepthNetwork>> {
+    /// Opens the network that the flags name, if there is one, and plans it for pictures of (H, W) = `shape`.
+    pub(crate) fn open(&self, shape: (usize, usize)) -> Result<Option<DepthNetwork>> {
         let Some(path) = self.network() else {
             return Ok(None);
         };
@@ -90,13 +90,15 @@ impl SeenDepthFlags {
                 "there is no such file; --depth-network takes an ONNX file",
             ));
         }
-        // tract panics on files that it does not expect.
-        let mut network = quiet::caught(|| DepthNetwork::open(path))
-            .map_err(|why| Error::file(path, why))?
-            .map_err(|why| Error::file(path, why))?;
-        network.colours = self.depth_network_colours.scale();
-        network.gives_distance = self.invert;
-        Ok(Some(network))
+        // tract panics on files that it does not expect. The network keeps the plan.
+        let opened = quiet::caught(|| {
+            let mut network = DepthNetwork::open(path)?;
+            network.colours = self.depth_network_colours.scale();
+            network.gives_distance = self.invert;
+            network.estimator(shape).map(|_| network)
+        });
+        let network = opened.map_err(|why| Error::file(path, why))?;
+        network.map(Some).map_err(|why| Error::file(path, why))
     }
 }
 
@@ -318,12 +320,12 @@ impl FrameFlags {
     }
 
     fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
-        let (Some(path), Some(network)) = (self.seen.network(), self.seen.open()?) else {
+        let (_, height, width) = rgb.dim();
+        let (Some(path), Some(network)) = (self.seen.network(), self.seen.open((height, width))?) else {
             return Err(Error::Input(
                 "--rgb needs --depth, or --depth-network that estimates it".into(),
             ));
         };
-        let (_, height, width) = rgb.dim();
         let colours = rgb.as_standard_layout();
         let nearer = quiet::caught(|| {
             let estimator = network.estimator((height, width))?;
