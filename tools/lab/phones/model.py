@@ -27,19 +27,18 @@ LOOPS = {
     "avx2 f32": ("x86_64", r"4avx28f32_sums", r"vfmadd\w+", 8),
     "avx512 f32": ("x86_64", r"6avx5127filters", r"vfmadd\w+", 16),
 }
-#: Multiply-adds a cycle of the loops of measured kernels that have changed since.
-FORMER = {"avx2 int8": 15.9}
-#: Measured machines (docs/benchmarks.md): llvm-mca's processor, cores, clock, and network times of 1920×1080. The first
-#: clock was measured with a chain of additions; the second follows from the share of the peak that the run states.
+#: Measured machines (docs/benchmarks.md): llvm-mca's processor, cores, clock, and network times of 1920×1080. The clock
+#: follows from the share of the peak that the run states.
 MEASURED = [
-    ("EPYC with AVX2", "znver3", 2, 3.24, "8 layers, int8", 8, "avx2 int8", (807.5, 862.3)),
-    ("EPYC with VNNI", "znver4", 2, 3.64, "8 layers, f32", 8, "avx512 f32", (757.7, 757.7)),
+    ("EPYC with VNNI", "znver4", 2, 3.64, "8 layers, f32", 8, "avx512 f32", (674.4, 757.7)),
     ("EPYC with VNNI", "znver4", 2, 3.64, "15 layers, f32", 15, "avx512 f32", (1598.6, 1598.6)),
+    ("the same, AVX2 alone", "znver4", 2, 3.64, "8 layers, f32", 8, "avx2 f32", (717.6, 717.6)),
 ]
-#: Stages other than networks on the EPYC with AVX2, two cores, 1920×1080, ms: the middle of the measured range.
-STAGES = {"sweep": 231.6, "encode": 40.4, "published": 13.9}
-#: The same on the EPYC with VNNI.
-ALSO = {"sweep": 207.8, "published": 8.9}
+#: Stages other than networks on the last of these, ms, and the loop that each is scaled by: the sweep and the encoder
+#: with the default steps and without.
+STAGES = {"sweep": (95.3, "sweep"), "encode": (21.2, "f32"), "published": (10.4, "f32")}
+#: The same times with AVX-512.
+ALSO = {"sweep": 79.7, "published": 8.1}
 #: Bytes that each pixel moves through memory: a frame in, a field out and in again, levels out.
 BYTES = 16 + 2 * 24 + 3
 FULL, APP = 1920 * 1080, 960 * 540
@@ -88,8 +87,6 @@ class Loops:
 
     def macs_a_cycle(self, name, processor):
         """Multiply-adds a cycle of a kernel's inner loop."""
-        if name in FORMER:
-            return FORMER[name]
         family, body, macs = self.inner(name)
         labels = {label for line in body for label in re.findall(r"\.L\w+", line)}
         source = "\n".join([*(f"{label}:" for label in labels), *body, ""])
@@ -118,37 +115,34 @@ def check(model):
         times = " to ".join(dict.fromkeys(f"{time:.0f}" for time in measured))
         beyond = " to ".join(dict.fromkeys(f"{ratio:.2f}" for ratio in (low, high)))
         print(f"| {machine} | {name} | {rate:.1f} | {ms:.0f} | {times} | {beyond} |")
-    _, znver3, cores3, clock3, *_ = MEASURED[0]
-    _, znver4, cores4, clock4, *_ = MEASURED[1]
-    lanes = model.macs_a_cycle("avx2 f32", znver3) * cores3 * clock3
-    share = lanes / (model.macs_a_cycle("avx512 f32", znver4) * cores4 * clock4)
     print("\n| stage | modelled ms | measured ms | measured / modelled |")
     print("|---|---|---|---|")
     for stage, measured in ALSO.items():
-        ms = STAGES[stage] * share
+        ms, loop = STAGES[stage]
+        ms *= model.macs_a_cycle(f"avx2 {loop}", "znver4") / model.macs_a_cycle(f"avx512 {loop}", "znver4")
         print(f"| {stage} | {ms:.1f} | {measured} | {measured / ms:.2f} |")
     return min(ratios), max(ratios)
 
 
-def rates(model, cores, core):
-    """Multiply-adds of all cores together in int8 and f32, 10⁹ a second."""
-    totals = [0.0, 0.0]
-    for count, name, clock in cores:
-        for i, kernels in enumerate((core[name]["kernels"], "neon f32")):
-            totals[i] += count * clock * model.macs_a_cycle(kernels, core[name]["mca"])
-    return totals
+def rate(model, cores, core, loop):
+    """Multiply-adds of all cores together, 10⁹ a second. `loop` is int8, f32 or sweep."""
+    kernels = lambda name: core[name]["kernels"] if loop == "int8" else f"neon {loop}"  # noqa: E731
+    return sum(count * clock * model.macs_a_cycle(kernels(name), core[name]["mca"]) for count, name, clock in cores)
 
 
 def times(model, phone, core, beyond):
     """Times of 1920×1080, ms, with the large cores alone and with all of them."""
-    unit = 2 * 3.24 * model.macs_a_cycle("avx2 f32", "znver3")
+    _, processor, count, clock, *_ = MEASURED[-1]
     rows = {}
     for cores in (phone["large"], phone["large"] + phone["small"]):
-        int8, f32 = rates(model, cores, core)
+        int8 = rate(model, cores, core, "int8")
         found = {f"{n} layers": FULL * network_macs(n, "int8") / (int8 * 1e6) * beyond for n in (8, 15, 30)}
-        found |= {name: ms * unit / f32 for name, ms in STAGES.items()}
+        for name, (ms, loop) in STAGES.items():
+            measured = count * clock * model.macs_a_cycle(f"avx2 {loop}", processor)
+            found[name] = ms * measured / rate(model, cores, core, loop)
         found["dark threshold and one step"] = found["encode"] - found["published"]
-        found["whole frame"] = found["8 layers"] + found["encode"]
+        found["sweep and encoder"] = found["sweep"] + found["encode"]
+        found["8 layers and encoder"] = found["8 layers"] + found["encode"]
         for name, ms in found.items():
             rows.setdefault(name, []).append(ms)
     return rows
@@ -160,16 +154,18 @@ def main():
     low, high = check(model)
     beyond = (low + high) / 2
     print(f"\nbeyond the inner loops: {beyond:.2f}, {low:.2f} to {high:.2f}\n")
-    print("| core | llvm-mca's model | reason | int8, multiply-adds a cycle | f32 |\n|---|---|---|---|---|")
+    print("| core | llvm-mca's model | reason | int8, multiply-adds a cycle | f32 | sweep |\n|---|---|---|---|---|---|")
     for name, core in told["core"].items():
-        int8, f32 = (model.macs_a_cycle(kernels, core["mca"]) for kernels in (core["kernels"], "neon f32"))
-        print(f"| {name} | {core['mca']} | {core['why']} | {core['kernels']} {int8:.1f} | {f32:.1f} |")
+        loops = (core["kernels"], "neon f32", "neon sweep")
+        cells = " | ".join(f"{model.macs_a_cycle(loop, core['mca']):.1f}" for loop in loops)
+        print(f"| {name} | {core['mca']} | {core['why']} | {core['kernels']} {cells} |")
     print("\n| phone | large cores | small cores | source |\n|---|---|---|---|")
     for phone in told["phone"]:
         large, small = (", ".join(f"{n} {core} at {clock} GHz" for n, core, clock in phone[k]) for k in ("large", "small"))
         print(f"| {phone['name']} | {large} | {small} | {phone['source']} |")
     print(f"\nthrough memory: {BYTES * FULL / 1e6:.0f} MB a frame of 1920×1080")
-    columns = ["8 layers", "15 layers", "30 layers", "sweep", "dark threshold and one step", "whole frame"]
+    columns = ["8 layers", "15 layers", "30 layers", "sweep", "dark threshold and one step"]
+    columns += ["sweep and encoder", "8 layers and encoder"]
     for title, share, text in (
         ("1920×1080, ms", 1, lambda ms: f"{ms:.0f}"),
         ("960×540, frames a second", APP / FULL, lambda ms: f"{1000 / ms:.1f}" if ms > 100 else f"{1000 / ms:.0f}"),
