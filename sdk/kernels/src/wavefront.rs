@@ -66,6 +66,11 @@ pub(crate) fn has_skip(i: usize) -> bool {
 
 /// Runs `block` on the whole blocks of a row that contain pixels `from..`, and copies those pixels to the output's
 /// rows.
+#[cfg(any(
+    target_arch = "x86_64",
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
 pub(crate) fn last_row_by_blocks(
     mut out: [&mut [f32]; OUTPUTS],
     from: usize,
