@@ -18,6 +18,8 @@ mod hologram;
 mod log;
 mod modulator;
 mod network;
+#[cfg(not(feature = "tract"))]
+mod no_depth_network;
 mod options;
 mod session;
 mod statistics;
@@ -33,13 +35,15 @@ pub use hologram::{HologramInfo, OutputSize, RawHologram, RawMemory, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use modulator::{RawModulator, modulator_names};
 pub use network::{DeepPair, DepthNetwork, Network, NetworkInfo, built_in_pair};
+#[cfg(not(feature = "tract"))]
+pub use no_depth_network::ColourScale;
 pub use options::{
     Brightness, EncoderOptions, Encoding, Method, Quality, QualityLevel, RunningMode, SessionOptions, phone_options,
     session_options,
 };
-pub use phasefront::input::{
-    ColourScale, ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix,
-};
+#[cfg(feature = "tract")]
+pub use phasefront::input::ColourScale;
+pub use phasefront::input::{ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix};
 pub use phasefront::output::{Layout, Placement};
 pub use phasefront::session::{Backend, Thermal};
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};

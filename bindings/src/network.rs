@@ -1,7 +1,10 @@
 //! Networks from files or bytes, and built-in networks.
 
 use crate::error::{PhasefrontError, guard};
-use phasefront::input::ColourScale;
+#[cfg(not(feature = "tract"))]
+use crate::no_depth_network::{ColourScale, DepthNetwork as CoreDepthNetwork};
+#[cfg(feature = "tract")]
+use phasefront::input::{ColourScale, DepthNetwork as CoreDepthNetwork};
 use phasefront_core::runtime::file;
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +31,8 @@ pub enum ColourScale {
 /// be used by several sessions.
 #[derive(Debug, uniffi::Object)]
 pub struct DepthNetwork {
-    pub(crate) core: Arc<phasefront::input::DepthNetwork>,
+    #[cfg_attr(not(feature = "tract"), expect(dead_code, reason = "no depth network can be made"))]
+    pub(crate) core: Arc<CoreDepthNetwork>,
 }
 
 #[uniffi::export]
@@ -37,7 +41,7 @@ impl DepthNetwork {
     /// with colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.
     ///
     /// # Errors
-    /// Returns an error if the library does not read the file.
+    /// Returns an error if the library does not read the file, and if it was built without tract.
     #[uniffi::constructor(default(colours = None, gives_distance = false))]
     pub fn from_bytes(
         onnx: &[u8],
@@ -45,7 +49,7 @@ impl DepthNetwork {
         gives_distance: bool,
     ) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
-            let mut core = phasefront::input::DepthNetwork::from_onnx(onnx)?;
+            let mut core = CoreDepthNetwork::from_onnx(onnx)?;
             core.colours = colours.unwrap_or_default();
             core.gives_distance = gives_distance;
             Ok(Arc::new(DepthNetwork { core: Arc::new(core) }))

@@ -430,7 +430,10 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             .collect();
         to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
-        to.depth_network = options.depth_network.as_ref().map(|network| network.core.clone());
+        #[cfg(feature = "tract")]
+        {
+            to.depth_network = options.depth_network.as_ref().map(|network| network.core.clone());
+        }
         to.backend = options.backend;
         to.most_pixels = options.most_pixels;
         to.threads = match options.threads {

@@ -86,7 +86,7 @@ DOCUMENTS = {
     'Target.with_look_up_table': 'Creates a target whose modulator was calibrated as a whole. `levels` has 256 entries; the level at i displays\nthe phase 2πi/256.\n\nErrors: Returns an error if the display is impossible or there are not 256 levels.',
     'Target.display': 'Returns the display.',
     'DepthNetwork': 'A network that estimates relative inverse depth from colour alone, for frames without depth. It is immutable and can\nbe used by several sessions.',
-    'DepthNetwork.from_bytes': 'Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or (1, H, W, 3),\nwith colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.\n\nErrors: Returns an error if the library does not read the file.',
+    'DepthNetwork.from_bytes': 'Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or (1, H, W, 3),\nwith colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.\n\nErrors: Returns an error if the library does not read the file, and if it was built without tract.',
     'LogListener': 'A receiver of log messages, which is called on any thread. It may call the library. On a thread that computes for a\nsession it cannot wait for a frame: `process`, `warm_up` and previews are refused, and closing does not wait. Errors\nthat it throws are ignored.',
     'LogListener.on_log': 'Receives a message.',
     'RawPlanes': 'Numbers of 32 bits at each pixel of each colour, without gaps between rows or planes. The layers written by hand\nread them.',

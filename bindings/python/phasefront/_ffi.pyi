@@ -936,7 +936,7 @@ class DepthNetwork:
         """Reads the bytes of an ONNX file that holds its own weights. It takes one picture, (1, 3, H, W) or (1, H, W, 3),
         with colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.
 
-        Errors: Returns an error if the library does not read the file.
+        Errors: Returns an error if the library does not read the file, and if it was built without tract.
         """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
 

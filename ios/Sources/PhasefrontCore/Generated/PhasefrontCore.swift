@@ -706,7 +706,7 @@ open class DepthNetwork: DepthNetworkProtocol, @unchecked Sendable {
      * with colours of the scale `colours`, and gives one plane: inverse depth, or distance if `gives_distance`.
      *
      * # Errors
-     * Returns an error if the library does not read the file.
+     * Returns an error if the library does not read the file, and if it was built without tract.
      */
 public static func fromBytes(onnx: Data, colours: ColourScale? = nil, givesDistance: Bool = false)throws  -> DepthNetwork  {
     return try  FfiConverterTypeDepthNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -8507,7 +8507,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_constructor_rawmodulator_named() != 2724) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_depthnetwork_from_bytes() != 8526) {
+    if (uniffi_phasefront_ffi_checksum_constructor_depthnetwork_from_bytes() != 63206) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_hologramnetwork_built_in() != 26010) {
