@@ -163,6 +163,34 @@ namespace Phasefront
         public ImagePlane Plane;
     }
 
+    /// <summary>The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of
+    /// the first pixel is (0, 0).</summary>
+    public struct Intrinsics
+    {
+        /// <summary>The focal length along x.</summary>
+        public double Fx;
+        /// <summary>The focal length along y.</summary>
+        public double Fy;
+        /// <summary>The x of the principal point.</summary>
+        public double Cx;
+        /// <summary>The y of the principal point.</summary>
+        public double Cy;
+    }
+
+    /// <summary>The intrinsics and the relative pose of the depth camera and the colour camera. A point p of the depth
+    /// camera (x right, y down, z forward) is at R·p + t of the colour camera.</summary>
+    public struct Cameras
+    {
+        /// <summary>The intrinsics of the colour camera.</summary>
+        public Intrinsics Colour;
+        /// <summary>The intrinsics of the depth camera.</summary>
+        public Intrinsics Depth;
+        /// <summary>R, nine numbers row by row, or null for cameras with the same orientation.</summary>
+        public double[] Rotation;
+        /// <summary>t, three numbers in metres, or null for cameras at the same place.</summary>
+        public double[] TranslationM;
+    }
+
     /// <summary>A frame: a colour image, a depth image and their orientation.</summary>
     public sealed class CameraFrame
     {
@@ -178,6 +206,8 @@ namespace Phasefront
         public Rotation Rotation;
         /// <summary>Whether the images are mirrored left to right after the rotation, as for front cameras.</summary>
         public bool Mirrored;
+        /// <summary>The cameras, or null if depth and colour have the same field of view.</summary>
+        public Cameras? Cameras;
 
         /// Calls `call` with this frame in the form of the C interface, and pins its memory during the call.
         internal T Pinned<T>(Func<NativeFrame, T> call)
@@ -231,7 +261,28 @@ namespace Phasefront
                     Plane = map.Plane.Pin(pins),
                 };
             }
+            if (Cameras is Cameras cameras)
+            {
+                var pin = GCHandle.Alloc(Numbers(cameras), GCHandleType.Pinned);
+                pins.Add(pin);
+                native.Cameras = pin.AddrOfPinnedObject();
+            }
             return native;
+        }
+
+        /// The numbers of a PfCameras.
+        private static double[] Numbers(Cameras cameras)
+        {
+            var rotation = cameras.Rotation ?? new double[] { 1, 0, 0, 0, 1, 0, 0, 0, 1 };
+            var translation = cameras.TranslationM ?? new double[3];
+            if (rotation.Length != 9 || translation.Length != 3)
+                throw new PhasefrontException(Status.Frame, "frame: a rotation has 9 numbers and a translation 3");
+            var numbers = new List<double>(20);
+            foreach (var camera in new[] { cameras.Colour, cameras.Depth })
+                numbers.AddRange(new[] { camera.Fx, camera.Fy, camera.Cx, camera.Cy });
+            numbers.AddRange(rotation);
+            numbers.AddRange(translation);
+            return numbers.ToArray();
         }
     }
 }

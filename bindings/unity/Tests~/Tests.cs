@@ -263,6 +263,8 @@ internal static class Tests
                 }
                 Refused(Status.Timestamp, "2", () => session.Process(frame));
                 frame.TimestampNs = 3;
+                Aligned(session, frame);
+                frame.TimestampNs = 6;
                 frame.Depth.Width = 480;
                 Refused(Status.Frame, "depth", () => session.Process(frame));
                 session.Dispose();
@@ -274,6 +276,32 @@ internal static class Tests
                 catch (ObjectDisposedException) { }
             }
         }
+    }
+
+    /// Cameras of the same place and view leave depth as it is, and others move it.
+    private static void Aligned(HologramSession session, CameraFrame frame)
+    {
+        var camera = new Intrinsics { Fx = 40, Fy = 40, Cx = 23.5, Cy = 17.5 };
+        Func<Cameras?, byte[]> levels = cameras =>
+        {
+            session.Reset();
+            frame.Cameras = cameras;
+            using (var hologram = session.Process(frame)) return hologram.Levels(0);
+        };
+        frame.Depth.Format = DepthFormat.MillimetresU16;
+        frame.Depth.Plane = new ImagePlane(
+            Enumerable.Range(0, 48 * 36).SelectMany(i => BitConverter.GetBytes((ushort)(400 + i % 48 * 20))).ToArray(), 96, 2);
+        var plain = levels(null);
+        var same = levels(new Cameras { Colour = camera, Depth = camera });
+        var apart = levels(new Cameras { Colour = camera, Depth = camera, TranslationM = new[] { 0.2, 0, 0 } });
+        Require(!plain.SequenceEqual(apart) && !same.SequenceEqual(apart), "cameras that stand apart");
+        Refused(Status.Frame, "9 numbers", () => levels(new Cameras { Colour = camera, Depth = camera, Rotation = new double[3] }));
+        camera.Fx = 0;
+        Refused(Status.Frame, "focal", () => levels(new Cameras { Colour = camera, Depth = camera }));
+        session.Reset();
+        frame.Cameras = null;
+        var normalized = Sample(0).Depth;
+        frame.Depth = normalized;
     }
 
     private sealed class Heard : ISessionListener
