@@ -4,9 +4,11 @@ import onnxruntime
 import pytest
 import torch
 
+from phasefront_training import from_pretrained
 from phasefront_training.export import ExportError, float_model, read_description, read_onnx, write
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.optics import Display
+from phasefront_training.pretrained import MODELS
 
 CASES = [Architecture(4), Architecture(5, 8), Architecture(8, head="amplitude-phase"), Architecture(6, 16, "ldi3"), Architecture(8, 8, "field"), Architecture(8, 8, halved=True), Architecture(5, 8, head="amplitude-phase", halved=True)]
 
@@ -59,3 +61,17 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         read_onnx(tmp_path / "x.onnx")
     with pytest.raises(ExportError, match="not there"):
         read_onnx(tmp_path / "y.onnx")
+
+
+def test_a_bundled_network_is_a_torch_module(tmp_path):
+    network, display = from_pretrained("rgbd-8")
+    assert network.architecture == Architecture(8, 24) and display.volume_depth_m == pytest.approx(6e-3)
+    x = torch.rand(1, 4, 17, 23) - 0.5
+    session = onnxruntime.InferenceSession(MODELS / "rgbd-8.onnx")
+    [expected] = session.run(None, {session.get_inputs()[0].name: x.numpy()})
+    with torch.no_grad():
+        np.testing.assert_allclose(network(x).numpy(), expected, atol=1e-5)
+    with pytest.raises(ExportError, match="no bundled network is called rgbd-9; there are .*rgbd-8"):
+        from_pretrained("rgbd-9")
+    with pytest.raises(ExportError, match="say where"):
+        from_pretrained("rgbd-8", tmp_path)

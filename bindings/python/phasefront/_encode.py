@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _ffi
 from ._ffi import Brightness, Display, EncoderOptions, Encoding, FrameError, RawMemory, SettingError
 from ._hologram import Hologram, Purpose
-from ._memory import MOST_BYTES, Memory, image
+from ._memory import MOST_BYTES, NO_ARRAY, Memory, as_array, image
 from ._target import Target
 
 
@@ -102,8 +102,8 @@ def encode(
     """Makes the hologram of a complex field. It propagates to the modulator, and is corrected and encoded for it.
 
     Args:
-        field: Complex, (H, W) for one laser or (C, H, W) for C lasers, red first. It may be smaller than the modulator,
-            and then lies in its middle.
+        field: Complex, (H, W) for one laser or (C, H, W) for C lasers, red first: an array, a tensor or an object with
+            DLPack. It may be smaller than the modulator, and then lies in its middle.
         target: A display, a calibrated target or a modulator. By default the display of 1920×1080.
         z_mm: z of the field from the middle of the volume, in mm toward the viewer.
         encoding: How the field becomes phases. By default a small Gaussian blur comes first (AA-DPM).
@@ -135,7 +135,10 @@ def encode(
 
 def _field(field: ArrayLike, colours: int) -> NDArray[numpy.complex64]:
     """Returns a field as complex64, (C, H, W), without gaps."""
-    given: numpy.ndarray[Any, Any] = numpy.asarray(field)
+    try:
+        given = as_array(field)
+    except NO_ARRAY as error:
+        raise FrameError(f"the field is no array: {error}") from None
     if given.dtype.kind != "c":
         raise FrameError(f"the field holds {given.dtype}; it must be complex: field.astype(numpy.complex64)")
     array = given[numpy.newaxis] if given.ndim == 2 else given

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from . import _ffi
 from ._ffi import Cameras, ColourFormat, ConfidenceFormat, DepthFormat, FrameError, Orientation, Rotation, YuvMatrix
-from ._memory import MOST_BYTES, Memory
+from ._memory import MOST_BYTES, NO_ARRAY, Memory, as_array
 
 _Array = numpy.ndarray[Any, Any]
 
@@ -42,8 +42,8 @@ _CHANNELS = {
 
 def _array(what: str, values: ArrayLike) -> _Array:
     try:
-        return numpy.asarray(values)
-    except (TypeError, ValueError) as error:
+        return as_array(values)
+    except NO_ARRAY as error:
         raise FrameError(f"frame: {what} is no array: {error}") from None
 
 
@@ -131,6 +131,8 @@ class Frame:
         video_range: Whether luma spans 16 to 235 instead of 0 to 255. RGB formats ignore it.
         orientation: The rotation and mirroring that bring the sensor's image upright. By default it is upright.
         cameras: The colour camera and the depth camera, if they are apart.
+
+    Anything that NumPy reads in place will do for an array, such as a tensor of PyTorch or an object with DLPack.
 
     A session reads the arrays in place, during the call that takes the frame. Grey images, float64 depth and rotated or
     mirrored arrays are copied. Raises `FrameError` for arrays of other types or shapes.

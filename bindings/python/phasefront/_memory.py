@@ -6,6 +6,7 @@ import ctypes
 from typing import Any, TypeVar
 
 import numpy
+from numpy.typing import ArrayLike
 
 from ._ffi import RawMemory, SettingError
 from .ffi import phasefront_ffi as _generated
@@ -14,6 +15,20 @@ Kind = TypeVar("Kind", bound=numpy.generic)
 
 #: The largest size in bytes. The generated code counts bytes in 32 bits.
 MOST_BYTES = 2**31 - 1
+
+
+def as_array(values: Any) -> numpy.ndarray[Any, Any]:
+    """Returns arrays and tensors in place, by DLPack if that is all they have, and anything else as a new array.
+
+    Raises one of `NO_ARRAY` for what is no array or lies in a GPU's memory, and for a tensor that requires a gradient.
+    """
+    if hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
+        return numpy.from_dlpack(values)
+    return numpy.asarray(values)
+
+
+#: What NumPy and tensors raise instead of becoming an array.
+NO_ARRAY = (TypeError, ValueError, RuntimeError, BufferError)
 
 
 class Memory:
@@ -52,12 +67,15 @@ class _ByRefBytes:
 _generated._UniffiFfiConverterByRefBytes = _ByRefBytes
 
 
-def image(out: numpy.ndarray[Any, Any] | None, shape: tuple[int, int, int], kind: type[Kind]) -> tuple[numpy.typing.NDArray[Kind], RawMemory]:
+def image(out: ArrayLike | None, shape: tuple[int, int, int], kind: type[Kind]) -> tuple[numpy.typing.NDArray[Kind], RawMemory]:
     """Returns the array that an image is written into, `out` or a new one, and its memory.
 
     Raises `SettingError` if `out` has another type or shape, gaps inside rows, or is read only.
     """
-    array = numpy.empty(shape, kind) if out is None else out
+    try:
+        array = numpy.empty(shape, kind) if out is None else as_array(out)
+    except NO_ARRAY as error:
+        raise SettingError(f"out is no array: {error}") from None
     _, width, values = shape
     packed = array.itemsize * values, array.itemsize
     if array.dtype != kind or array.shape != shape or not array.flags.writeable or array.strides[1:] != packed or array.strides[0] < width * packed[0]:

@@ -40,6 +40,26 @@ from phasefront import (
 )
 
 
+class OnlyDlpack:
+    """A tensor that has DLPack and nothing else that NumPy knows."""
+
+    def __init__(self, array):
+        self._array = array
+
+    def __dlpack__(self, **arguments):
+        return self._array.__dlpack__(**arguments)
+
+    def __dlpack_device__(self):
+        return self._array.__dlpack_device__()
+
+
+class NoArray:
+    """A tensor that refuses to become an array, as those with gradients and on GPUs do."""
+
+    def __array__(self, *arguments, **named):
+        raise RuntimeError("use detach()")
+
+
 class Events:
     """Collects a live stream's events."""
 
@@ -600,3 +620,26 @@ def test_dropped_by_reset_is_told(options):
         assert session.submit(still(timestamp_ns=1)) == DropReason.PAUSED
         events.wait(1)
     assert events.all == [Dropped(1, DropReason.PAUSED)]
+
+
+def test_tensors_go_in_and_out_in_place(options):
+    y, x = numpy.mgrid[0:48, 0:64]
+    colour = numpy.stack([x * 4, y * 5, 255 - x * 3], axis=2).astype(numpy.uint8)
+    metres = numpy.linspace(0.3, 0.6, 24 * 32, dtype=numpy.float32).reshape(24, 32)
+    with Session(options) as session:
+        expected = session.process(Frame(colour, metres))
+        given = Frame(OnlyDlpack(colour), OnlyDlpack(metres))
+        assert given._colour[0].address == colour.ctypes.data and given._depth.address == metres.ctypes.data
+        hologram = session.process(given)
+        numpy.testing.assert_array_equal(hologram.levels, expected.levels)
+        seen = hologram.preview(0.0, 64, 48)
+        into = numpy.zeros((48, 64, 3), numpy.uint8)
+        assert hologram.preview(0.0, 64, 48, out=into) is into
+        numpy.testing.assert_array_equal(seen, into)
+        numpy.testing.assert_array_equal(numpy.from_dlpack(hologram.field()), hologram.field())
+        with pytest.raises(FrameError, match="colour is no array: use detach"):
+            Frame(NoArray(), metres)
+        with pytest.raises(SettingError, match="out is no array: use detach"):
+            hologram.preview(0.0, 64, 48, out=NoArray())
+        with pytest.raises(FrameError, match="the field is no array: use detach"):
+            phasefront.encode(NoArray())
