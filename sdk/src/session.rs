@@ -59,6 +59,7 @@ use stages::Stages;
 use std::fmt::{Debug, Formatter};
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
+use threads::block_on;
 
 /// Makes a hologram of each frame independently. Every method may be called from any thread at any time. A session
 /// belongs to the process that made it: in a forked process, calls that need its threads fail.
@@ -119,7 +120,25 @@ impl ImageSession {
     /// # Errors
     /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
     pub fn new(options: SessionOptions) -> Result<Self> {
-        Answering::new(options).map(ImageSession)
+        block_on(Answering::new(options)).map(ImageSession)
+    }
+
+    /// Creates a session as [`Self::new`] does, in a browser, whose GPU answers only while nothing blocks.
+    ///
+    /// # Errors
+    /// Returns an error in the same cases as [`Self::new`].
+    #[cfg(target_arch = "wasm32")]
+    pub async fn new_async(options: SessionOptions) -> Result<Self> {
+        Answering::new(options).await.map(ImageSession)
+    }
+
+    /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time.
+    ///
+    /// # Errors
+    /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
+    #[cfg(target_arch = "wasm32")]
+    pub async fn process_async(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
+        self.0.process_async(frame, false).await
     }
 
     /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
@@ -139,7 +158,25 @@ impl VideoSession {
     /// # Errors
     /// Returns an error in the same cases as [`ImageSession::new`].
     pub fn new(options: SessionOptions) -> Result<Self> {
-        Answering::new(options).map(VideoSession)
+        block_on(Answering::new(options)).map(VideoSession)
+    }
+
+    /// Creates a session as [`Self::new`] does, in a browser, whose GPU answers only while nothing blocks.
+    ///
+    /// # Errors
+    /// Returns an error in the same cases as [`Self::new`].
+    #[cfg(target_arch = "wasm32")]
+    pub async fn new_async(options: SessionOptions) -> Result<Self> {
+        Answering::new(options).await.map(VideoSession)
+    }
+
+    /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time.
+    ///
+    /// # Errors
+    /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
+    #[cfg(target_arch = "wasm32")]
+    pub async fn process_async(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
+        self.0.process_async(frame, true).await
     }
 
     /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
@@ -163,7 +200,7 @@ impl VideoSession {
             )));
         }
         self.0
-            .answer(frame, true, |stages, past| stages.replay(frame, past, scale))
+            .answer(frame, true, |stages, past| block_on(stages.replay(frame, past, scale)))
     }
 }
 
@@ -182,7 +219,7 @@ impl LiveSession {
         }
         let period_ns = options.target_rate_hz.map(|rate| (1e9 / rate) as u64);
         let estimates = DepthEstimates::on_own_thread(&options)?;
-        let shared = Shared::new(options, estimates)?;
+        let shared = block_on(Shared::new(options, estimates))?;
         let of = shared.clone();
         let listener = move |report| tell(&of, &mut listener, report);
         let live = Arc::new(Live::start(LiveWork(shared.clone()), period_ns, listener)?);
@@ -247,9 +284,9 @@ struct Answering {
 }
 
 impl Answering {
-    fn new(options: SessionOptions) -> Result<Self> {
+    async fn new(options: SessionOptions) -> Result<Self> {
         let estimates = DepthEstimates::for_each_frame(&options);
-        let shared = Shared::new(options, estimates)?;
+        let shared = Shared::new(options, estimates).await?;
         let gate = Arc::new(Mutex::new(Gate::new(shared.cancel.clone())));
         let frames = Frames::Answered(gate.clone());
         let handle = SessionHandle { shared, frames };
@@ -258,9 +295,26 @@ impl Answering {
 
     fn process(&self, frame: &CameraFrame<'_>, video: bool) -> Result<Hologram> {
         self.answer(frame, video, |stages, past| {
-            let made = self.handle.shared.process(stages, frame, past)?;
+            let made = block_on(self.handle.shared.process(stages, frame, past))?;
             Ok(made.hologram)
         })
+    }
+
+    #[cfg(target_arch = "wasm32")]
+    async fn process_async(&self, frame: &CameraFrame<'_>, video: bool) -> Result<Hologram> {
+        let work = async |stages: &mut Stages| {
+            let fresh = self.admit(frame, video)?;
+            if fresh {
+                stages.forget();
+            }
+            let result = match frame.check() {
+                Ok(()) => self.handle.shared.process(stages, frame, video && !fresh).await,
+                Err(why) => Err(why),
+            };
+            self.count(&result);
+            Ok(result?.hologram)
+        };
+        self.handle.with_stages_async(work).await
     }
 
     /// Runs `work` on one frame and tells it whether the frames before count.
@@ -271,15 +325,7 @@ impl Answering {
         work: impl FnOnce(&mut Stages, bool) -> Result<T>,
     ) -> Result<T> {
         self.handle.with_stages(|stages| {
-            let fresh = {
-                let mut gate = lock(&self.gate);
-                gate.admit(frame.timestamp_ns, video)?;
-                if gate.paused {
-                    gate.counts.dropped.count(DropReason::Paused);
-                    return Err(Error::Session("it is paused; resume it first".into()));
-                }
-                gate.begin()
-            };
+            let fresh = self.admit(frame, video)?;
             // The stages exist as long as the gate is open.
             let stages = stages.as_mut().ok_or_else(queue::closed)?;
             if fresh {
@@ -292,15 +338,31 @@ impl Answering {
             if panicked {
                 stages.recover();
             }
-            let Gate { counts, closed, .. } = &mut *lock(&self.gate);
-            match (&result, self.handle.shared.cancel.requested(), *closed) {
-                (Ok(_), ..) => counts.processed += 1,
-                (Err(_), false, _) => counts.failed += 1,
-                (Err(_), true, true) => counts.dropped.count(DropReason::Closed),
-                (Err(_), true, false) => counts.dropped.count(DropReason::Reset),
-            }
+            self.count(&result);
             result
         })
+    }
+
+    /// Lets a frame in and returns whether it is the first that counts.
+    fn admit(&self, frame: &CameraFrame<'_>, video: bool) -> Result<bool> {
+        let mut gate = lock(&self.gate);
+        gate.admit(frame.timestamp_ns, video)?;
+        if gate.paused {
+            gate.counts.dropped.count(DropReason::Paused);
+            return Err(Error::Session("it is paused; resume it first".into()));
+        }
+        Ok(gate.begin())
+    }
+
+    /// Counts a frame that was let in.
+    fn count<T>(&self, result: &Result<T>) {
+        let Gate { counts, closed, .. } = &mut *lock(&self.gate);
+        match (result, self.handle.shared.cancel.requested(), *closed) {
+            (Ok(_), ..) => counts.processed += 1,
+            (Err(_), false, _) => counts.failed += 1,
+            (Err(_), true, true) => counts.dropped.count(DropReason::Closed),
+            (Err(_), true, false) => counts.dropped.count(DropReason::Reset),
+        }
     }
 }
 

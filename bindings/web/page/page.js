@@ -3,7 +3,7 @@ const at = (id) => document.getElementById(id);
 const DEPTH_MM = 6;
 const STEPS = Number(at("focus").max);
 
-const state = { focus: STEPS / 2, source: "", frames: 0, method: "rgbd-8", width: 640, localSteps: 1 };
+const state = { focus: STEPS / 2, source: "", frames: 0, method: "rgbd-8", width: 640, localSteps: 1, backend: "cpu" };
 globalThis.state = state;
 
 const worker = new Worker("worker.js", { type: "module" });
@@ -78,16 +78,17 @@ async function look() {
   at("times").textContent =
     `${made.width}×${made.height} in ${made.ms.toFixed(0)} ms: method ${times.methodMs.toFixed(0)}, ` +
     `encoding ${times.encodeMs.toFixed(0)}, depth and colour ${(times.depthMs + times.colourMs).toFixed(0)}; ` +
-    `this view ${ms.toFixed(0)} ms; ${made.backend || "plane sweep"}`;
+    `this view ${ms.toFixed(0)} ms; ${made.backend || "plane sweep"}` +
+    (state.backend === "webgpu" ? `: ${made.backendWhy}` : "");
 }
 const view = newest(look);
 
 let picture, stream;
 async function show() {
   if (!picture) return;
-  const { method, localSteps, width } = state;
+  const { method, localSteps, width, backend } = state;
   const height = Math.round((width * picture.depth.height) / picture.depth.width);
-  const options = { method, localSteps, width, height, video: Boolean(stream) };
+  const options = { method, localSteps, width, height, video: Boolean(stream), backend };
   const colour = pixels(picture.colour, width, height, true);
   // Depth is not interpolated, because a mean of two depths lies on neither surface.
   const depth = pixels(picture.depth, width, height, false);
@@ -218,9 +219,9 @@ at("sample").addEventListener("click", sample);
 at("camera").addEventListener("click", camera);
 at("white").addEventListener("change", () => refresh());
 at("files").addEventListener("change", () => open("files", [...at("files").files]));
-for (const id of ["method", "width", "localSteps"]) {
+for (const id of ["method", "width", "localSteps", "backend"]) {
   at(id).addEventListener("change", () => {
-    state[id] = id === "method" ? at(id).value : Number(at(id).value);
+    state[id] = id === "method" || id === "backend" ? at(id).value : Number(at(id).value);
     refresh();
   });
 }

@@ -9,13 +9,13 @@ const METHODS = {
 
 let session, planned, hologram;
 
-function plan({ method, localSteps, width, height, video }) {
-  const wanted = JSON.stringify([method, localSteps, width, height, video]);
+async function plan({ method, localSteps, width, height, video, backend }) {
+  const wanted = JSON.stringify([method, localSteps, width, height, video, backend]);
   if (wanted === planned) return;
   session?.close();
   session = planned = undefined;
-  session = new Session(
-    { target: { width, height }, method: METHODS[method](), localSteps },
+  session = await Session.open(
+    { target: { width, height }, method: METHODS[method](), localSteps, backend },
     video ? "video" : "image",
   );
   session.warmUp();
@@ -27,10 +27,10 @@ const answers = {
     await load();
   },
 
-  frame({ options, colour, depth, timestampNs }) {
-    plan(options);
+  async frame({ options, colour, depth, timestampNs }) {
+    await plan(options);
     const start = performance.now();
-    const made = session.process(
+    const made = await session.processAsync(
       new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestampNs }),
     );
     const ms = performance.now() - start;
@@ -39,7 +39,8 @@ const answers = {
     const { width, height } = hologram.outputSize("rgba");
     const levels = new Uint8ClampedArray(4 * width * height);
     hologram.writeOutput({ layout: "rgba" }, levels);
-    return { ms, times: hologram.info.times, backend: session.statistics.backend, width, height, levels };
+    const { backend, backendWhy } = session.statistics;
+    return { ms, times: hologram.info.times, backend, backendWhy, width, height, levels };
   },
 
   view({ zMm }) {

@@ -4,7 +4,7 @@ use crate::error::{Answer, setting};
 use crate::network::RawNetwork;
 use crate::target::RawTarget;
 use phasefront::input::DepthRange;
-use phasefront::session::{Quality, QualityLevel, SessionOptions};
+use phasefront::session::{Backend, Quality, QualityLevel, SessionOptions};
 use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
@@ -149,6 +149,12 @@ impl RawOptions {
     #[wasm_bindgen(js_name = mostPixels)]
     pub fn most_pixels(&mut self, pixels: u32) {
         self.core.most_pixels = pixels as usize;
+    }
+
+    /// Computes frames on the browser's GPU, or only on an adapter whose name contains `adapter`.
+    pub fn webgpu(&mut self, adapter: Option<String>) {
+        self.core.backend = Backend::Gpu;
+        self.core.gpu.device.name = adapter;
     }
 
     /// Fixes the quality level of the session; without one, the session may change it.

@@ -16,6 +16,10 @@ pub struct RawSession {
     core: Core,
 }
 
+fn no_mode(name: &str) -> JsValue {
+    setting(&format!("there is no mode '{name}'; there are image and video"))
+}
+
 /// A session of either running mode. JavaScript has one type for both.
 enum Core {
     Image(ImageSession),
@@ -46,14 +50,40 @@ impl RawSession {
         let core = match mode {
             "image" => ImageSession::new(options).map(Core::Image),
             "video" => VideoSession::new(options).map(Core::Video),
-            other => {
-                return Err(setting(&format!(
-                    "there is no mode '{other}'; there are image and video"
-                )));
-            }
+            other => return Err(no_mode(other)),
         };
         let core = core.map_err(of_core)?;
         Ok(RawSession { core })
+    }
+
+    /// Creates a session as the constructor does, and waits for the browser's GPU if the options ask for it.
+    ///
+    /// # Errors
+    /// Rejects in the cases of the constructor.
+    pub async fn open(options: &RawOptions, mode: &str) -> Answer<RawSession> {
+        let options = options.core.clone();
+        let core = match mode {
+            "image" => ImageSession::new_async(options).await.map(Core::Image),
+            "video" => VideoSession::new_async(options).await.map(Core::Video),
+            other => return Err(no_mode(other)),
+        };
+        let core = core.map_err(of_core)?;
+        Ok(RawSession { core })
+    }
+
+    /// Returns the hologram of a frame, and waits for the browser's GPU if it computes the frame.
+    ///
+    /// # Errors
+    /// Rejects in the cases of [`RawSession::process`], and while another frame is computed.
+    #[wasm_bindgen(js_name = processAsync)]
+    pub async fn process_async(&self, frame: &RawFrame) -> Answer<RawHologram> {
+        let frame = frame.frame()?;
+        let made = match &self.core {
+            Core::Image(session) => session.process_async(&frame).await,
+            Core::Video(session) => session.process_async(&frame).await,
+        };
+        let core = made.map_err(of_core)?;
+        Ok(RawHologram { core })
     }
 
     /// Returns the hologram of a frame.

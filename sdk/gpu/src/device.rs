@@ -1,12 +1,16 @@
 //! An open GPU: its limits, its programs, its memory and its errors. This module does not depend on the stages.
 
+#[cfg(target_arch = "wasm32")]
+mod browser;
 mod cache;
 mod memory;
+#[cfg(not(target_arch = "wasm32"))]
 pub(crate) mod peak;
 
 mod program;
 #[cfg(test)]
 pub(super) mod testing;
+mod wait;
 
 pub(crate) use memory::{Constants, copy_mapped};
 pub(crate) use program::{Dispatch, Program};
@@ -14,11 +18,15 @@ pub(crate) use program::{Dispatch, Program};
 use super::{GpuError, Result};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
+#[cfg(not(target_arch = "wasm32"))]
 use std::time::Duration;
 
-/// The time after which a frame's device counts as hung. Drivers themselves give up after some seconds.
+/// The time after which a frame's device counts as hung. Drivers themselves give up after some seconds, and a browser
+/// watches over them itself.
+#[cfg(not(target_arch = "wasm32"))]
 const PATIENCE: Duration = Duration::from_secs(10);
 /// The same limit for software drivers, which are slow.
+#[cfg(not(target_arch = "wasm32"))]
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(300);
 
 /// The GPU to open, and the programs that it compiled on an earlier run.
@@ -71,6 +79,7 @@ pub struct Device {
     /// Why the programs of an earlier run were rejected.
     programs_refused: Option<&'static str>,
     /// The time after which a frame's device counts as hung.
+    #[cfg(not(target_arch = "wasm32"))]
     patience: Duration,
     /// The programs by entry point and text. Identical layers, and frames of all sizes, share their programs.
     compiled: Mutex<HashMap<(&'static str, String), Program>>,
@@ -90,22 +99,23 @@ impl Device {
     /// Returns [`GpuError::None`] if there is no GPU, or none with that name (the message lists the GPUs that exist),
     /// and [`GpuError::Refused`] if the driver does not open it.
     #[doc(hidden)]
-    pub fn open(options: &DeviceOptions) -> Result<Self> {
-        Self::open_with(options, &Allowed::default())
+    pub async fn open_async(options: &DeviceOptions) -> Result<Self> {
+        Self::open_with_async(options, &Allowed::default()).await
     }
 
-    /// Opens a GPU as [`Device::open`] does, with at most the features, limits and memory of `allowed`.
-    pub(crate) fn open_with(options: &DeviceOptions, allowed: &Allowed) -> Result<Self> {
-        let adapter = adapter(options.name.as_deref(), allowed.memory_percent)?;
-        let info = adapter.get_info();
+    /// Opens a GPU as [`Device::open_async`] does, with at most the features, limits and memory of `allowed`.
+    pub(crate) async fn open_with_async(options: &DeviceOptions, allowed: &Allowed) -> Result<Self> {
+        let (adapter, name) = adapter(options.name.as_deref(), allowed.memory_percent).await?;
         let descriptor = wgpu::DeviceDescriptor {
             required_features: adapter.features() & Self::wanted() & allowed.features,
             required_limits: (allowed.limits)(adapter.limits()),
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|why| GpuError::Refused(format!("{} cannot be opened: {}", info.name, one_line(why))))?;
-        Ok(Self::of(device, queue, options.programs.as_deref()))
+        let (device, queue) = (adapter.request_device(&descriptor).await)
+            .map_err(|why| GpuError::Refused(format!("{name} cannot be opened: {}", reason(&why))))?;
+        let mut device = Self::of(device, queue, options.programs.as_deref());
+        device.info.name = name;
+        Ok(device)
     }
 
     /// Returns the features that an app should enable, if its adapter has them, on a device for [`Device::of`].
@@ -137,6 +147,7 @@ impl Device {
             .then(|| cache::open(&device, &info, programs))
             .unzip();
         Device {
+            #[cfg(not(target_arch = "wasm32"))]
             patience: match info.device_type {
                 wgpu::DeviceType::Cpu => SOFTWARE_PATIENCE,
                 _ => PATIENCE,
@@ -209,23 +220,6 @@ impl Device {
         self.inner.destroy();
     }
 
-    /// Waits for the work submitted up to `submission`.
-    pub(crate) fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
-        self.check()?;
-        let waited = self.inner.poll(wgpu::PollType::Wait {
-            submission_index: Some(submission.clone()),
-            timeout: Some(self.patience),
-        });
-        match waited {
-            Ok(_) => {}
-            Err(wgpu::PollError::Timeout) => {
-                self.give_up(&format!("no answer for {:?}", self.patience));
-            }
-            Err(why) => self.give_up(&one_line(why)),
-        }
-        self.check()
-    }
-
     /// Polls the device, because a loss is reported only then.
     fn ask(&self) -> Result<()> {
         if let Err(why) = self.inner.poll(wgpu::PollType::Poll) {
@@ -235,17 +229,18 @@ impl Device {
     }
 
     /// Runs `work` and returns the device's errors during it.
-    pub(crate) fn guarded<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    pub(crate) async fn guarded_async<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.ask()?;
         let memory = self.inner.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.inner.push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = self.inner.push_error_scope(wgpu::ErrorFilter::Validation);
         let done = work();
         // Scopes are popped last in, first out.
-        let errors = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
+        let [validation, internal, memory] = [validation, internal, memory].map(wgpu::ErrorScopeGuard::pop);
+        let errors = [memory.await, internal.await, validation.await];
         self.check()?;
         // A resource that memory was too short for is invalid in later calls: report the cause before its consequences.
-        let error = errors.into_iter().rev().flatten().next();
+        let error = errors.into_iter().flatten().next();
         if error.is_some() {
             // The cause may be a loss that was not reported yet.
             self.ask()?;
@@ -258,12 +253,26 @@ impl Device {
     }
 }
 
-/// Returns the adapter with that name, or the fastest hardware adapter.
-fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<wgpu::Adapter> {
+/// What is missing if there is no adapter at all.
+const NO_DRIVER: &str = if cfg!(target_arch = "wasm32") {
+    "the browser gives no WebGPU adapter"
+} else {
+    "no driver of Vulkan, Metal or DirectX 12 answers"
+};
+
+/// Returns the adapter with that name, or the fastest hardware adapter, and its name.
+async fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<(wgpu::Adapter, String)> {
     let mut wanted = wgpu::InstanceDescriptor::new_without_display_handle();
     wanted.memory_budget_thresholds.for_resource_creation = memory_percent;
     let instance = wgpu::Instance::new(wanted);
-    let mut all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let mut all = instance.enumerate_adapters(wgpu::Backends::all()).await;
+    // A browser has one adapter.
+    #[cfg(target_arch = "wasm32")]
+    let called = browser::adapter_name().await;
+    #[cfg(target_arch = "wasm32")]
+    let called = |_: &wgpu::Adapter| called.clone();
+    #[cfg(not(target_arch = "wasm32"))]
+    let called = |adapter: &wgpu::Adapter| adapter.get_info().name;
     let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
@@ -277,31 +286,40 @@ fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<wgpu::Adapt
     };
     all.retain(computes);
     all.sort_by_key(rank);
-    let names = all
-        .iter()
-        .map(|adapter| adapter.get_info().name)
-        .collect::<Vec<_>>()
-        .join(", ");
+    let names = all.iter().map(called).collect::<Vec<_>>().join(", ");
     let wanted = |adapter: &wgpu::Adapter| match name {
         Some(name) => {
-            let of = adapter.get_info().name.to_lowercase();
+            let of = called(adapter).to_lowercase();
             of.contains(&name.to_lowercase())
         }
         None => rank(adapter) < 4,
     };
-    all.into_iter().find(wanted).ok_or_else(|| {
+    let found = all.into_iter().find(wanted).ok_or_else(|| {
         GpuError::None(match (name, names.is_empty()) {
-            (_, true) => "no driver of Vulkan, Metal or DirectX 12 answers".into(),
+            (_, true) => NO_DRIVER.into(),
             (Some(name), _) => format!("none is called '{name}'; there is {names}"),
             (None, _) => {
                 format!("only drivers in software answer ({names}); they are taken by name")
             }
         })
-    })
+    })?;
+    let name = called(&found);
+    Ok((found, name))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns why a device was refused. A browser appends the places in its program.
+fn reason(why: &wgpu::RequestDeviceError) -> String {
+    let said = why.to_string();
+    if cfg!(target_arch = "wasm32") {
+        let first = said.lines().next().unwrap_or_default();
+        first.trim_start_matches("JsValue(").trim_end_matches(')').to_owned()
+    } else {
+        one_line(said)
+    }
 }
 
 pub(crate) fn one_line(error: impl std::fmt::Display) -> String {
@@ -414,7 +432,7 @@ mod tests {
 
     #[test]
     fn an_app_computes_on_its_own_device() {
-        let adapter = opened(adapter(software().name.as_deref(), None));
+        let (adapter, _) = opened(pollster::block_on(adapter(software().name.as_deref(), None)));
         let descriptor = wgpu::DeviceDescriptor {
             required_features: adapter.features() & Device::wanted(),
             required_limits: adapter.limits(),

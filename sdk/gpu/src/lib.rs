@@ -1,5 +1,5 @@
-//! Runs whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as wgpu compute passes for Vulkan, Metal
-//! and DirectX 12. The input is a frame and the output is modulator levels. No intermediate result returns to the CPU.
+//! Runs whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as wgpu compute passes for Vulkan, Metal,
+//! DirectX 12 and a browser's WebGPU. The input is a frame and the output is modulator levels. No intermediate result returns to the CPU.
 //!
 //! Each stage is a .wgsl file beside its Rust file. The Rust code prepends a header of constants to the shader text, so
 //! that loops have constant bounds. The CPU stage is the reference: f32 agrees with it to 1e-4, int8 networks agree bit
@@ -16,6 +16,9 @@
 //! | `probe` | compares a small frame with the CPU's |
 //! | `renderer` | reopens a lost device |
 //! | `watch` | abandons calls into drivers that do not return |
+//! | `blocking` | blocks on the futures of a native GPU |
+//!
+//! What waits for the device is a future, because a browser's thread must not block. `blocking` blocks on them.
 //!
 //! In `chain` each thread computes four pixels of a column for eight filters at a time. The weights are in uniform
 //! memory in the order in which they are read. Two layers and the skip around them can be one dispatch, which saves
@@ -42,6 +45,8 @@
 //! }
 //! ```
 
+#[cfg(not(target_arch = "wasm32"))]
+mod blocking;
 mod brightness;
 mod device;
 mod encode;
@@ -54,6 +59,9 @@ mod probe;
 mod renderer;
 mod watch;
 
+#[cfg(not(target_arch = "wasm32"))]
+pub use blocking::probe;
+#[cfg(not(target_arch = "wasm32"))]
 pub use device::peak::Peak;
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};
@@ -61,7 +69,7 @@ pub use method::chain::{ChainOptions, Fusion, GpuNetworkPlan};
 pub use numbers::Float;
 pub use phasefront_core::encode::brightness::Past;
 pub use pipeline::{Deliver, FLIGHTS, GpuPipeline, GpuReport, Job, Ticket};
-pub use probe::probe;
+pub use probe::probe_async;
 pub use renderer::{InFlight, Renderer};
 
 /// The reason why the GPU cannot be used.

@@ -117,7 +117,7 @@ impl MethodPlan {
     }
 
     /// Plans the input stage again for frames in `formats`.
-    pub(super) fn expect(&mut self, device: &Device, formats: (Colour, Depth)) -> Result<()> {
+    pub(super) async fn expect(&mut self, device: &Device, formats: (Colour, Depth)) -> Result<()> {
         if self.packer.formats() == Some(formats) {
             return Ok(());
         }
@@ -127,7 +127,9 @@ impl MethodPlan {
         };
         let source = Source::Frame(formats.0, formats.1);
         let input = Some(self.packer.input.clone());
-        self.packer = device.guarded(|| Packer::new(device, form, self.size, source, input))?;
+        self.packer = device
+            .guarded_async(|| Packer::new(device, form, self.size, source, input))
+            .await?;
         Ok(())
     }
 

@@ -7,6 +7,7 @@ use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame};
 use super::method::MethodPlan;
 use super::{GpuError, Result};
+#[cfg(not(target_arch = "wasm32"))]
 use crate::device::peak::Peak;
 use crate::method::chain::ChainOptions;
 use phasefront_core::display::target::Target;
@@ -124,12 +125,12 @@ struct Flight {
 }
 
 impl GpuPipeline {
-    /// Plans `job` on `device`. It does not check the device's results: see [`super::probe`].
+    /// Plans `job` on `device`. It does not check the device's results: see [`super::probe_async`].
     ///
     /// # Errors
     /// Returns the errors of [`phasefront_core::pipeline::Pipeline::new`], and [`GpuError::Refused`] or
     /// [`GpuError::OutOfMemory`] if the device cannot run the job.
-    pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
+    pub async fn new_async(device: &Arc<Device>, job: &Job) -> Result<Self> {
         let display = &job.target.display;
         job.method.check(display)?;
         let size = job.shape;
@@ -150,7 +151,7 @@ impl GpuPipeline {
         if let Encoding::Deep(network) = &job.encoder.encoding {
             network.check_prefilter(display)?;
         }
-        device.guarded(|| Self::build(device, job, size))
+        device.guarded_async(|| Self::build(device, job, size)).await
     }
 
     fn build(device: &Arc<Device>, job: &Job, size: (usize, usize)) -> Result<Self> {
@@ -231,6 +232,7 @@ impl GpuPipeline {
     }
 
     /// Measures the device's peak performance in these numbers.
+    #[cfg(not(target_arch = "wasm32"))]
     ///
     /// # Errors
     /// Returns an error if the device cannot run the measurement, or [`GpuError::Lost`].
@@ -247,24 +249,16 @@ impl GpuPipeline {
     ///
     /// # Errors
     /// Returns an error if the CPU path refuses the format or the device cannot run it. The earlier formats then stay.
-    pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
-        self.method.expect(&self.device, (colour, depth))
+    pub async fn expect_async(&mut self, colour: Colour, depth: Depth) -> Result<()> {
+        self.method.expect(&self.device, (colour, depth)).await
     }
 
-    /// Submits a frame. At most [`FLIGHTS`] may be in flight.
+    /// Submits a frame whose smoothed brightness starts from the scale in `past`. At most [`FLIGHTS`] may be in flight.
     ///
     /// # Errors
     /// Returns an error if the frame's byte lengths differ from the plan, too many frames are in flight or the device
     /// is lost.
-    pub fn submit(&mut self, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
-        self.submit_after(None, frame, deliver)
-    }
-
-    /// Submits a frame whose smoothed brightness starts from the scale in `past`.
-    ///
-    /// # Errors
-    /// Returns the errors of [`GpuPipeline::submit`].
-    pub fn submit_after(&mut self, past: Option<Past>, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
+    pub async fn submit_async(&mut self, past: Option<Past>, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
         let Some(slot) = self.slots.iter().position(|slot| slot.flight.is_none()) else {
             return Err(phasefront_core::runtime::error::Error::Setting(format!(
                 "{FLIGHTS} frames are in flight; one must be collected first"
@@ -272,11 +266,12 @@ impl GpuPipeline {
             .into());
         };
         let device = self.device.clone();
-        let submission = device.guarded(|| {
+        let work = || {
             self.method.upload(&device, frame)?;
             self.encoder.set_past(&device, past);
             Ok(device.queue.submit([self.commands(slot, deliver)]))
-        })?;
+        };
+        let submission = device.guarded_async(work).await?;
         self.serial += 1;
         self.slots[slot].flight = Some(Flight {
             serial: self.serial,
@@ -351,7 +346,7 @@ impl GpuPipeline {
     ///
     /// # Panics
     /// Panics if `levels` does not have 3·H·W values.
-    pub fn collect(&mut self, ticket: Ticket, levels: &mut [u8]) -> Result<GpuReport> {
+    pub async fn collect_async(&mut self, ticket: Ticket, levels: &mut [u8]) -> Result<GpuReport> {
         let area = self.size.0 * self.size.1;
         assert_eq!(levels.len(), 3 * area);
         self.take(ticket, Deliver::Levels, |bytes| {
@@ -367,17 +362,18 @@ impl GpuPipeline {
                     });
             }
         })
+        .await
     }
 
     /// Waits for a frame that stays on the GPU and frees its slot.
     ///
     /// # Errors
     /// Returns [`GpuError::Lost`] if the device is lost.
-    pub fn finish(&mut self, ticket: Ticket) -> Result<GpuReport> {
-        self.take(ticket, Deliver::Shown, |_| {})
+    pub async fn finish_async(&mut self, ticket: Ticket) -> Result<GpuReport> {
+        self.take(ticket, Deliver::Shown, |_| {}).await
     }
 
-    fn take(&mut self, ticket: Ticket, wanted: Deliver, read: impl FnOnce(&[u8])) -> Result<GpuReport> {
+    async fn take(&mut self, ticket: Ticket, wanted: Deliver, read: impl FnOnce(&[u8])) -> Result<GpuReport> {
         let slot = &mut self.slots[ticket.slot];
         let flight = slot.flight.take_if(|flight| flight.serial == ticket.serial);
         let Some(flight) = flight else {
@@ -391,7 +387,7 @@ impl GpuPipeline {
             )
             .into());
         }
-        self.device.map(&slot.readable, &flight.submission)?;
+        self.device.map(&slot.readable, &flight.submission).await?;
         let mut head = [0; LEVELS_AT];
         copy_mapped(&slot.readable, &mut head)?;
         {
@@ -422,18 +418,6 @@ impl GpuPipeline {
                 ..FrameTimes::default()
             }),
         })
-    }
-
-    /// Submits a frame and collects it, as [`GpuPipeline::submit`] and [`GpuPipeline::collect`] do.
-    ///
-    /// # Errors
-    /// Returns the errors of both.
-    ///
-    /// # Panics
-    /// Panics if `levels` does not have 3·H·W values.
-    pub fn process(&mut self, frame: &Frame<'_>, levels: &mut [u8]) -> Result<GpuReport> {
-        let ticket = self.submit(frame, Deliver::Levels)?;
-        self.collect(ticket, levels)
     }
 }
 

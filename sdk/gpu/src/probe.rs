@@ -2,7 +2,7 @@
 
 use super::device::Device;
 use super::input::Frame;
-use super::pipeline::{GpuPipeline, Job};
+use super::pipeline::{Deliver, GpuPipeline, Job};
 use super::{GpuError, Result};
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
@@ -18,8 +18,8 @@ const SIZE: (usize, usize) = (37, 43);
 ///
 /// # Errors
 /// Returns [`GpuError::Wrong`] if the phases differ by more than the rounding of the numbers, [`GpuError::Lost`] if the
-/// device does not respond, and the errors of [`GpuPipeline::new`].
-pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
+/// device does not respond, and the errors of [`GpuPipeline::new_async`].
+pub async fn probe_async(device: &Arc<Device>, job: &Job) -> Result<()> {
     let job = Job {
         shape: SIZE,
         target: Target {
@@ -35,7 +35,7 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
         ..job.clone()
     };
     // The GPU goes first, so that its errors are known before the CPU works.
-    let mut gpu = GpuPipeline::new(device, &job)?;
+    let mut gpu = GpuPipeline::new_async(device, &job).await?;
     let size = 3 * SIZE.0 * SIZE.1;
     let frame = frame()?;
     let cpu = job.on_cpu()?;
@@ -45,7 +45,8 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let mut levels = vec![0; size];
     // Two frames, because the state that one leaves must not affect the next.
     for _ in 0..2 {
-        gpu.process(&Frame::of(&frame), &mut levels)?;
+        let ticket = gpu.submit_async(None, &Frame::of(&frame), Deliver::Levels).await?;
+        gpu.collect_async(ticket, &mut levels).await?;
         let apart = apart(&levels, &expected, &job.target.response);
         let most = if gpu.numbers() == "f16" { 0.1 } else { 0.01 };
         if apart > most {
@@ -93,9 +94,11 @@ mod tests {
     use super::super::device::testing::{opened, software};
     use super::super::renderer::Renderer;
     use super::*;
+    use crate::probe;
     use phasefront_core::display::Display;
     use phasefront_core::method::Method;
     use phasefront_core::method::network::Network;
+    use pollster::block_on;
 
     /// Checks that a driver that compiles one program wrongly is detected.
     #[test]
@@ -113,7 +116,7 @@ mod tests {
         device.forge("find", source, &forged);
         let wrong = probe(&device, &job).unwrap_err();
         assert!(matches!(&wrong, GpuError::Wrong(why) if !why.contains('\n')), "{wrong}");
-        let refused = Renderer::new(Some(device), DeviceOptions::default(), job);
+        let refused = block_on(Renderer::new(Some(device), DeviceOptions::default(), job));
         assert_eq!(refused.err().unwrap().to_string(), wrong.to_string());
     }
 }

@@ -1,10 +1,10 @@
-//! Renders frames on a GPU that passed [`probe`] and reopens a device that is lost. The session decides what happens to
+//! Renders frames on a GPU that passed [`probe_async`] and reopens a device that is lost. The session decides what happens to
 //! a frame if no device is available.
 
 use super::device::{Device, DeviceOptions};
 use super::input::{Colour, Depth, Frame};
 use super::pipeline::{Deliver, GpuPipeline, GpuReport, Job, Ticket};
-use super::probe::probe;
+use super::probe::probe_async;
 use super::watch::watched;
 use super::{GpuError, Result};
 use phasefront_core::encode::brightness::Past;
@@ -40,11 +40,11 @@ pub struct InFlight {
 }
 
 impl Renderer {
-    /// Plans `job` on `device`, or on a device opened with `options`, and checks the plan with [`probe`].
+    /// Plans `job` on `device`, or on a device opened with `options`, and checks the plan with [`probe_async`].
     ///
     /// # Errors
     /// Returns an error if the CPU path refuses the job or the GPU cannot be used.
-    pub fn new(device: Option<Arc<Device>>, options: DeviceOptions, job: Job) -> Result<Self> {
+    pub async fn new(device: Option<Arc<Device>>, options: DeviceOptions, job: Job) -> Result<Self> {
         let mut renderer = Renderer {
             job,
             options,
@@ -53,7 +53,7 @@ impl Renderer {
             epoch: 0,
             losses: 0,
         };
-        renderer.open(device.filter(|device| device.check().is_ok()))?;
+        renderer.open(device.filter(|device| device.check().is_ok())).await?;
         Ok(renderer)
     }
 
@@ -78,10 +78,10 @@ impl Renderer {
     }
 
     /// Opens a device unless one is given.
-    fn open(&mut self, device: Option<Arc<Device>>) -> Result<&mut GpuPipeline> {
+    async fn open(&mut self, device: Option<Arc<Device>>) -> Result<&mut GpuPipeline> {
         self.epoch += 1;
         let opened = match (self.losses < ATTEMPTS, &self.reason) {
-            (true, _) => trusted(device, &self.options, &self.job),
+            (true, _) => trusted(device, &self.options, &self.job).await,
             (false, Some(last)) => Err(GpuError::Lost(format!("{ATTEMPTS} times in a row: {last}"))),
             (false, None) => Err(GpuError::Lost(format!("{ATTEMPTS} times in a row"))),
         };
@@ -95,13 +95,13 @@ impl Renderer {
         }
     }
 
-    /// Plans the input stage again for frames in these formats, as [`GpuPipeline::expect`] does.
+    /// Plans the input stage again for frames in these formats, as [`GpuPipeline::expect_async`] does.
     ///
     /// # Errors
-    /// Returns the errors of [`GpuPipeline::expect`] except a loss.
-    pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
+    /// Returns the errors of [`GpuPipeline::expect_async`] except a loss.
+    pub async fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
         if let Some(pipeline) = &mut self.pipeline {
-            match pipeline.expect(colour, depth) {
+            match pipeline.expect_async(colour, depth).await {
                 // The next frame notices the loss and opens another device for these formats.
                 Ok(()) | Err(GpuError::Lost(_)) => {}
                 Err(why) => return Err(why),
@@ -117,13 +117,13 @@ impl Renderer {
     /// # Errors
     /// Returns an error if the frame's byte lengths differ from the plan, or, after a loss, the errors of
     /// [`Renderer::new`].
-    pub fn submit(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<InFlight> {
+    pub async fn submit(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<InFlight> {
         loop {
-            let submitted = match &mut self.pipeline {
-                Some(pipeline) => pipeline.submit_after(past, frame, Deliver::Levels),
-                None => self.open(None)?.submit_after(past, frame, Deliver::Levels),
+            let pipeline = match &mut self.pipeline {
+                Some(pipeline) => pipeline,
+                None => self.open(None).await?,
             };
-            match submitted {
+            match pipeline.submit_async(past, frame, Deliver::Levels).await {
                 Ok(ticket) => {
                     let epoch = self.epoch;
                     return Ok(InFlight { epoch, ticket });
@@ -140,12 +140,12 @@ impl Renderer {
     ///
     /// # Panics
     /// Panics if `levels` does not have 3·H·W values.
-    pub fn collect(&mut self, frame: InFlight, levels: &mut [u8]) -> Result<GpuReport> {
+    pub async fn collect(&mut self, frame: InFlight, levels: &mut [u8]) -> Result<GpuReport> {
         let pipeline = self.pipeline.as_mut().filter(|_| frame.epoch == self.epoch);
         let Some(pipeline) = pipeline else {
             return Err(GpuError::Lost("with the device that it was on".into()));
         };
-        match pipeline.collect(frame.ticket, levels) {
+        match pipeline.collect_async(frame.ticket, levels).await {
             Ok(report) => {
                 self.losses = 0;
                 Ok(report)
@@ -173,21 +173,22 @@ impl Renderer {
 
 /// Plans `job` on `device`, or on a newly opened one, and returns the plan if the device responds and agrees with the
 /// CPU.
-fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> Result<GpuPipeline> {
+async fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> Result<GpuPipeline> {
     let device = match device {
         Some(device) => device,
         None => {
             let options = options.clone();
-            let open = move || Device::open(&options).map(Arc::new);
-            watched("while it was opened", OPENING, open)?
+            let open = async move || Device::open_async(&options).await.map(Arc::new);
+            watched("while it was opened", OPENING, open).await?
         }
     };
     let patience = if device.is_software() { TRYING_SOFTWARE } else { TRYING };
     let job = job.clone();
-    watched("while it was tried out", patience, move || {
-        probe(&device, &job)?;
-        GpuPipeline::new(&device, &job)
+    watched("while it was tried out", patience, async move || {
+        probe_async(&device, &job).await?;
+        GpuPipeline::new_async(&device, &job).await
     })
+    .await
 }
 
 #[cfg(test)]
@@ -203,6 +204,7 @@ mod tests {
     use phasefront_core::frame::RgbdFrame;
     use phasefront_core::method::Method;
     use phasefront_core::method::network::Network;
+    use pollster::block_on;
 
     const SIZE: (usize, usize) = (21, 34);
 
@@ -231,33 +233,33 @@ mod tests {
 
     #[test]
     fn a_lost_device_costs_the_frames_in_flight_and_no_more() {
-        let mut renderer = opened(Renderer::new(None, software(), job(&network())));
+        let mut renderer = opened(block_on(Renderer::new(None, software(), job(&network()))));
         assert!(renderer.reason().is_none() && renderer.pipeline().is_some());
         let frame = frame();
         let bytes = Frame::of(&frame);
         let mut before = vec![0; 3 * SIZE.0 * SIZE.1];
-        let first = renderer.submit(None, &bytes).unwrap();
-        renderer.collect(first, &mut before).unwrap();
+        let first = block_on(renderer.submit(None, &bytes)).unwrap();
+        block_on(renderer.collect(first, &mut before)).unwrap();
 
         let flying = [
-            renderer.submit(None, &bytes).unwrap(),
-            renderer.submit(None, &bytes).unwrap(),
+            block_on(renderer.submit(None, &bytes)).unwrap(),
+            block_on(renderer.submit(None, &bytes)).unwrap(),
         ];
         lose(&renderer);
         let mut levels = vec![0; before.len()];
         for frame in flying {
-            let lost = renderer.collect(frame, &mut levels).unwrap_err();
+            let lost = block_on(renderer.collect(frame, &mut levels)).unwrap_err();
             assert!(matches!(lost, GpuError::Lost(_)), "{lost}");
         }
-        let next = renderer.submit(None, &bytes).unwrap();
-        renderer.collect(next, &mut levels).unwrap();
+        let next = block_on(renderer.submit(None, &bytes)).unwrap();
+        block_on(renderer.collect(next, &mut levels)).unwrap();
         assert_eq!(levels, before);
         assert!(matches!(renderer.reason(), Some(GpuError::Lost(_))));
 
         // The device is lost with nothing in flight: the next frame notices and succeeds on a new device.
         lose(&renderer);
-        let next = renderer.submit(None, &bytes).unwrap();
-        renderer.collect(next, &mut levels).unwrap();
+        let next = block_on(renderer.submit(None, &bytes)).unwrap();
+        block_on(renderer.collect(next, &mut levels)).unwrap();
         assert_eq!(levels, before);
     }
 
@@ -267,18 +269,18 @@ mod tests {
             name: Some("no such card".into()),
             programs: None,
         };
-        let refused = Renderer::new(None, none, job(&network())).err().unwrap();
+        let refused = block_on(Renderer::new(None, none, job(&network()))).err().unwrap();
         assert!(matches!(refused, GpuError::None(_)), "{refused}");
     }
 
     #[test]
     fn a_device_that_is_lost_again_and_again_is_of_no_use() {
-        let mut renderer = opened(Renderer::new(None, software(), job(&network())));
+        let mut renderer = opened(block_on(Renderer::new(None, software(), job(&network()))));
         renderer.losses = ATTEMPTS;
         renderer.reason = Some(GpuError::Lost("pulled out".into()));
         renderer.release();
         let frame = frame();
-        let refused = renderer.submit(None, &Frame::of(&frame)).unwrap_err();
+        let refused = block_on(renderer.submit(None, &Frame::of(&frame))).unwrap_err();
         assert!(
             (refused.to_string()).contains("in a row: the GPU was lost: pulled out"),
             "{refused}"

@@ -62,7 +62,7 @@ impl Engine {
     ///
     /// # Errors
     /// Returns an error if the CPU refuses the quality level too.
-    pub(super) fn new(context: &mut LevelContext<'_>) -> Result<Self> {
+    pub(super) async fn new(context: &mut LevelContext<'_>) -> Result<Self> {
         let asked = context.quality_level.backend.unwrap_or(context.options.backend);
         let on_cpu = |context: &LevelContext<'_>| -> Result<Processor> {
             let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
@@ -70,7 +70,7 @@ impl Engine {
         };
         let (processor, refusal) = match asked {
             Backend::Cpu => (on_cpu(context)?, None),
-            Backend::Gpu => match Self::on_gpu(context)? {
+            Backend::Gpu => match Self::on_gpu(context).await? {
                 Ok(processor) => (processor, None),
                 Err(why) => (on_cpu(context)?, Some(why)),
             },
@@ -84,7 +84,7 @@ impl Engine {
 
     /// Plans the quality level on the GPU, or returns the reason why that is impossible.
     #[cfg(feature = "gpu")]
-    fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
+    async fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
         let LevelContext {
             options,
             quality_level,
@@ -94,7 +94,7 @@ impl Engine {
         if let Some(why) = &gpu.refusal {
             return Ok(Err(why.clone()));
         }
-        match OnGpu::new(options, quality_level, gpu.device.clone()) {
+        match OnGpu::new(options, quality_level, gpu.device.clone()).await {
             Ok(on_gpu) => {
                 gpu.device = on_gpu.device().cloned();
                 Ok(Ok(Processor::Gpu(Box::new(on_gpu))))
@@ -105,7 +105,7 @@ impl Engine {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
+    async fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
         let GpuState {} = context.gpu;
         Ok(Err("no GPU: this library was built without it (feature gpu)".into()))
     }
@@ -135,13 +135,34 @@ impl Engine {
     /// # Errors
     /// Returns an error if the frame has another shape or was lost with its GPU.
     #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only the fallback uses the context.
-    pub(super) fn process(
+    pub(super) async fn process(
         &mut self,
         context: &mut LevelContext<'_>,
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         levels: LevelsMut<'_>,
     ) -> Result<FrameReport> {
+        #[cfg(feature = "gpu")]
+        let levels = match &mut self.processor {
+            Processor::Cpu(_) => levels,
+            Processor::Gpu(gpu) => {
+                let LevelsMut::Bytes(bytes) = levels else {
+                    unreachable!("a GPU refuses a display of more than 8 bits");
+                };
+                let before = gpu.openings();
+                let made = gpu.process(input, brightness, bytes).await;
+                if gpu.openings() != before {
+                    context.gpu.device = gpu.device().cloned();
+                    self.report_is_new = true;
+                }
+                match made {
+                    Ok(made) => return Ok(made),
+                    Err(Failure::Frame(why)) => return Err(why),
+                    Err(Failure::Gpu(why)) => self.fall_back(context, &why)?,
+                }
+                LevelsMut::Bytes(bytes)
+            }
+        };
         match &mut self.processor {
             Processor::Cpu(cpu) => {
                 let past = brightness.past(input.elapsed);
@@ -150,32 +171,23 @@ impl Engine {
                 Ok(made)
             }
             #[cfg(feature = "gpu")]
-            Processor::Gpu(gpu) => {
-                let LevelsMut::Bytes(bytes) = levels else {
-                    unreachable!("a GPU refuses a display of more than 8 bits");
-                };
-                let before = gpu.openings();
-                let made = gpu.process(input, brightness, bytes);
-                if gpu.openings() != before {
-                    context.gpu.device = gpu.device().cloned();
-                    self.report_is_new = true;
-                }
-                match made {
-                    Ok(made) => Ok(made),
-                    Err(Failure::Frame(why)) => Err(why),
-                    Err(Failure::Gpu(why)) => {
-                        // Free the GPU's memory first.
-                        gpu.release();
-                        context.gpu.device = None;
-                        self.refusal = Some(context.gpu.refuse(&why));
-                        let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
-                        self.processor = Processor::Cpu(Box::new(cpu));
-                        self.report_is_new = true;
-                        self.process(context, input, brightness, LevelsMut::Bytes(bytes))
-                    }
-                }
-            }
+            Processor::Gpu(_) => unreachable!("it answered, or the CPU took over"),
         }
+    }
+
+    /// Lets the CPU take over from a GPU that is unusable.
+    #[cfg(feature = "gpu")]
+    fn fall_back(&mut self, context: &mut LevelContext<'_>, why: &phasefront_gpu::GpuError) -> Result<()> {
+        if let Processor::Gpu(gpu) = &mut self.processor {
+            // Free the GPU's memory first.
+            gpu.release();
+        }
+        context.gpu.device = None;
+        self.refusal = Some(context.gpu.refuse(why));
+        let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
+        self.processor = Processor::Cpu(Box::new(cpu));
+        self.report_is_new = true;
+        Ok(())
     }
 }
 

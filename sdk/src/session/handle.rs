@@ -10,6 +10,9 @@ use super::queue::{self, Gate, Queue};
 use super::shared::Shared;
 use super::stages::Stages;
 use super::statistics::Statistics;
+use super::threads::block_on;
+#[cfg(target_arch = "wasm32")]
+use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::error::Result;
 use std::fmt::{Debug, Formatter};
 use std::sync::{Arc, Mutex};
@@ -50,6 +53,24 @@ impl SessionHandle {
         result
     }
 
+    /// Runs `work` with exclusive access to the stages. No lock is held while it waits, and the session counts as busy.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) async fn with_stages_async<T>(&self, work: impl AsyncFnOnce(&mut Stages) -> Result<T>) -> Result<T> {
+        let Some(mut stages) = lock(&self.shared.stages).take() else {
+            return Err(Error::Session(
+                "it is closed, or it computes another frame; wait for that one first".into(),
+            ));
+        };
+        let result = work(&mut stages).await;
+        *lock(&self.shared.stages) = Some(stages);
+        if let Frames::Answered(gate) = &self.frames
+            && lock(gate).closed
+        {
+            self.shared.end();
+        }
+        result
+    }
+
     /// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as the others.
     ///
     /// # Errors
@@ -58,7 +79,7 @@ impl SessionHandle {
     pub fn warm_up(&self) -> Result<()> {
         self.with_stages(|stages| {
             let stages = stages.as_mut().ok_or_else(queue::closed)?;
-            let (result, panicked) = guarded(|| stages.warm_up());
+            let (result, panicked) = guarded(|| block_on(stages.warm_up()));
             if panicked {
                 stages.recover();
             }

@@ -8,6 +8,7 @@ use super::quality::QualityChange;
 use super::queue;
 use super::shared::Shared;
 use super::stages::FrameResult;
+use super::threads::block_on;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 use std::sync::Arc;
@@ -26,7 +27,7 @@ impl Work for LiveWork {
         if fresh {
             stages.forget();
         }
-        self.0.process(stages, &frame.frame()?, !fresh)
+        block_on(self.0.process(stages, &frame.frame()?, !fresh))
     }
 
     fn recover(&mut self) {

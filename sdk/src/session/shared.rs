@@ -36,7 +36,7 @@ pub(super) struct Control {
 impl Shared {
     /// # Errors
     /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
-    pub(super) fn new(options: SessionOptions, estimates: Option<DepthEstimates>) -> Result<Arc<Self>> {
+    pub(super) async fn new(options: SessionOptions, estimates: Option<DepthEstimates>) -> Result<Arc<Self>> {
         options.check()?;
         let control = Control {
             quality_levels: options.quality_levels.len(),
@@ -44,7 +44,7 @@ impl Shared {
             thermal: Thermal::Nominal,
         };
         let cancel = Cancel::default();
-        let mut stages = Stages::new(options, estimates, cancel.clone())?;
+        let mut stages = Stages::new(options, estimates, cancel.clone()).await?;
         let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.quality_level());
         Ok(Arc::new(Shared {
             process: ProcessId::current(),
@@ -55,9 +55,14 @@ impl Shared {
         }))
     }
 
-    pub(super) fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<FrameResult> {
+    pub(super) async fn process(
+        &self,
+        stages: &mut Stages,
+        frame: &CameraFrame<'_>,
+        past: bool,
+    ) -> Result<FrameResult> {
         let Control { quality, thermal, .. } = *lock(&self.control);
-        let made = stages.process(frame, past, thermal, quality)?;
+        let made = stages.process(frame, past, thermal, quality).await?;
         let mut recent = lock(&self.recent);
         recent.push(Instant::now(), made.hologram.times());
         recent.quality_level = stages.quality_level();

@@ -11,7 +11,7 @@ use super::hologram::{Hologram, Pool, Viewer};
 use super::live::guarded;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::BackendReport;
-use super::threads::Threads;
+use super::threads::{Threads, block_on};
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::{DepthReport, DepthStream};
 use phasefront_core::display::levels::LevelsMut;
@@ -114,7 +114,11 @@ pub(super) struct FrameResult {
 
 impl Stages {
     /// Plans the stages. Requesting `cancel` gives up the current frame.
-    pub(super) fn new(options: SessionOptions, estimates: Option<DepthEstimates>, cancel: Cancel) -> Result<Self> {
+    pub(super) async fn new(
+        options: SessionOptions,
+        estimates: Option<DepthEstimates>,
+        cancel: Cancel,
+    ) -> Result<Self> {
         let pool = Arc::new(Threads::start(options.threads)?);
         let start = match options.quality {
             Quality::Adaptive => 0,
@@ -140,11 +144,11 @@ impl Stages {
             pool,
             options,
         };
-        stages.plan = Some(stages.plan_level()?);
+        stages.plan = Some(stages.plan_level().await?);
         Ok(stages)
     }
 
-    fn plan_level(&mut self) -> Result<LevelPlan> {
+    async fn plan_level(&mut self) -> Result<LevelPlan> {
         let _stage = stage!("plan");
         let Stages {
             options,
@@ -165,7 +169,7 @@ impl Stages {
             cancel,
         };
         Ok(LevelPlan {
-            engine: pool.install(|| Engine::new(&mut context))?,
+            engine: pool.run(async || Engine::new(&mut context).await).await?,
             frame: RgbdFrame::black(colours, shape),
             depth,
             colour: None,
@@ -203,8 +207,8 @@ impl Stages {
     }
 
     /// Runs a black frame through all stages that do not need a camera's frame.
-    pub(super) fn warm_up(&mut self) -> Result<()> {
-        let mut plan = self.take_plan()?;
+    pub(super) async fn warm_up(&mut self) -> Result<()> {
+        let mut plan = self.take_plan().await?;
         let Stages {
             pool,
             levels,
@@ -219,36 +223,37 @@ impl Stages {
         let mut levels = levels.take(options.target.display.colours() * quality_level.height * quality_level.width);
         let mut brightness = BrightnessTracker::default();
         plan.frame.planes_mut().0.fill(0.0);
-        let result = pool.install(|| {
-            plan.engine.process(
-                &mut LevelContext {
-                    options,
-                    quality_level,
-                    gpu,
-                    cancel,
-                },
-                &FrameInput {
-                    camera: None,
-                    rgbd: &plan.frame,
-                    elapsed: None,
-                },
-                &mut brightness,
-                LevelsMut::Bytes(&mut levels.values),
-            )
-        });
+        let work = async || {
+            let mut context = LevelContext {
+                options,
+                quality_level,
+                gpu,
+                cancel,
+            };
+            let input = FrameInput {
+                camera: None,
+                rgbd: &plan.frame,
+                elapsed: None,
+            };
+            let levels = LevelsMut::Bytes(&mut levels.values);
+            (plan.engine)
+                .process(&mut context, &input, &mut brightness, levels)
+                .await
+        };
+        let result = pool.run(work).await;
         self.plan = Some(plan);
         result.map(|_| ())
     }
 
-    fn take_plan(&mut self) -> Result<LevelPlan> {
+    async fn take_plan(&mut self) -> Result<LevelPlan> {
         match self.plan.take() {
             Some(plan) => Ok(plan),
-            None => self.plan_level(),
+            None => self.plan_level().await,
         }
     }
 
     /// Makes the hologram of `frame`; `past` says whether the frames before it count.
-    pub(super) fn process(
+    pub(super) async fn process(
         &mut self,
         frame: &CameraFrame<'_>,
         past: bool,
@@ -257,8 +262,8 @@ impl Stages {
     ) -> Result<FrameResult> {
         let start = Instant::now();
         let elapsed = self.elapsed(frame, past);
-        let mut plan = self.take_plan()?;
-        let made = self.run(&mut plan, frame, elapsed);
+        let mut plan = self.take_plan().await?;
+        let made = self.run(&mut plan, frame, elapsed).await;
         self.plan = Some(plan);
         let hologram = made?;
         self.last_ns = Some(frame.timestamp_ns);
@@ -267,30 +272,42 @@ impl Stages {
             .target_rate_hz
             .map(|rate| Duration::from_secs_f64(1.0 / rate));
         let change = self.level_control.observe(start.elapsed(), period, thermal, quality);
-        let change = change.map(|change| self.step(change));
+        let change = match change {
+            Some(change) => Some(self.step(change).await),
+            None => None,
+        };
         Ok(FrameResult { hologram, change })
     }
 
     /// Plans the chosen quality level; if that fails, stays at the previous one. The frame's hologram is made in both
     /// cases.
-    fn step(&mut self, change: QualityChange) -> QualityChange {
+    async fn step(&mut self, change: QualityChange) -> QualityChange {
         // Free the memory of the previous quality level first.
         self.plan = None;
-        if let (Ok(plan), _) = guarded(|| self.plan_level()) {
+        if let Ok(plan) = self.plan_caught().await {
             self.plan = Some(plan);
             return change;
         }
         let change = self.level_control.refuse(change);
         // If this fails too, the next frame tries it again and returns the reason.
-        self.plan = guarded(|| self.plan_level()).0.ok();
+        self.plan = self.plan_caught().await.ok();
         change
+    }
+
+    /// Plans the chosen quality level and converts a panic to an error, where panics can be caught.
+    async fn plan_caught(&mut self) -> Result<LevelPlan> {
+        if cfg!(target_family = "wasm") {
+            self.plan_level().await
+        } else {
+            guarded(|| block_on(self.plan_level())).0
+        }
     }
 
     /// Updates the state as [`Self::process`] does, for a `frame` whose hologram is known to have `scale`, without
     /// making the hologram.
-    pub(super) fn replay(&mut self, frame: &CameraFrame<'_>, past: bool, scale: f32) -> Result<()> {
+    pub(super) async fn replay(&mut self, frame: &CameraFrame<'_>, past: bool, scale: f32) -> Result<()> {
         let elapsed = self.elapsed(frame, past);
-        let mut plan = self.take_plan()?;
+        let mut plan = self.take_plan().await?;
         let Stages {
             pool,
             estimates,
@@ -315,7 +332,12 @@ impl Stages {
             .filter(|gap| *gap <= LONGEST_GAP)
     }
 
-    fn run(&mut self, plan: &mut LevelPlan, frame: &CameraFrame<'_>, elapsed: Option<Duration>) -> Result<Hologram> {
+    async fn run(
+        &mut self,
+        plan: &mut LevelPlan,
+        frame: &CameraFrame<'_>,
+        elapsed: Option<Duration>,
+    ) -> Result<Hologram> {
         let Stages {
             pool,
             brightness,
@@ -337,7 +359,7 @@ impl Stages {
         let mut words = (display.bits() > 8).then(|| words.take(values));
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
-        let (report, encoded) = pool.install(|| -> Result<_> {
+        let work = async || -> Result<_> {
             let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
             let report = plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
             given_up(cancel)?;
@@ -345,24 +367,22 @@ impl Stages {
             for (to, d) in depths.values.iter_mut().zip(depth) {
                 *to = (d * 65535.0 + 0.5) as u16;
             }
-            let encoded = plan.engine.process(
-                &mut LevelContext {
-                    options,
-                    quality_level,
-                    gpu,
-                    cancel,
-                },
-                &FrameInput {
-                    camera: Some(frame),
-                    rgbd: &plan.frame,
-                    elapsed,
-                },
-                brightness,
-                match &mut words {
-                    None => LevelsMut::Bytes(&mut levels.values),
-                    Some(words) => LevelsMut::Words(&mut words.values),
-                },
-            )?;
+            let mut context = LevelContext {
+                options,
+                quality_level,
+                gpu,
+                cancel,
+            };
+            let input = FrameInput {
+                camera: Some(frame),
+                rgbd: &plan.frame,
+                elapsed,
+            };
+            let made = match &mut words {
+                None => LevelsMut::Bytes(&mut levels.values),
+                Some(words) => LevelsMut::Words(&mut words.values),
+            };
+            let encoded = (plan.engine).process(&mut context, &input, brightness, made).await?;
             given_up(cancel)?;
             if let Some(words) = &words {
                 let below = display.bits() - 8;
@@ -371,7 +391,8 @@ impl Stages {
                 }
             }
             Ok((report, encoded))
-        })?;
+        };
+        let (report, encoded) = pool.run(work).await?;
         Ok(Hologram {
             timestamp_ns: frame.timestamp_ns,
             shape,
@@ -422,7 +443,7 @@ mod tests {
         let mut options = SessionOptions::new(display, Method::Sweep(sweep));
         let best = options.quality_levels[0].clone();
         options.quality_levels.push(best.clone());
-        let mut stages = Stages::new(options, None, Cancel::default()).unwrap();
+        let mut stages = block_on(Stages::new(options, None, Cancel::default())).unwrap();
         // The second quality level was valid at the start and becomes invalid.
         let worse = Sweep { planes: 0, ..sweep };
         stages.options.quality_levels[1] = QualityLevel {
@@ -436,7 +457,7 @@ mod tests {
         let depth = DepthImage::new(DepthFormat::NormalizedU8, 16, 12, plane).unwrap();
         let mut process = |time| {
             let frame = CameraFrame::new(time, colour, depth);
-            stages.process(&frame, false, Thermal::Nominal, Quality::Fixed(1))
+            block_on(stages.process(&frame, false, Thermal::Nominal, Quality::Fixed(1)))
         };
         let change = process(1).unwrap().change.unwrap();
         assert_eq!((change.from, change.to, change.reason), (0, 0, QualityReason::Refused));

@@ -5,6 +5,7 @@ use super::computing::Computing;
 use super::live::lock;
 use super::process_id::ProcessId;
 use phasefront_core::runtime::error::{Error, Result};
+pub(super) use pollster::block_on;
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
@@ -63,6 +64,15 @@ impl Threads {
         match &self.0 {
             Some(pool) => pool.install(work),
             None => work(),
+        }
+    }
+
+    /// Runs the future of `work` on these threads and blocks until it is done. On platforms without threads the caller
+    /// awaits it, because a browser's GPU answers only while nothing blocks.
+    pub(super) async fn run<R: Send>(&self, work: impl AsyncFnOnce() -> R + Send) -> R {
+        match &self.0 {
+            Some(pool) => pool.install(|| block_on(work())),
+            None => work().await,
         }
     }
 }

@@ -31,19 +31,41 @@ export function guard<T>(call: () => T): T {
   try {
     return call();
   } catch (error) {
-    if (!(error instanceof Error)) throw error;
-    const kind = (error as { kind?: string }).kind;
-    if (kind === "panic" || error instanceof WebAssembly.RuntimeError || error instanceof RangeError) {
-      const line = error.message.replaceAll("\n", " ");
-      state = new PhasefrontError(
-        "internal",
-        `internal error: ${line}; the module cannot go on: load the page or the worker anew, and please report it`,
-      );
-      throw state;
-    }
-    if (kind !== undefined) throw new PhasefrontError(kind as ErrorKind, error.message);
-    throw error;
+    throw ofModule(error);
   }
+}
+
+/** Does as {@link guard} does for a `call` whose result comes later. */
+export async function guardAsync<T>(call: () => Promise<T>): Promise<T> {
+  // A panic after a pause ends no promise; the browser reports it to the page or the worker.
+  let panicked: (event: ErrorEvent) => void = () => {};
+  const panic = new Promise<never>((_, reject) => {
+    panicked = ({ error }) => {
+      const said = ofModule(error);
+      if (said === state) reject(said);
+    };
+  });
+  addEventListener("error", panicked);
+  try {
+    return await Promise.race([guard(call).catch((error: unknown) => Promise.reject(ofModule(error))), panic]);
+  } finally {
+    removeEventListener("error", panicked);
+  }
+}
+
+/** Converts an error that the module threw. */
+function ofModule(error: unknown): unknown {
+  if (!(error instanceof Error) || error instanceof PhasefrontError) return error;
+  const kind = (error as { kind?: string }).kind;
+  if (kind === "panic" || error instanceof WebAssembly.RuntimeError || error instanceof RangeError) {
+    const line = error.message.replaceAll("\n", " ");
+    state = new PhasefrontError(
+      "internal",
+      `internal error: ${line}; the module cannot go on: load the page or the worker anew, and please report it`,
+    );
+    return state;
+  }
+  return kind === undefined ? error : new PhasefrontError(kind as ErrorKind, error.message);
 }
 
 /** Frees an object of the module. After a panic nothing can be freed. */

@@ -1,4 +1,4 @@
-import { PhasefrontError, guard, release, whole } from "./error.js";
+import { PhasefrontError, guard, guardAsync, release, whole } from "./error.js";
 import type { Frame } from "./frame.js";
 import { Hologram, type FrameTimes } from "./hologram.js";
 import type { Network } from "./network.js";
@@ -79,6 +79,16 @@ export interface SessionOptions {
   readonly leastConfidence?: number;
   /** The maximum number of pixels of a quality level and of the modulator. */
   readonly mostPixels?: number;
+  /**
+   * The processor that computes frames; `cpu` by default. With `webgpu`, make the session with {@link Session.open}. If
+   * the browser's GPU is missing, refused, too small, lost or wrong, the CPU computes; {@link Statistics} tells why.
+   */
+  readonly backend?: "cpu" | "webgpu";
+  /**
+   * A part of the name of the adapter that `webgpu` needs. Without it, adapters in software are refused, because they
+   * are slower than the CPU.
+   */
+  readonly adapter?: string;
 }
 
 /** The statistics of a session. Rates and times are means over the last 30 holograms. */
@@ -144,6 +154,7 @@ function rawOptions(options: SessionOptions): RawOptions {
       }
     }
     if (options.quality) raw.quality(qualityLevel(options.quality));
+    if (options.backend === "webgpu") raw.webgpu(options.adapter);
     return raw;
   });
 }
@@ -154,11 +165,21 @@ function rawOptions(options: SessionOptions): RawOptions {
  */
 export class Session {
   #raw: RawSession | undefined;
+  /** The frames that wait for the GPU, one after another; undefined if frames are computed at once. */
+  #waiting: Promise<unknown> | undefined;
 
   /**
-   * @throws PhasefrontError if the options are invalid or cannot be planned for.
+   * @throws PhasefrontError if the options are invalid or cannot be planned for, or need {@link Session.open}.
    */
-  constructor(options: SessionOptions = {}, mode: RunningMode = "image") {
+  constructor(options?: SessionOptions, mode?: RunningMode);
+  constructor(options: SessionOptions | RawSession = {}, mode: RunningMode = "image") {
+    if (options instanceof RawSession) {
+      this.#raw = options;
+      this.#waiting = Promise.resolve();
+      return;
+    }
+    if (options.backend === "webgpu")
+      throw new PhasefrontError("setting", "a session on WebGPU waits for its adapter; make it with Session.open");
     const raw = rawOptions(options);
     try {
       this.#raw = guard(() => new RawSession(raw, mode));
@@ -168,13 +189,49 @@ export class Session {
   }
 
   /**
-   * Returns the hologram of a frame.
+   * Makes a session as the constructor does, on any backend.
+   *
+   * @throws PhasefrontError if the options are invalid or cannot be planned for.
+   */
+  static async open(options: SessionOptions = {}, mode: RunningMode = "image"): Promise<Session> {
+    if (options.backend !== "webgpu") return new Session(options, mode);
+    const raw = rawOptions(options);
+    try {
+      const opened: unknown = await guardAsync(() => RawSession.open(raw, mode));
+      return new Session(opened as SessionOptions);
+    } finally {
+      release(raw);
+    }
+  }
+
+  /**
+   * Returns the hologram of a frame, on any backend. Calls of one session are computed one after another.
+   *
+   * @throws PhasefrontError in the cases of {@link process}.
+   */
+  processAsync(frame: Frame): Promise<Hologram> {
+    const compute = async () => {
+      const session = this.#open();
+      const raw = frame.toRaw();
+      try {
+        return Hologram.of(await guardAsync(() => session.processAsync(raw)));
+      } finally {
+        release(raw);
+      }
+    };
+    const made = (this.#waiting ?? Promise.resolve()).then(compute);
+    this.#waiting &&= made.catch(() => {});
+    return made;
+  }
+
+  /**
+   * Returns the hologram of a frame. A session on WebGPU has {@link processAsync} instead.
    *
    * @throws PhasefrontError `frame`: the frame is not usable. `timestamp`: the frame is late in a video session.
    * `session`: the session is closed. The frames that follow are not affected.
    */
   process(frame: Frame): Hologram {
-    const session = this.#open();
+    const session = this.#openNow();
     const raw = frame.toRaw();
     try {
       return Hologram.of(guard(() => session.process(raw)));
@@ -183,8 +240,12 @@ export class Session {
     }
   }
 
-  /** Runs an empty frame through the stages, so that the first real frame is as fast as the others. */
+  /**
+   * Runs an empty frame through the stages, so that the first real frame is as fast as the others. A session on WebGPU
+   * did that when it was made.
+   */
   warmUp(): void {
+    if (this.#waiting) return;
     const session = this.#open();
     guard(() => session.warmUp());
   }
@@ -215,8 +276,16 @@ export class Session {
 
   /** Stops taking frames and frees the memory. Holograms stay valid. Closing twice does nothing. */
   close(): void {
-    release(this.#raw);
+    const raw = this.#raw;
     this.#raw = undefined;
+    if (this.#waiting) void this.#waiting.then(() => release(raw));
+    else release(raw);
+  }
+
+  #openNow(): RawSession {
+    if (this.#waiting)
+      throw new PhasefrontError("setting", "a session on WebGPU does not answer at once; await processAsync");
+    return this.#open();
   }
 
   #open(): RawSession {

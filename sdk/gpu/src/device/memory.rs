@@ -90,32 +90,16 @@ impl Device {
         }
     }
 
-    /// Reads `buffer` back after the submitted work is done. For tests and for inspecting data between stages.
-    pub(crate) fn read(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
+    /// Reads `buffer` back after the submitted work is done. For inspecting data between stages.
+    pub(crate) async fn read_async(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
         let target = self.readable("read back", bytes);
         let mut encoder = self.inner.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(buffer, 0, &target, 0, target.size());
         let submission = self.queue.submit([encoder.finish()]);
         let mut all = vec![0; bytes];
-        self.map(&target, &submission)?;
+        self.map(&target, &submission).await?;
         copy_mapped(&target, &mut all)?;
         Ok(all)
-    }
-
-    /// Maps a readable buffer that `submission` writes.
-    pub(crate) fn map(&self, buffer: &wgpu::Buffer, submission: &wgpu::SubmissionIndex) -> Result<()> {
-        let (send, receive) = std::sync::mpsc::channel();
-        buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            // The receiver waits below or has given up.
-            let _ = send.send(mapped);
-        });
-        self.wait(submission)?;
-        // Another thread that polls the device may run the callback.
-        match receive.recv_timeout(self.patience) {
-            Ok(Ok(())) => Ok(()),
-            Ok(Err(why)) => Err(GpuError::Lost(one_line(why))),
-            Err(why) => Err(GpuError::Lost(one_line(why))),
-        }
     }
 }
 

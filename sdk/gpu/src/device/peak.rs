@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::device::{Device, Dispatch};
 use crate::numbers::Numbers;
-use std::time::Instant;
+use phasefront_core::runtime::clock::Instant;
 
 /// The number of bytes to copy.
 const COPIED: usize = 1 << 26;

@@ -8,8 +8,9 @@ use crate::numbers::{Float, GROUP, Numbers};
 use crate::{GpuError, Result};
 use phasefront_core::method::network::chain::{Chain, Layer, Weights};
 use phasefront_core::method::network::{Head, InputKind, Network};
+use phasefront_core::runtime::clock::Instant;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The number of filters that a thread computes at a time.
 const BLOCK: usize = 8;
@@ -24,7 +25,7 @@ const LARGEST_SUM: i64 = 1 << 24;
 /// The number of layers per dispatch. The result is bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fusion {
-    /// The faster of the two, measured when the plan is made. One layer on software drivers.
+    /// The faster of the two, measured when the plan is made. One layer on software drivers and in browsers.
     #[default]
     Measured,
     /// One layer.
@@ -154,7 +155,7 @@ impl ChainPlan {
         let pairs = packed.len() > 3 && fits;
         (plan.steps, plan.fusion) = match fusion {
             Fusion::Pairs if pairs => (make(Fusion::Pairs)?, Fusion::Pairs),
-            Fusion::Measured if pairs && !device.is_software() => {
+            Fusion::Measured if pairs && device.measures() => {
                 let (layers, fused) = (make(Fusion::Layers)?, make(Fusion::Pairs)?);
                 if time(device, &fused)? < time(device, &layers)? {
                     (fused, Fusion::Pairs)
@@ -545,7 +546,7 @@ impl GpuNetworkPlan {
     /// # Errors
     /// Returns [`GpuError::Refused`] if `device` does not support the number format or the size, or
     /// [`GpuError::OutOfMemory`].
-    pub fn new(
+    pub async fn new_async(
         device: &Arc<Device>,
         network: &Network,
         height: usize,
@@ -554,7 +555,7 @@ impl GpuNetworkPlan {
     ) -> Result<Self> {
         let size = (height, width);
         phasefront_core::method::network::check_size(height, width, phasefront_core::method::network::MAX_PIXELS)?;
-        device.guarded(|| {
+        let build = || {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
             let packer = Packer::new(device, Form::Chain(chain, numbers, 1.0), size, Source::Planes, None)?;
@@ -568,7 +569,8 @@ impl GpuNetworkPlan {
                 packer,
                 chain: plan,
             })
-        })
+        };
+        device.guarded_async(build).await
     }
 
     /// Describes the number format, the device and the number of dispatches.
@@ -586,7 +588,7 @@ impl GpuNetworkPlan {
     ///
     /// # Errors
     /// Returns an error if a length is wrong, or [`GpuError::Lost`].
-    pub fn run(&self, input: &[f32], output: &mut [f32]) -> Result<()> {
+    pub async fn run_async(&self, input: &[f32], output: &mut [f32]) -> Result<()> {
         let area = self.size.0 * self.size.1;
         if input.len() != self.inputs * area || output.len() != 6 * area {
             return Err(phasefront_core::runtime::error::Error::Frame(format!(
@@ -600,7 +602,7 @@ impl GpuNetworkPlan {
             .into());
         }
         let device = &self.device;
-        device.guarded(|| {
+        let work = || {
             device
                 .queue
                 .write_buffer(&self.packer.planes, 0, bytemuck::cast_slice(input));
@@ -611,8 +613,9 @@ impl GpuNetworkPlan {
             drop(pass);
             device.queue.submit([encoder.finish()]);
             Ok(())
-        })?;
-        let bytes = device.read(&self.chain.planes, 4 * output.len())?;
+        };
+        device.guarded_async(work).await?;
+        let bytes = device.read_async(&self.chain.planes, 4 * output.len()).await?;
         output.copy_from_slice(bytemuck::cast_slice(&bytes));
         Ok(())
     }

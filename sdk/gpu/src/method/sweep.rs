@@ -44,7 +44,7 @@ impl Sweeper {
     /// Plans the sweep of `plan`, made for `display`, on a frame's `surfaces`: (H, W) of red, green, blue and depth,
     /// f32.
     pub(crate) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
-        Self::planned(device, plan, display, surfaces, !device.is_software())
+        Self::planned(device, plan, display, surfaces, device.measures())
     }
 
     /// Plans the sweep with the number of planes per dispatch that is measured to be faster, or the most that fit.

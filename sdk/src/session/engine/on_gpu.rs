@@ -46,7 +46,7 @@ pub(in crate::session) struct OnGpu(Renderer);
 
 impl OnGpu {
     /// Plans `quality_level` on `device`; without one, opens a device and tests it.
-    pub(in crate::session) fn new(
+    pub(in crate::session) async fn new(
         options: &SessionOptions,
         quality_level: &QualityLevel,
         device: Option<Arc<Device>>,
@@ -63,7 +63,8 @@ impl OnGpu {
             chain: options.gpu.chain,
             ..Job::new(shape, quality_level.method.clone(), options.target.clone())
         };
-        Renderer::new(device, options.gpu.device.clone(), job).map(OnGpu)
+        let renderer = Renderer::new(device, options.gpu.device.clone(), job).await?;
+        Ok(OnGpu(renderer))
     }
 
     pub(in crate::session) fn device(&self) -> Option<&Arc<Device>> {
@@ -98,18 +99,18 @@ impl OnGpu {
     }
 
     /// Computes the levels of a frame. If the frame comes from a camera, reads the camera's colour directly.
-    pub(in crate::session) fn process(
+    pub(in crate::session) async fn process(
         &mut self,
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
     ) -> Result<FrameReport, Failure> {
         let stage = stage!("gpu");
-        let frame = self.submit(input, brightness)?;
-        self.collect(frame, stage, brightness, levels)
+        let frame = self.submit(input, brightness).await?;
+        self.collect(frame, stage, brightness, levels).await
     }
 
-    fn submit(&mut self, input: &FrameInput<'_>, brightness: &BrightnessTracker) -> Result<InFlight, Failure> {
+    async fn submit(&mut self, input: &FrameInput<'_>, brightness: &BrightnessTracker) -> Result<InFlight, Failure> {
         let planar = Frame::of(input.rgbd);
         let (colour, frame) = match input.camera {
             None => (Colour::Planar, planar),
@@ -128,19 +129,19 @@ impl OnGpu {
                 (colour, frame)
             }
         };
-        self.0.expect(colour, Depth::F32)?;
+        self.0.expect(colour, Depth::F32).await?;
         let past = brightness.past(input.elapsed);
-        Ok(self.0.submit(past, &frame)?)
+        Ok(self.0.submit(past, &frame).await?)
     }
 
-    fn collect(
+    async fn collect(
         &mut self,
         frame: InFlight,
         stage: Stage,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
     ) -> Result<FrameReport, Failure> {
-        let report = self.0.collect(frame, levels).map_err(|why| match why {
+        let report = self.0.collect(frame, levels).await.map_err(|why| match why {
             GpuError::Core(why) => Failure::Frame(why),
             why => Failure::Frame(Error::Lost(format!("{why}, and this frame with it"))),
         })?;
@@ -168,6 +169,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::driver::opened;
     use super::*;
+    use crate::session::threads::block_on;
     use ndarray::{Array2, Array3};
     use phasefront_core::display::Display;
     use phasefront_core::frame::RgbdFrame;
@@ -183,7 +185,7 @@ mod tests {
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
         let mut options = SessionOptions::new(display, method);
         options.gpu.device.name = Some("llvmpipe".into());
-        let mut gpu = opened(OnGpu::new(&options, &options.quality_levels[0], None));
+        let mut gpu = opened(block_on(OnGpu::new(&options, &options.quality_levels[0], None)));
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
         let frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
         let mut brightness = BrightnessTracker::default();
@@ -193,21 +195,21 @@ mod tests {
             rgbd: &frame,
             elapsed: None,
         };
-        let made = gpu.process(&input, &mut brightness, &mut first);
+        let made = block_on(gpu.process(&input, &mut brightness, &mut first));
         let scale = made.unwrap().scale;
         input.elapsed = Some(Duration::from_millis(33));
-        let flying = gpu.submit(&input, &brightness).unwrap();
+        let flying = block_on(gpu.submit(&input, &brightness)).unwrap();
         let before = gpu.openings();
         gpu.device().unwrap().wgpu().0.destroy();
         let mut levels = vec![0; first.len()];
-        let lost = gpu.collect(flying, stage!("gpu"), &mut brightness, &mut levels);
+        let lost = block_on(gpu.collect(flying, stage!("gpu"), &mut brightness, &mut levels));
         assert!(
             matches!(&lost, Err(Failure::Frame(Error::Lost(why))) if !why.contains('\n')),
             "{:?}",
             lost.err()
         );
         assert_eq!(gpu.report().name, "no GPU at this moment");
-        let made = gpu.process(&input, &mut brightness, &mut levels);
+        let made = block_on(gpu.process(&input, &mut brightness, &mut levels));
         // The scene is the same, so its scale and levels are too.
         assert!((made.unwrap().scale - scale).abs() < 1e-6);
         assert_eq!(levels, first);
