@@ -29,6 +29,7 @@ mod surfaces;
 use crate::depth::{no_reading, sharpness};
 use crate::frame::Crop;
 use crate::runtime::error::{Error, Result};
+use crate::runtime::stage::stage;
 use axis::AxisMap;
 use colour::Moments;
 use edges::Kind;
@@ -142,12 +143,15 @@ impl Conditioner {
         self.fill(depth, rgb, growth, scratch);
         let clean =
             self.depth == self.out && sharpness::measure_planes(rgb, &scratch.readings, self.depth.1).is_clean();
-        match clean {
-            true => scratch.kinds.fill(Kind::Inside),
-            false => self.find_surfaces(rgb, scratch),
+        if clean {
+            scratch.kinds.fill(Kind::Inside);
+        } else {
+            self.find_surfaces(rgb, scratch);
         }
+        let _stage = stage!("surfaces");
         let readings = surfaces::Readings {
             depth: &scratch.readings,
+            width: self.depth.1,
             kinds: &scratch.kinds,
             colours: &scratch.colours,
         };
@@ -164,6 +168,7 @@ impl Conditioner {
     /// Finds the shift between depth and colour, places the display's pixels among the readings, and returns the number
     /// of readings by which near surfaces are too wide.
     fn place(&self, depth: &[f32], rgb: &[f32], scratch: &mut ConditionScratch) -> usize {
+        let _stage = stage!("register");
         let registration = scratch.registration.as_mut();
         let Misfit { shift: (y, x), growth } = registration.map_or(Misfit::default(), |r| r.misfit(depth, rgb));
         scratch.x.place(self.crop.x + x, self.crop.width);
@@ -174,7 +179,10 @@ impl Conditioner {
     /// Narrows near surfaces by `growth` readings and fills holes.
     fn fill(&self, depth: &[f32], rgb: &[f32], growth: usize, scratch: &mut ConditionScratch) {
         let width = self.depth.1;
+        let stage = stage!("narrow");
         narrow::narrow(depth, width, growth, &mut scratch.readings);
+        stage.end();
+        let _stage = stage!("fill");
         if scratch.readings.iter().all(|reading| reading.is_nan()) {
             scratch.readings.copy_from_slice(depth);
         }
@@ -191,7 +199,10 @@ impl Conditioner {
     /// Smooths the readings, finds their kinds and the colours around edges, and replaces contradicted readings.
     fn find_surfaces(&self, rgb: &[f32], scratch: &mut ConditionScratch) {
         let (axes, width) = ((&scratch.x, &scratch.y), self.depth.1);
+        let stage = stage!("smooth");
         smooth::smooth(&mut scratch.readings, width, &mut scratch.smooth);
+        stage.end();
+        let _stage = stage!("edges");
         edges::find(&scratch.readings, width, &mut scratch.bent, &mut scratch.kinds);
         if contradict::applies(self.crop, self.out) {
             let kinds = &scratch.kinds;

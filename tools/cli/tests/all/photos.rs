@@ -314,7 +314,7 @@ fn any_photo_becomes_a_hologram_by_a_network() {
     let folder = Folder::new();
     colour().save(folder.path("rgb.png")).unwrap();
     fs::write(folder.path("photo.jpg"), short_gdepth()).unwrap();
-    fs::write(folder.path("depth.onnx"), network(Some((32, 48)), false)).unwrap();
+    fs::write(folder.path("depth.onnx"), network(Some((16, 24)), false)).unwrap();
     let by = |from: &[&str], more: &[&str]| {
         let common = ["--depth-network", "depth.onnx", "--method", "sweep", "-o", "h.png"];
         folder.succeeds(&[&["hologram"], from, &common[..], more].concat());

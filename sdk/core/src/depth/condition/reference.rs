@@ -196,7 +196,11 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
             (is_edge, _) => usize::from(is_edge && filled[at]),
         });
         let depths = around.map(|at| readings[at]);
-        let surfaces = surfaces_of(depths, rounds, &|k| colours(around[k].0, around[k].1));
+        let end = |k: usize, behind: bool| {
+            let end = end_of_ramp(&readings, &kinds, around[k], behind).filter(|_| rounds[4] == 2)?;
+            Some((readings[end], colours(end.0, end.1)))
+        };
+        let surfaces = surfaces_of(depths, rounds, &|k| colours(around[k].0, around[k].1), &end);
         let colour = [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)]));
         let likelihood = |surface: &Surface| {
             let square: f64 = (0..3).map(|c| (colour[c] - surface.mean[c]).powi(2)).sum();
@@ -408,6 +412,31 @@ fn kinds_of(depth: &Array2<f32>) -> Array2<(bool, bool)> {
     })
 }
 
+/// Returns the end behind or before a reading of a ramp of two mixed readings, in which it is one of the two.
+fn end_of_ramp(
+    depth: &Array2<f32>,
+    kinds: &Array2<(bool, bool)>,
+    (y, x): (usize, usize),
+    behind: bool,
+) -> Option<(usize, usize)> {
+    surfaces::ramps().find_map(|ramp| {
+        let places: Vec<_> = (ramp.into_iter())
+            .filter_map(|(dy, dx)| y.checked_add_signed(dy).zip(x.checked_add_signed(dx)))
+            .filter(|at| depth.get(*at).is_some())
+            .collect();
+        let (Some(&end), 4) = (places.last(), places.len()) else {
+            return None;
+        };
+        let sign = if behind { 1.0 } else { -1.0 };
+        let rises = places
+            .windows(2)
+            .all(|pair| sign * (depth[pair[1]] - depth[pair[0]]) > 0.0);
+        let mixed: Vec<bool> = places.iter().map(|at| kinds[*at].1).collect();
+        let is_far = (depth[end] - depth[(y, x)]).abs() > surfaces::TOLERANCE;
+        (rises && mixed == [false, true, true, false] && is_far).then_some(end)
+    })
+}
+
 /// A surface at an edge, as in [`super::surfaces`].
 struct Surface {
     depth: f32,
@@ -421,6 +450,19 @@ struct Surface {
 }
 
 impl Surface {
+    fn of(depth: f32, covers: [f32; 9], colours: Vec<[f64; 3]>) -> Self {
+        Surface {
+            depth,
+            count: 1.0,
+            covers,
+            colours,
+            mean: [0.0; 3],
+            variance: 0.0,
+            differences: [0.0; 9],
+            has: [0.0; 9],
+        }
+    }
+
     fn depth_at(&self, place: &surfaces::Place) -> f32 {
         let known = place.of(&self.has);
         match known > 0.05 {
@@ -431,8 +473,13 @@ impl Surface {
 }
 
 /// Groups 3×3 readings with their colours: in round 0 those that are neither filled nor mixed, in round 1 the filled
-/// ones, in round 2 the mixed ones.
-fn surfaces_of(readings: [f32; 9], rounds: [usize; 9], colours: &dyn Fn(usize) -> Vec<[f64; 3]>) -> Vec<Surface> {
+/// ones, in round 2 the mixed ones. `end` is the end behind or before a reading of a ramp, with its colours.
+fn surfaces_of(
+    readings: [f32; 9],
+    rounds: [usize; 9],
+    colours: &dyn Fn(usize) -> Vec<[f64; 3]>,
+    end: &dyn Fn(usize, bool) -> Option<(f32, Vec<[f64; 3]>)>,
+) -> Vec<Surface> {
     let mut found: Vec<Surface> = Vec::new();
     for round in 0..3 {
         let mixed = round == 2;
@@ -444,7 +491,18 @@ fn surfaces_of(readings: [f32; 9], rounds: [usize; 9], colours: &dyn Fn(usize) -
             found.sort_by(|a, b| a.depth.total_cmp(&b.depth));
             let apart = |surface: &Surface| (surface.depth - depth).abs();
             let nearest = (0..found.len()).min_by(|a, b| apart(&found[*a]).total_cmp(&apart(&found[*b])));
-            let behind = found.partition_point(|surface| surface.depth < depth);
+            let mut behind = found.partition_point(|surface| surface.depth < depth);
+            let is_last = behind == found.len();
+            if mixed
+                && (is_last || behind == 0)
+                && (1..surfaces::MOST).contains(&found.len())
+                && nearest.is_some_and(|i| apart(&found[i]) > surfaces::TOLERANCE)
+                && let Some((depth, colours)) = end(at, is_last)
+            {
+                let place = if is_last { found.len() } else { 0 };
+                found.insert(place, Surface::of(depth, [0.0; 9], colours));
+                behind = if is_last { behind } else { 1 };
+            }
             if let Some(nearest) = nearest.filter(|i| apart(&found[*i]) <= surfaces::TOLERANCE) {
                 let surface = &mut found[nearest];
                 surface.depth += (depth - surface.depth) / (surface.count + 1.0);
@@ -459,16 +517,11 @@ fn surfaces_of(readings: [f32; 9], rounds: [usize; 9], colours: &dyn Fn(usize) -
                 found[behind - 1].covers[at] += 1.0 - share;
                 found[behind].covers[at] += share;
             } else if found.len() < surfaces::MOST {
-                found.push(Surface {
+                found.push(Surface::of(
                     depth,
-                    count: 1.0,
-                    covers: std::array::from_fn(|k| f32::from(k == at)),
-                    colours: colours(at),
-                    mean: [0.0; 3],
-                    variance: 0.0,
-                    differences: [0.0; 9],
-                    has: [0.0; 9],
-                });
+                    std::array::from_fn(|k| f32::from(k == at)),
+                    colours(at),
+                ));
             }
         }
     }

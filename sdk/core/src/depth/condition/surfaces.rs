@@ -1,8 +1,9 @@
 //! The surfaces at an edge: groups of the 3×3 readings around a reading, with their colours.
 //!
 //! Readings that are not mixed form the surfaces. A mixed reading between two surfaces covers a share of each, by its
-//! depth; one beyond all surfaces is the only reading of a surface of its own, such as a thin bar. A filled reading
-//! covers a share of every surface, since nothing is known of its place but its colour.
+//! depth; one beyond all surfaces is the only reading of a surface of its own, such as a thin bar. Where an edge is a
+//! ramp of two mixed readings, as resampling makes it, the surface behind the other one is borrowed from farther away.
+//! A filled reading covers a share of every surface, since nothing is known of its place but its colour.
 
 use super::colour::Moments;
 use super::edges::Kind;
@@ -44,6 +45,16 @@ impl Surface {
         surface
     }
 
+    /// Returns a surface that covers none of the 3×3 readings so far.
+    fn borrowed(depth: f32, colours: &Moments) -> Self {
+        Surface {
+            depth,
+            count: 1.0,
+            moments: *colours,
+            ..Surface::default()
+        }
+    }
+
     fn join(&mut self, at: usize, depth: f32) {
         self.depth += (depth - self.depth) / (self.count + 1.0);
         self.count += 1.0;
@@ -82,6 +93,7 @@ impl Surface {
 /// The readings at an edge.
 pub(super) struct Readings<'a> {
     pub(super) depth: &'a [f32],
+    pub(super) width: usize,
     pub(super) kinds: &'a [Kind],
     pub(super) colours: &'a [Moments],
 }
@@ -112,7 +124,7 @@ impl Readings<'_> {
                     if !mixed {
                         nearest.moments.add(&self.colours[i]);
                     }
-                } else if mixed && split(&mut surfaces[..count], at, depth) {
+                } else if mixed && self.share(around[4], (i, at), surfaces, &mut count) {
                 } else if count < MOST {
                     surfaces[count] = Surface::new(at, depth, &self.colours[i]);
                     count += 1;
@@ -135,6 +147,52 @@ impl Readings<'_> {
         }
         count
     }
+}
+
+impl Readings<'_> {
+    /// Shares the mixed reading `i`, `at` among the 3×3 around `middle`, between the surfaces before and behind it. If
+    /// the middle is mixed, one of them may be borrowed. Returns whether both exist.
+    fn share(&self, middle: usize, (i, at): (usize, usize), surfaces: &mut [Surface; MOST], count: &mut usize) -> bool {
+        let depth = self.depth[i];
+        if split(&mut surfaces[..*count], at, depth) {
+            return true;
+        }
+        if self.kinds[middle] != Kind::Mixed || *count == 0 || *count == MOST {
+            return false;
+        }
+        let Some(end) = self.end_of_ramp(i, surfaces[0].depth < depth) else {
+            return false;
+        };
+        surfaces[*count] = Surface::borrowed(self.depth[end], &self.colours[end]);
+        *count += 1;
+        split(&mut surfaces[..*count], at, depth)
+    }
+
+    /// Returns the end behind (if `behind`) or before the mixed reading `i` of a ramp of two mixed readings along a row
+    /// or a column.
+    fn end_of_ramp(&self, i: usize, behind: bool) -> Option<usize> {
+        let (x, y) = (i % self.width, i / self.width);
+        let height = self.depth.len() / self.width;
+        let is_mixed = |at: usize| self.kinds[at] == Kind::Mixed;
+        ramps().find_map(|ramp| {
+            let at = |(dy, dx): (isize, isize)| {
+                let (x, y) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
+                (x < self.width && y < height).then(|| y * self.width + x)
+            };
+            let [start, first, second, end] = [at(ramp[0])?, at(ramp[1])?, at(ramp[2])?, at(ramp[3])?];
+            let depths = [start, first, second, end].map(|at| self.depth[at]);
+            let rises = depths.is_sorted_by(|a, b| if behind { a < b } else { a > b });
+            let is_ramp = rises && is_mixed(first) && is_mixed(second) && !is_mixed(start) && !is_mixed(end);
+            (is_ramp && (self.depth[end] - self.depth[i]).abs() > TOLERANCE).then_some(end)
+        })
+    }
+}
+
+/// Returns the steps along y and x from a reading to the four readings of each ramp in which it is the second or the
+/// third.
+pub(super) fn ramps() -> impl Iterator<Item = [(isize, isize); 4]> {
+    let directions = [(0, -1), (0, 1), (-1, 0), (1, 0)].into_iter();
+    directions.flat_map(|(dy, dx)| [-1, -2].map(|start| [0, 1, 2, 3].map(|k| ((start + k) * dy, (start + k) * dx))))
 }
 
 /// Shares the mixed reading `at` between the surfaces before and behind its `depth`. Returns whether both exist.

@@ -290,6 +290,27 @@ fn slopes_stay_slopes() {
     assert!((16..144).all(|y| change(y) >= 0.0) && most < 0.0025, "{most}");
 }
 
+/// A resampler leaves two mixed readings at an edge.
+#[test]
+fn a_ramp_of_two_mixed_readings_becomes_an_edge() {
+    for turned in [false, true] {
+        let place = |y: usize, x: usize| if turned { y } else { x };
+        let depth = Array2::from_shape_fn((30, 30), |(y, x)| match place(y, x) {
+            ..14 => 0.2,
+            14 => 0.35,
+            15 => 0.65,
+            _ => 0.8,
+        });
+        let is_front = |y: usize, x: usize| place(y, x) < 60;
+        let rgb = Array3::from_shape_fn((3, 120, 120), |(_, y, x)| if is_front(y, x) { 0.9 } else { 0.2 });
+        let case = Case::whole(depth, rgb);
+        for (i, d) in case.condition(false).unwrap().iter().enumerate() {
+            let expected = if is_front(i / 120, i % 120) { 0.2 } else { 0.8 };
+            assert!((d - expected).abs() < 0.03, "{turned} {} {} {d}", i / 120, i % 120);
+        }
+    }
+}
+
 #[test]
 fn a_thin_bar_stays() {
     let (h, w) = (30, 40);
@@ -312,6 +333,16 @@ fn unusual_frames_give_depth() {
     let wide = Array2::from_shape_fn((24, 40), |(_, x)| if x < 20 { 0.2 } else { 0.7 });
     let conditioned = Case::whole(wide, texture.clone()).condition(true).unwrap();
     assert!((conditioned[5 * 20 + 2] - 0.2).abs() < 1e-5 && (conditioned[5 * 20 + 17] - 0.7).abs() < 1e-5);
+    // Of twice the width in proportion to its height: the display sees the middle half.
+    let long = Array2::from_shape_fn((12, 40), |(_, x)| [0.1, 0.3, 0.6, 0.9][x / 10]);
+    let crop = Crop::cover((12, 40), (12, 20));
+    let middle = Case {
+        depth: long,
+        rgb: texture.clone(),
+        crop,
+    };
+    let conditioned = middle.condition(true).unwrap();
+    assert!((conditioned[5 * 20 + 2] - 0.3).abs() < 1e-5 && (conditioned[5 * 20 + 17] - 0.6).abs() < 1e-5);
     // A single reading.
     let mut one = Array2::from_elem((6, 10), f32::NAN);
     one[(2, 3)] = 0.6;
