@@ -85,8 +85,8 @@ pub enum Method {
     },
     /// The plane sweep, which suits any display. It is slower and needs no training.
     Sweep,
-    /// The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
-    /// noisy or incomplete depth, such as depth from sensors.
+    /// The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
+    /// estimated, and the plane sweep for all others.
     Auto {
         /// The network, which must suit the session's display.
         network: Arc<Network>,

@@ -157,7 +157,7 @@ typedef enum PfMethod {
   PF_METHOD_TRAINED = 1,
   // The plane sweep, which suits any display. It is slower and needs no training.
   PF_METHOD_SWEEP = 2,
-  // The plane sweep for frames with clean depth, and the network for frames with noisy or incomplete depth.
+  // The network for frames whose depth has soft edges, and the plane sweep for all others.
   PF_METHOD_AUTO = 3,
 } PfMethod;
 

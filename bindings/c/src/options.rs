@@ -18,7 +18,7 @@ pub enum PfMethod {
     Trained = 1,
     /// The plane sweep, which suits any display. It is slower and needs no training.
     Sweep = 2,
-    /// The plane sweep for frames with clean depth, and the network for frames with noisy or incomplete depth.
+    /// The network for frames whose depth has soft edges, and the plane sweep for all others.
     Auto = 3,
 }
 

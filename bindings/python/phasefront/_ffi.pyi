@@ -191,7 +191,7 @@ class Method:
     One of:
         trained: A trained network.
         sweep: The plane sweep, which suits any display. It is slower and needs no training.
-        auto: The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with noisy or incomplete depth, such as depth from sensors.
+        auto: The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network estimated, and the plane sweep for all others.
     """
     class trained(Method):
         """A trained network.
@@ -205,8 +205,8 @@ class Method:
         """The plane sweep, which suits any display. It is slower and needs no training."""
         def __init__(self) -> None: ...
     class auto(Method):
-        """The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
-        noisy or incomplete depth, such as depth from sensors.
+        """The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
+        estimated, and the plane sweep for all others.
 
         Fields:
             network: The network, which must suit the session's display.

@@ -12,7 +12,7 @@ namespace Phasefront
         Trained = 1,
         /// <summary>The plane sweep, which is slower and works for any display without training.</summary>
         Sweep = 2,
-        /// <summary>The plane sweep for frames with clean depth and the network for frames with noisy depth.</summary>
+        /// <summary>The network for frames whose depth has soft edges, and the plane sweep for all others.</summary>
         Auto = 3,
     }
 

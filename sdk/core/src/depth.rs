@@ -10,6 +10,7 @@ pub mod image;
 pub mod range;
 pub mod sharpness;
 pub mod smoothing;
+pub mod softness;
 pub mod stream;
 
 use crate::runtime::error::{Error, Result};

@@ -4,7 +4,7 @@ pub mod network;
 pub mod seeded;
 pub mod sweep;
 
-use crate::depth::sharpness;
+use crate::depth::softness;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
@@ -25,8 +25,8 @@ pub enum Method {
     Sweep(Sweep),
     /// The plane sweep, corrected by a network that was trained on it.
     Seeded(Arc<Network>),
-    /// Chooses the method for each frame by its depth ([`sharpness::measure`]): the plane sweep for clean depth, the
-    /// trained network for noisy or incomplete depth.
+    /// Chooses the method for each frame by its depth ([`softness`]): the trained network where most edges are soft, the
+    /// plane sweep otherwise.
     Auto(Sweep, Arc<Network>),
 }
 
@@ -92,8 +92,8 @@ enum Scratch {
     Auto {
         sweep: SweepScratch,
         trained: Box<MethodScratch>,
-        /// Whether the depth of the previous frame was clean.
-        was_clean: Option<bool>,
+        /// Whether the depth of the previous frame was soft.
+        was_soft: Option<bool>,
     },
 }
 
@@ -174,7 +174,7 @@ impl MethodPlan {
             Plan::Auto(sweep, trained) => Scratch::Auto {
                 sweep: sweep.scratch(),
                 trained: Box::new(trained.scratch()),
-                was_clean: None,
+                was_soft: None,
             },
         })
     }
@@ -209,19 +209,15 @@ impl MethodPlan {
                 Scratch::Auto {
                     sweep: of_sweep,
                     trained: of_trained,
-                    was_clean,
+                    was_soft,
                 },
             ) => {
-                let measured = sharpness::measure(frame);
-                let is_clean = match was_clean.filter(|_| follows) {
-                    Some(was) => measured.stays_clean(was),
-                    None => measured.is_clean(),
-                };
-                *was_clean = Some(is_clean);
-                if is_clean {
-                    sweep.field(frame, field, of_sweep)
-                } else {
+                let is_soft = softness::is_soft(softness::sharp_edges(frame), was_soft.filter(|_| follows));
+                *was_soft = Some(is_soft);
+                if is_soft {
                     trained.field(frame, field, of_trained)
+                } else {
+                    sweep.field(frame, field, of_sweep)
                 }
             }
             _ => panic!("the scratch is another plan's"),

@@ -17,7 +17,7 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::RgbdFrame;
 use phasefront_command::flags::sweep_for;
-use phasefront_core::depth::sharpness;
+use phasefront_core::depth::softness;
 use phasefront_core::method::network::Engine;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
@@ -45,7 +45,7 @@ impl HologramRequest {
                     CoreMethod::Auto => self.automatic(frame, &display.target.display)?,
                     method => method,
                 };
-                // If depth is clean, auto does not use its network.
+                // If edges are sharp, auto does not use its network.
                 let trained = method == chosen || chosen == CoreMethod::Network;
                 let method = chosen;
                 let (core, encoder) = method.of(&Parts {
@@ -69,10 +69,11 @@ impl HologramRequest {
         }
     }
 
-    /// Chooses the method for the frame: the sweep if depth is clean or no network suits the display, else the network.
+    /// Chooses the method for the frame: the network if the edges of its depth are soft and one suits the display, else the
+    /// sweep.
     fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || default_network(display).is_some();
-        Ok(if trained && !sharpness::measure(frame).is_clean() {
+        Ok(if trained && softness::is_soft(softness::sharp_edges(frame), None) {
             CoreMethod::Network
         } else {
             CoreMethod::Sweep

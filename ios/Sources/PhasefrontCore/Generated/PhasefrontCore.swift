@@ -6521,8 +6521,8 @@ public enum HologramMethod {
      */
     case sweep
     /**
-     * The plane sweep for frames with clean depth, such as rendered depth, and the trained network for frames with
-     * noisy or incomplete depth, such as depth from sensors.
+     * The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
+     * estimated, and the plane sweep for all others.
      */
     case auto(
         /**

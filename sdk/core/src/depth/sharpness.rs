@@ -1,5 +1,5 @@
-//! Measures whether a frame's depth is clean. The plane sweep, which relies on every depth, makes better holograms from
-//! clean depth; a network makes better ones from noisy or incomplete depth.
+//! Measures whether a frame's depth is clean: conditioning leaves clean depth alone, and its wave is a truth to compare
+//! holograms with.
 //!
 //! Rendered depth changes between surfaces within one pixel, at the same place as the colour, and is smooth on
 //! surfaces. Enlarged depth ramps over several pixels, the depth of a camera beside the colour camera changes at other
@@ -20,8 +20,6 @@ const ONE_STEP: f32 = 0.75;
 pub const SHARP_EDGES: f32 = 0.6;
 /// The largest noise of clean depth, as a share of the volume.
 pub const SMOOTH: f32 = 1.5e-3;
-/// The relative margin by which a video frame must cross a bound to be classified differently from the previous frame.
-pub const HYSTERESIS: f32 = 0.15;
 
 /// The result of [`measure`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,21 +33,9 @@ pub struct Sharpness {
 }
 
 impl Sharpness {
-    /// Returns whether the depth is clean, so that the plane sweep makes the better hologram: edges of at least
-    /// [`SHARP_EDGES`], and noise of at most [`SMOOTH`].
+    /// Returns whether the depth is clean: edges of at least [`SHARP_EDGES`], and noise of at most [`SMOOTH`].
     pub fn is_clean(&self) -> bool {
         self.edges >= SHARP_EDGES && self.noise <= SMOOTH
-    }
-
-    /// Returns whether the depth is clean, like [`Self::is_clean`], given whether the previous frame `was` clean.
-    /// Values within [`HYSTERESIS`] of the bounds keep the previous result, so that a video does not alternate between
-    /// two methods.
-    pub fn stays_clean(&self, was: bool) -> bool {
-        let slack = match was {
-            true => 1.0 + HYSTERESIS,
-            false => 1.0 / (1.0 + HYSTERESIS),
-        };
-        self.edges * slack >= SHARP_EDGES && self.noise <= SMOOTH * slack
     }
 }
 
@@ -205,18 +191,6 @@ mod tests {
             let flat = measure(&RgbdFrame::new(rgb, depth).unwrap());
             assert_eq!((flat.edges, flat.noise), (1.0, 0.0));
             assert!(flat.is_clean());
-        }
-    }
-
-    #[test]
-    fn what_lies_near_the_bounds_stays_what_it_was() {
-        let of = |edges, noise| Sharpness { edges, noise };
-        let near = of(SHARP_EDGES * 1.05, SMOOTH * 1.1);
-        assert!(near.stays_clean(true) && !near.stays_clean(false));
-        for was in [true, false] {
-            assert!(of(SHARP_EDGES * 1.2, SMOOTH * 0.8).stays_clean(was));
-            assert!(!of(SHARP_EDGES * 0.8, SMOOTH * 0.8).stays_clean(was));
-            assert!(!of(1.0, SMOOTH * 1.2).stays_clean(was));
         }
     }
 }

@@ -307,9 +307,9 @@ fn auto_gives_each_frame_what_suits_its_depth() {
     let either = plan(Method::Auto(default, network.clone()));
     assert!(either.z_m() == 0.0 && either.engine().is_some());
     let midpoint = SweepPlan::new(height, width, &display, default, 0.0).unwrap();
-    let (clean, noisy) = (frame(1), frame(5));
-    assert!(made(&either, &clean) == run(&midpoint, &clean));
-    assert!(made(&either, &noisy) == made(&plan(Method::trained(network)), &noisy));
+    let (sharp, soft) = (frame(1), frame(5));
+    assert!(made(&either, &sharp) == run(&midpoint, &sharp));
+    assert!(made(&either, &soft) == made(&plan(Method::trained(network)), &soft));
 }
 
 #[test]

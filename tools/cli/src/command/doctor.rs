@@ -60,7 +60,7 @@ impl Chosen {
         let network = default_network(display);
         let method = match &network {
             Some(network) => format!(
-                "auto: the plane sweep if depth is clean, the network of {} layers if it is noisy or incomplete",
+                "auto: the network of {} layers where the edges of depth are soft, the plane sweep otherwise",
                 network.layers()
             ),
             None => {

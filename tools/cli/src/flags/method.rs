@@ -14,7 +14,7 @@ pub(crate) enum CoreMethod {
     Network,
     /// The plane sweep on the RGB-D image: waves by short filters, for any display
     Sweep,
-    /// The plane sweep if depth is clean, a network if it is noisy or incomplete
+    /// A network where the edges of depth are soft, the plane sweep otherwise
     Auto,
 }
 

@@ -320,7 +320,7 @@ fn each_sensors_depth_is_judged_after_the_true_depth() {
     assert_eq!(of("rgb")[0].mean, of("rgb")[2].mean);
 }
 
-/// The automatic choice takes the sweep for clean depth and the network for noisy depth.
+/// The automatic choice takes the network for depth with soft edges and the sweep for all other depth.
 #[test]
 fn the_automatic_choice_is_one_of_its_methods() {
     let data = Data::new();
