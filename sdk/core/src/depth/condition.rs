@@ -152,6 +152,7 @@ impl Conditioner {
         let readings = surfaces::Readings {
             depth: &scratch.readings,
             width: self.depth.1,
+            are_coarse: contradict::pixels(self.crop, self.out) > 1.0,
             kinds: &scratch.kinds,
             colours: &scratch.colours,
         };

@@ -18,8 +18,13 @@ const MOST_PIXELS: f64 = 5.0;
 
 /// Returns whether readings of the part `crop` for a display of (H, W) = `out` have a few pixels each.
 pub(super) fn applies(crop: Crop, out: (usize, usize)) -> bool {
-    let pixels = (out.0 * out.1) as f64 / (crop.height * crop.width);
+    let pixels = pixels(crop, out);
     pixels > 1.0 && pixels <= MOST_PIXELS
+}
+
+/// Returns the number of pixels of a reading of the part `crop` for a display of (H, W) = `out`.
+pub(super) fn pixels(crop: Crop, out: (usize, usize)) -> f64 {
+    (out.0 * out.1) as f64 / (crop.height * crop.width)
 }
 
 /// Writes `depth`, rows of `width` without NaN, to `to` with its contradicted readings replaced, and makes them

@@ -177,6 +177,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
         }
         kinds = kinds_of(&readings);
     }
+    let is_coarse = contradict::pixels(crop, (height, width)) > 1.0;
     let choices = Array2::from_shape_fn((height, width), |(y, x)| {
         let (row, column) = (rows.reading(y), columns.reading(x));
         let around: [(usize, usize); 9] = std::array::from_fn(|k| {
@@ -197,7 +198,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
         });
         let depths = around.map(|at| readings[at]);
         let end = |k: usize, behind: bool| {
-            let end = end_of_ramp(&readings, &kinds, around[k], behind).filter(|_| rounds[4] == 2)?;
+            let end = end_of_ramp(&readings, &kinds, around[k], behind).filter(|_| is_coarse && rounds[4] == 2)?;
             Some((readings[end], colours(end.0, end.1)))
         };
         let surfaces = surfaces_of(depths, rounds, &|k| colours(around[k].0, around[k].1), &end);

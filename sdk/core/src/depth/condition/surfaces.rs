@@ -94,6 +94,8 @@ impl Surface {
 pub(super) struct Readings<'a> {
     pub(super) depth: &'a [f32],
     pub(super) width: usize,
+    /// Whether readings have several pixels, so that an edge in them may be a ramp.
+    pub(super) are_coarse: bool,
     pub(super) kinds: &'a [Kind],
     pub(super) colours: &'a [Moments],
 }
@@ -157,7 +159,7 @@ impl Readings<'_> {
         if split(&mut surfaces[..*count], at, depth) {
             return true;
         }
-        if self.kinds[middle] != Kind::Mixed || *count == 0 || *count == MOST {
+        if !self.are_coarse || self.kinds[middle] != Kind::Mixed || *count == 0 || *count == MOST {
             return false;
         }
         let Some(end) = self.end_of_ramp(i, surfaces[0].depth < depth) else {
