@@ -9,7 +9,8 @@
 use super::fit::{self, Coefficients};
 use num_complex::Complex64;
 use phasefront_kernels::fir::Taps;
-use rustfft::FftPlanner;
+use rustfft::algorithm::Radix4;
+use rustfft::{Fft, FftDirection};
 
 /// The sum of magnitudes that a merged filter may lose at its ends.
 const TAIL: f64 = 2e-5;
@@ -187,7 +188,8 @@ fn coefficients(taps: &Taps) -> Coefficients {
 /// A frequency grid fine enough for the longest filter not to wrap around.
 struct Grid {
     size: usize,
-    inverse: std::sync::Arc<dyn rustfft::Fft<f64>>,
+    /// A planner would compile all its algorithms once more for `f64`.
+    inverse: Radix4<f64>,
 }
 
 impl Grid {
@@ -197,7 +199,7 @@ impl Grid {
         let size = (4 * longest).next_power_of_two().max(1024);
         Grid {
             size,
-            inverse: FftPlanner::new().plan_fft_inverse(size),
+            inverse: Radix4::new(size, FftDirection::Inverse),
         }
     }
 
