@@ -25,8 +25,8 @@ pub enum Method {
     Sweep(Sweep),
     /// The plane sweep, corrected by a network that was trained on it.
     Seeded(Arc<Network>),
-    /// Chooses the method for each frame by its depth ([`softness`]): the trained network where most edges are soft, the
-    /// plane sweep otherwise.
+    /// Chooses the method for each frame by its depth ([`softness`]): the trained network where most edges are soft,
+    /// the plane sweep otherwise.
     Auto(Sweep, Arc<Network>),
 }
 

@@ -1,5 +1,6 @@
 //! Runs whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as wgpu compute passes for Vulkan, Metal,
-//! DirectX 12 and a browser's WebGPU. The input is a frame and the output is modulator levels. No intermediate result returns to the CPU.
+//! DirectX 12 and a browser's WebGPU. The input is a frame and the output is modulator levels. No intermediate result
+//! returns to the CPU.
 //!
 //! Each stage is a .wgsl file beside its Rust file. The Rust code prepends a header of constants to the shader text, so
 //! that loops have constant bounds. The CPU stage is the reference: f32 agrees with it to 1e-4, int8 networks agree bit

@@ -1,5 +1,5 @@
-//! Renders frames on a GPU that passed [`probe_async`] and reopens a device that is lost. The session decides what happens to
-//! a frame if no device is available.
+//! Renders frames on a GPU that passed [`probe_async`] and reopens a device that is lost. The session decides what
+//! happens to a frame if no device is available.
 
 use super::device::{Device, DeviceOptions};
 use super::input::{Colour, Depth, Frame};

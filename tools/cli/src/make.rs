@@ -69,8 +69,8 @@ impl HologramRequest {
         }
     }
 
-    /// Chooses the method for the frame: the network if the edges of its depth are soft and one suits the display, else the
-    /// sweep.
+    /// Chooses the method for the frame: the network if the edges of its depth are soft and one suits the display, else
+    /// the sweep.
     fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || default_network(display).is_some();
         Ok(if trained && softness::is_soft(softness::sharp_edges(frame), None) {

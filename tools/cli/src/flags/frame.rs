@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use ndarray::{Array2, Array3};
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
+use phasefront_core::stage;
 use phasefront_io::film::sequence;
 use phasefront_io::frame::Captured;
 use phasefront_io::frame::fit::{Fit, Placement};
@@ -299,6 +300,7 @@ impl FrameFlags {
             depth.mapv_inplace(|d| 1.0 - d);
         }
         let (_, height, width) = rgb.dim();
+        let _stage = stage!("depth");
         frame::conditioned(rgb, &depth, &self.placement((height, width), display))
     }
 

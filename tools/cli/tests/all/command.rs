@@ -91,8 +91,10 @@ fn a_trace_has_the_stages_of_the_work() {
             .map(|event| event["name"].as_str().unwrap().to_owned())
             .collect()
     };
-    assert_eq!(names("B"), ["method", "propagate", "encode"]);
-    assert_eq!(names("E"), ["method", "propagate", "encode"]);
+    let of_depth = ["register", "narrow", "fill", "smooth", "edges", "surfaces"];
+    let of_frame = ["method", "propagate", "encode"];
+    assert_eq!(names("B"), [&["depth"][..], &of_depth, &of_frame].concat());
+    assert_eq!(names("E"), [&of_depth[..], &["depth"], &of_frame].concat());
     let nowhere = [&hologram[..], &["nowhere/trace.json"]].concat();
     folder.refuses(&nowhere, 1, &["there is no folder nowhere"]);
 }
@@ -132,7 +134,7 @@ fn json_is_one_object_on_stdout() {
     let folder = Folder::new().with_frame();
     let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&with(&["-o", "h.png", "--json"]))).unwrap();
     assert_eq!(made["width"], 48);
-    for stage in ["network", "propagate", "encode"] {
+    for stage in ["sweep", "propagate", "encode"] {
         assert!(made["stage_ms"][stage].is_number(), "{made}");
     }
     let compared: serde_json::Value =
@@ -856,13 +858,12 @@ fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
 #[test]
 fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     let folder = Folder::new().with_frame();
-    let common = ["--scale", "1", "--offset-mm", "3"];
-    let swept = [&["--method", "sweep"], &common[..]].concat();
-    for more in [&common[..], &swept] {
-        folder.succeeds(&with(&[more, &["-o", "cpu.png"]].concat()));
-        let arguments = with(&[more, &["-o", "gpu.png"]].concat());
+    for method in ["network", "sweep"] {
+        let more = ["--method", method, "--scale", "1", "--offset-mm", "3"];
+        folder.succeeds(&with(&[&more[..], &["-o", "cpu.png"]].concat()));
+        let arguments = with(&[&more[..], &["-o", "gpu.png"]].concat());
         let report = report_on_gpu(&folder, &arguments);
-        if more.contains(&"sweep") {
+        if method == "sweep" {
             assert!(report["stage_ms"]["sweep"].is_number(), "{report}");
         } else {
             let engine = report["engine"].as_str().unwrap();

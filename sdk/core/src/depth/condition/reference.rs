@@ -473,13 +473,16 @@ impl Surface {
     }
 }
 
+/// The colours of a reading's pixels.
+type Colours = Vec<[f64; 3]>;
+
 /// Groups 3×3 readings with their colours: in round 0 those that are neither filled nor mixed, in round 1 the filled
 /// ones, in round 2 the mixed ones. `end` is the end behind or before a reading of a ramp, with its colours.
 fn surfaces_of(
     readings: [f32; 9],
     rounds: [usize; 9],
-    colours: &dyn Fn(usize) -> Vec<[f64; 3]>,
-    end: &dyn Fn(usize, bool) -> Option<(f32, Vec<[f64; 3]>)>,
+    colours: &dyn Fn(usize) -> Colours,
+    end: &dyn Fn(usize, bool) -> Option<(f32, Colours)>,
 ) -> Vec<Surface> {
     let mut found: Vec<Surface> = Vec::new();
     for round in 0..3 {
