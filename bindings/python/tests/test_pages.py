@@ -62,7 +62,7 @@ def test_the_conventions_reconstruct_a_hologram(tmp_path, monkeypatch):
         views = [numpy.asarray(Image.open(name)).astype(int) for name in ("near.png", "by_command.png")]
         inside = [view[48:-48, 48:-48] for view in views]
         assert inside[0].std() > 20
-        assert abs(inside[0] - inside[1]).max() <= 2
+        assert abs(inside[0] - inside[1]).max() <= 3
 
 
 def test_a_type_checker_follows_the_pages(tmp_path):
