@@ -6,7 +6,8 @@ phones.toml gives cores and clocks. Prints the tables of docs/phones.md.
 Needs Python 3.11, Rust with the target aarch64-unknown-linux-gnu, and llvm-mca of LLVM 19 (Debian's llvm-19).
 
 A network's time is its multiply-adds divided by the inner loop's multiply-adds a second, times the factor that two
-measured machines took beyond that. Other stages scale a measured time by the ratio of f32 lanes a second.
+measured machines took beyond that. The sweep scales a measured time by the ratio of its inner loops' multiply-adds a
+second, the encoder by that of f32 lanes.
 """
 
 import os
@@ -19,13 +20,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "phasefront/phone-model"
-#: For each loop: the processor family, the function, the multiplying instruction, its multiply-adds.
+#: For each loop: the processor family, the function, the multiplying instruction, its multiply-adds, and how many of
+#: these instructions the loop has at least.
 LOOPS = {
-    "dotprod": ("aarch64", r"neon_dotprod4sums", r"sdot", 16),
-    "i8mm": ("aarch64", r"neon_i8mm4sums", r"usdot", 16),
-    "neon f32": ("aarch64", r"4neon10hidden_row", r"fmla", 4),
-    "avx2 f32": ("x86_64", r"4avx28f32_sums", r"vfmadd\w+", 8),
-    "avx512 f32": ("x86_64", r"6avx5127filters", r"vfmadd\w+", 16),
+    "dotprod": ("aarch64", r"neon_dotprod4sums", r"sdot", 16, 16),
+    "i8mm": ("aarch64", r"neon_i8mm4sums", r"usdot", 16, 16),
+    "neon f32": ("aarch64", r"4neon10hidden_row", r"fmla", 4, 16),
+    "neon sweep": ("aarch64", r"3fir4neon3two", r"smlal2?", 4, 16),
+    "avx2 f32": ("x86_64", r"4avx28f32_sums", r"vfmadd\w+", 8, 16),
+    "avx2 sweep": ("x86_64", r"3fir4avx23two", r"vpmaddwd", 16, 8),
+    "avx512 f32": ("x86_64", r"6avx5127filters", r"vfmadd\w+", 16, 16),
+    "avx512 sweep": ("x86_64", r"3fir6avx5123two", r"vpdpwssd", 32, 8),
 }
 #: Measured machines (docs/benchmarks.md): llvm-mca's processor, cores, clock, and network times of 1920×1080. The clock
 #: follows from the share of the peak that the run states.
@@ -77,9 +82,9 @@ class Loops:
 
     def inner(self, name):
         """The innermost loop of a kernel, and its multiply-adds."""
-        family, function, instruction, macs = LOOPS[name]
+        family, function, instruction, macs, least = LOOPS[name]
         count = lambda lines: sum(bool(re.match(rf"{instruction}\s", line)) for line in lines)  # noqa: E731
-        found = [(len(body), body) for of, body in self.texts[family] if re.search(function, of) and count(body) >= 16]
+        found = [(len(body), body) for of, body in self.texts[family] if re.search(function, of) and count(body) >= least]
         if not found:
             sys.exit(f"{name}: no loop with {instruction} in {function}; the kernels have changed")
         _, body = min(found, key=lambda pair: pair[0])
