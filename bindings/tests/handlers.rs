@@ -1,18 +1,17 @@
 //! Tests a log handler that closes the session whose frame is being computed, on the thread that computes it.
 #![allow(clippy::unwrap_used)]
 
+mod small_frame;
+
 use phasefront_ffi::{
-    ColourFormat, ColourInfo, DepthFormat, DepthInfo, FrameInfo, ListenerError, LogLevel, LogListener, Method,
-    Orientation, PhasefrontError, PlaneInfo, RawSession, Rotation, RunningMode, Target, YuvMatrix, display_from_toml,
+    ListenerError, LogLevel, LogListener, Method, PhasefrontError, RawSession, RunningMode, Target, display_from_toml,
     session_options, set_log_listener,
 };
+use small_frame::{H, W, process};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Metadata, Subscriber};
-
-const W: usize = 32;
-const H: usize = 24;
 
 /// Logs in the middle of a frame, as wgpu and tract do.
 struct Logging;
@@ -52,38 +51,6 @@ impl LogListener for Closing {
     }
 }
 
-fn process(session: &RawSession) -> Result<(), PhasefrontError> {
-    let plane = |pixel| PlaneInfo {
-        row_stride: W * pixel,
-        pixel_stride: pixel,
-    };
-    let info = FrameInfo {
-        timestamp_ns: 1,
-        colour: ColourInfo {
-            format: ColourFormat::Rgb,
-            width: W,
-            height: H,
-            planes: vec![plane(3)],
-            matrix: YuvMatrix::Bt601,
-            video_range: false,
-        },
-        depth: Some(DepthInfo {
-            format: DepthFormat::NormalizedU8,
-            width: W,
-            height: H,
-            plane: plane(1),
-        }),
-        confidence: None,
-        orientation: Orientation {
-            rotation: Rotation::Upright,
-            mirrored: false,
-        },
-        cameras: None,
-    };
-    let (rgb, depth) = (vec![180; W * H * 3], vec![90; W * H]);
-    session.process(&rgb, &[], &[], &depth, &[], info).map(|_| ())
-}
-
 /// This is one test, because a process has only one listener.
 #[test]
 fn a_log_handler_may_close_the_session_that_computes() {
@@ -97,7 +64,7 @@ fn a_log_handler_may_close_the_session_that_computes() {
     assert!(slot.set(session.clone()).is_ok());
     let (sender, done) = mpsc::channel();
     let processing = session.clone();
-    std::thread::spawn(move || sender.send(process(&processing)));
+    std::thread::spawn(move || sender.send(process(&processing).map(|_| ())));
     let given_up = done.recv_timeout(Duration::from_secs(60)).unwrap().unwrap_err();
     assert!(given_up.to_string().contains("given up"), "{given_up}");
     let refused = told.recv().unwrap().unwrap_err();

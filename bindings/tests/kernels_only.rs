@@ -3,53 +3,21 @@
 #![cfg(not(feature = "tract"))]
 #![allow(clippy::unwrap_used)]
 
+mod small_frame;
+
 use phasefront_ffi::{
-    ColourFormat, ColourInfo, DepthFormat, DepthInfo, DepthNetwork, FrameInfo, Method, Network, Orientation,
-    PhasefrontError, PlaneInfo, RawHologram, RawSession, Rotation, RunningMode, SessionOptions, Target, YuvMatrix,
-    display_from_toml, session_options,
+    DepthNetwork, Method, Network, PhasefrontError, RawSession, RunningMode, SessionOptions, Target, display_from_toml,
+    session_options,
 };
+use small_frame::{H, W, process};
 use std::fmt::Debug;
 use std::sync::Arc;
-
-const W: usize = 32;
-const H: usize = 24;
 
 fn options(network: Arc<Network>) -> SessionOptions {
     let display = display_from_toml(format!("width = {W}\nheight = {H}")).unwrap();
     let mut options = session_options(Target::of_display(display).unwrap(), Some(Method::Trained { network })).unwrap();
     options.threads = Some(1);
     options
-}
-
-fn process(session: &RawSession) -> Result<Arc<RawHologram>, PhasefrontError> {
-    let plane = |pixel| PlaneInfo {
-        row_stride: W * pixel,
-        pixel_stride: pixel,
-    };
-    let info = FrameInfo {
-        timestamp_ns: 1,
-        colour: ColourInfo {
-            format: ColourFormat::Rgb,
-            width: W,
-            height: H,
-            planes: vec![plane(3)],
-            matrix: YuvMatrix::Bt601,
-            video_range: false,
-        },
-        depth: Some(DepthInfo {
-            format: DepthFormat::NormalizedU8,
-            width: W,
-            height: H,
-            plane: plane(1),
-        }),
-        confidence: None,
-        orientation: Orientation {
-            rotation: Rotation::Upright,
-            mirrored: false,
-        },
-        cameras: None,
-    };
-    session.process(&[180; W * H * 3], &[], &[], &[90; W * H], &[], info)
 }
 
 /// Checks that an error is one line that names tract.

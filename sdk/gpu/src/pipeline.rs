@@ -232,10 +232,10 @@ impl GpuPipeline {
     }
 
     /// Measures the device's peak performance in these numbers.
-    #[cfg(not(target_arch = "wasm32"))]
     ///
     /// # Errors
     /// Returns an error if the device cannot run the measurement, or [`GpuError::Lost`].
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn peak(&self) -> Result<Peak> {
         crate::device::peak::measure(&self.device, self.method.numbers())
     }
