@@ -24,6 +24,10 @@ mod options;
 mod session;
 #[cfg(target_arch = "wasm32")]
 mod target;
+#[cfg(target_arch = "wasm32")]
+mod threads;
 
 #[cfg(target_arch = "wasm32")]
 pub use error::{start, version};
+#[cfg(target_arch = "wasm32")]
+pub use threads::{help, of_this_module, start_threads};

@@ -4,7 +4,9 @@ use crate::error::{Answer, setting};
 use crate::network::RawNetwork;
 use crate::target::RawTarget;
 use phasefront::input::DepthRange;
-use phasefront::session::{Backend, Quality, QualityLevel, SessionOptions};
+#[cfg(not(target_feature = "atomics"))]
+use phasefront::session::Backend;
+use phasefront::session::{Quality, QualityLevel, SessionOptions};
 use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
@@ -152,9 +154,23 @@ impl RawOptions {
     }
 
     /// Computes frames on the browser's GPU, or only on an adapter whose name contains `adapter`.
-    pub fn webgpu(&mut self, adapter: Option<String>) {
-        self.core.backend = Backend::Gpu;
-        self.core.gpu.device.name = adapter;
+    ///
+    /// # Errors
+    /// Throws an error of kind `setting` in the build with threads.
+    pub fn webgpu(&mut self, adapter: Option<String>) -> Answer<()> {
+        #[cfg(not(target_feature = "atomics"))]
+        {
+            self.core.backend = Backend::Gpu;
+            self.core.gpu.device.name = adapter;
+            Ok(())
+        }
+        #[cfg(target_feature = "atomics")]
+        {
+            let _ = adapter;
+            Err(setting(
+                "the build with threads has no WebGPU; import from phasefront, or leave out the backend",
+            ))
+        }
     }
 
     /// Fixes the quality level of the session; without one, the session may change it.

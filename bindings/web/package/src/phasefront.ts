@@ -17,6 +17,7 @@
 
 import { PhasefrontError, guard, ready } from "./error.js";
 import init, { version as rawVersion } from "./raw/phasefront_web.js";
+import { start, threadsToStart } from "./threads.js";
 
 export { PhasefrontError, type ErrorKind } from "./error.js";
 export {
@@ -64,20 +65,38 @@ export { Target, displayFromToml, type Display } from "./target.js";
  */
 export type ModuleSource = string | URL | Request | Response | BufferSource | WebAssembly.Module;
 
+/** Options of {@link load}. */
+export interface LoadOptions {
+  /**
+   * The number of threads that compute, including the calling worker's. In `phasefront/threads` it is by default that of
+   * the processor, at most 8; in `phasefront` it is 1.
+   */
+  readonly threads?: number;
+}
+
 let loading: Promise<void> | undefined;
 
 /**
- * Loads the module from the folder of this file, or from `source`. Later calls wait for the first.
+ * Loads the module from the folder of this file, or from `source`. Later calls wait for the first. With
+ * `phasefront/threads`, call it in a worker of a page that is isolated from other origins.
  *
- * @throws PhasefrontError `session`: the module cannot be loaded, or the browser has no WebAssembly SIMD.
+ * @throws PhasefrontError `session`: the module cannot be loaded, the browser has no WebAssembly SIMD, or threads cannot
+ * be started here. `setting`: the number of threads is invalid.
  */
-export function load(source?: ModuleSource | Promise<ModuleSource>): Promise<void> {
-  loading ??= init(source === undefined ? undefined : { module_or_path: source }).then(ready, (error: unknown) => {
+export function load(source?: ModuleSource | Promise<ModuleSource>, options: LoadOptions = {}): Promise<void> {
+  loading ??= loaded(source, options.threads).then(ready, (error: unknown) => {
     loading = undefined;
+    if (error instanceof PhasefrontError) throw error;
     const why = error instanceof Error ? error.message : String(error);
     throw new PhasefrontError("session", `the module cannot be loaded: ${why.replaceAll("\n", " ")}`);
   });
   return loading;
+}
+
+async function loaded(source: ModuleSource | Promise<ModuleSource> | undefined, asked?: number): Promise<void> {
+  const threads = threadsToStart(asked);
+  await init(source === undefined ? undefined : { module_or_path: source });
+  await start(threads);
 }
 
 /** Returns the version of the library. */
