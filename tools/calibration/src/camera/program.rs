@@ -85,10 +85,12 @@ impl CaptureProgram {
         let [program, arguments @ ..] = command else {
             return Err(refuse("names no program".into()));
         };
-        let mut child = Command::new(program)
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
+        let mut command = Command::new(program);
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+        // The processes that the program starts are ended with it.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut child = command
             .spawn()
             .map_err(|e| refuse(format!("cannot be started: {e}")))?;
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
@@ -191,7 +193,7 @@ impl CaptureProgram {
                 Err(RecvTimeoutError::Timeout) => {
                     let seconds = self.timeout.as_secs_f64();
                     // It hangs, and would not notice the end of its input.
-                    let _ = self.child.kill();
+                    let _ = self.kill();
                     return Err(self.refuse(&format!(
                         "no answer in {seconds} seconds; --capture-timeout-s gives it more"
                     )));
@@ -229,8 +231,18 @@ impl CaptureProgram {
                 Err(e) => return e.to_string(),
             }
         }
-        let ended = self.child.kill().and_then(|()| self.child.wait());
+        let ended = self.kill().and_then(|()| self.child.wait());
         ended.map_or_else(|e| e.to_string(), |status| status.to_string())
+    }
+
+    /// Ends the program and, on Unix, the processes that it started.
+    fn kill(&mut self) -> std::io::Result<()> {
+        #[cfg(unix)]
+        {
+            use rustix::process::{Pid, Signal, kill_process_group};
+            kill_process_group(Pid::from_child(&self.child), Signal::KILL)?;
+        }
+        self.child.kill()
     }
 }
 

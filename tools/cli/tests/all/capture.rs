@@ -8,6 +8,8 @@ use phasefront_core::optics::metrics;
 use phasefront_io::picture;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
 
 /// Answers each request by the rehearsal's photograph that is next, but for `FAULTS`, cases of the request's number.
 const PROGRAM: &str = r#"
@@ -252,9 +254,16 @@ fn programs_that_do_not_help_are_named() {
     assert_eq!(said.matches("shows 0 of the 4 corner marks").count(), 4, "{said}");
     assert_eq!(taken(&folder), 0);
 
-    fs::write(folder.path("program.sh"), "sleep 100").unwrap();
-    let slow = [&LUT[..9], &["--capture-timeout-s", "0.2"], &LUT[9..]].concat();
-    assert!(folder.fails(&slow, 1).contains("no answer in 0.2 seconds"));
+    fs::write(folder.path("program.sh"), "sleep 1000 & echo $! >sleep; wait").unwrap();
+    let slow = [&LUT[..9], &["--capture-timeout-s", "0.5"], &LUT[9..]].concat();
+    assert!(folder.fails(&slow, 1).contains("no answer in 0.5 seconds"));
+    // What the program started ends too.
+    let alive = format!("kill -0 {}", fs::read_to_string(folder.path("sleep")).unwrap());
+    let is_alive = || Command::new("sh").args(["-c", &alive]).status().unwrap().success();
+    assert!((0..500).any(|_| {
+        std::thread::sleep(Duration::from_millis(10));
+        !is_alive()
+    }));
     let absent = [&LUT[..10], &["no-such-program"]].concat();
     assert!(
         folder
