@@ -11,6 +11,7 @@
 //! 7. `surfaces`: the 3×3 readings around a reading at an edge form surfaces. Each display pixel there takes the
 //!    surface that covers its place and has its colour. All other pixels are interpolated.
 //! 8. Pixels that are nearly undecided follow their neighbours of the same colour.
+//! 9. `history`: in video, a pixel at an edge whose colour stays prefers the surface that it had.
 //!
 //! Clean depth of the display's resolution is only shifted, narrowed and filled.
 
@@ -19,6 +20,7 @@ mod colour;
 mod contradict;
 mod edges;
 mod fill;
+mod history;
 mod narrow;
 mod pixels;
 pub mod reference;
@@ -48,7 +50,8 @@ pub struct Conditioner {
     registers: bool,
 }
 
-/// The working memory of a [`Conditioner`] for one call at a time, and the shift found in previous calls.
+/// The working memory of a [`Conditioner`] for one call at a time, and what it remembers of previous calls: the shift
+/// and the surfaces of pixels at edges.
 pub struct ConditionScratch {
     registration: Option<Registration>,
     x: AxisMap,
@@ -70,6 +73,7 @@ impl ConditionScratch {
     /// Forgets previous calls.
     pub fn reset(&mut self) {
         self.registration.iter_mut().for_each(Registration::reset);
+        self.pixels.reset();
     }
 }
 

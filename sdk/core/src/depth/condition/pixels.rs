@@ -1,8 +1,9 @@
 //! The depth of display pixels. Each pixel at an edge takes the surface that covers its place and has its colour. Then
-//! pixels that are nearly undecided follow their neighbours of the same colour.
+//! pixels that are nearly undecided follow their neighbours of the same colour. In video, earlier choices count.
 
 use super::axis::AxisMap;
 use super::edges::Kind;
+use super::history::Choice;
 use super::surfaces::{MOST, Place, Readings, Surface};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -39,6 +40,8 @@ impl Second {
 pub(super) struct Pixels {
     /// The second depth of each pixel. Only those at edges are used.
     seconds: Vec<Second>,
+    /// The earlier choice of each pixel.
+    history: Vec<Choice>,
     /// A row of readings between two rows, for each row.
     between: Vec<f32>,
     near: [f32; SIDE * SIDE],
@@ -59,9 +62,15 @@ impl Pixels {
         let square = |i: usize| (i as f32 - REACH as f32) * (i as f32 - REACH as f32);
         Pixels {
             seconds: vec![Second::default(); pixels],
+            history: vec![Choice::default(); pixels],
             between: vec![0.0; readings],
             near: std::array::from_fn(|i| quarter(square(i / SIDE) + square(i % SIDE), NEAR)),
         }
+    }
+
+    /// Forgets earlier choices.
+    pub(super) fn reset(&mut self) {
+        self.history.fill(Choice::default());
     }
 
     /// Writes the depth of each pixel to `to`.
@@ -70,6 +79,7 @@ impl Pixels {
         let lines = Lines {
             depth: to,
             seconds: &mut self.seconds,
+            history: &self.history,
             between: &mut self.between,
         };
         decider.rows(0..decider.y.pixels.len(), lines);
@@ -88,11 +98,15 @@ impl Pixels {
                     }
                 }
             });
-        (to.par_chunks_exact_mut(width).zip(self.seconds.par_chunks_exact(width)))
+        (to.par_chunks_exact_mut(width))
+            .zip(self.seconds.par_chunks_exact(width))
+            .zip(self.history.par_chunks_exact_mut(width))
             .enumerate()
-            .for_each(|(y, (to, seconds))| {
-                for x in decider.edge_pixels(y).filter(|x| seconds[*x].lead == Second::OUTVOTED) {
-                    to[x] = seconds[x].depth;
+            .for_each(|(y, ((to, seconds), history))| {
+                for x in decider.edge_pixels(y) {
+                    let is_outvoted = seconds[x].lead == Second::OUTVOTED;
+                    let depth = if is_outvoted { seconds[x].depth } else { to[x] };
+                    to[x] = history[x].follow(decider.colour(y * width + x), depth);
                 }
             });
     }
@@ -102,6 +116,7 @@ impl Pixels {
 struct Lines<'a> {
     depth: &'a mut [f32],
     seconds: &'a mut [Second],
+    history: &'a [Choice],
     between: &'a mut [f32],
 }
 
@@ -110,15 +125,18 @@ impl Lines<'_> {
     fn split(&mut self, pixels: usize, readings: usize) -> (Lines<'_>, Lines<'_>) {
         let (depth, below_depth) = self.depth.split_at_mut(pixels);
         let (seconds, below_seconds) = self.seconds.split_at_mut(pixels);
+        let (history, below_history) = self.history.split_at(pixels);
         let (between, below_between) = self.between.split_at_mut(readings);
         let above = Lines {
             depth,
             seconds,
+            history,
             between,
         };
         let below = Lines {
             depth: below_depth,
             seconds: below_seconds,
+            history: below_history,
             between: below_between,
         };
         (above, below)
@@ -169,8 +187,8 @@ impl Decider<'_> {
             let count = self.readings.surfaces(&around, &mut surfaces);
             for y in inside.clone() {
                 for x in self.x.inside(column) {
-                    let (first, second) = self.choose(&surfaces[..count], y, x);
                     let at = (y - inside.start) * width + x;
+                    let (first, second) = self.choose(&surfaces[..count], &lines.history[at], y, x);
                     lines.depth[at] = first;
                     lines.seconds[at] = second;
                 }
@@ -193,8 +211,8 @@ impl Decider<'_> {
             .flat_map(|column| self.x.inside(column))
     }
 
-    /// Chooses the first and the second of `surfaces` for the pixel (`y`, `x`).
-    fn choose(&self, surfaces: &[Surface], y: usize, x: usize) -> (f32, Second) {
+    /// Chooses the first and the second of `surfaces` for the pixel (`y`, `x`) with its `earlier` choice.
+    fn choose(&self, surfaces: &[Surface], earlier: &Choice, y: usize, x: usize) -> (f32, Second) {
         let place = Place::new(self.x.offset[x], self.y.offset[y]);
         let colour = self.colour(y * self.x.cell.len() + x);
         let mut likelihoods = [f32::NEG_INFINITY; MOST];
@@ -203,9 +221,10 @@ impl Decider<'_> {
             *likelihood = surface.likelihood(colour);
             most = likelihood.max(most);
         }
+        let leads: [f32; MOST] = earlier.leads(colour, surfaces.iter().map(|surface| surface.depth));
         let (mut first, mut second) = ((f32::NEG_INFINITY, 0), (f32::NEG_INFINITY, 0));
         for (i, (surface, likelihood)) in surfaces.iter().zip(likelihoods).enumerate() {
-            let score = PLACE * place.of(&surface.covers) + (likelihood - most).max(-MOST_EVIDENCE);
+            let score = PLACE * place.of(&surface.covers) + (likelihood - most).max(-MOST_EVIDENCE) + leads[i];
             if score > first.0 {
                 second = first;
                 first = (score, i);

@@ -228,6 +228,55 @@ fn frames_share_their_evidence_until_a_reset() {
     assert_eq!(run(&other, &mut scratch), other.condition(false).unwrap());
 }
 
+/// Pixels of a scene that stands still seldom change their surface, although the readings are noisy.
+#[test]
+fn surfaces_stay_where_nothing_moves() {
+    let case = Case::disc(4, (0, 0));
+    let plan = Conditioner::new((50, 50), case.crop, (200, 200), true).unwrap();
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    // Only its place tells the surface of a pixel.
+    let rgb = vec![0.5; 3 * 200 * 200];
+    let mut scratch = plan.scratch();
+    let (mut alone, mut video) = (vec![], vec![]);
+    for _ in 0..6 {
+        let depth: Vec<f32> = (case.depth.iter())
+            .map(|d| d + random.random_range(-0.03..0.03))
+            .collect();
+        for (seen, scratch) in [(&mut alone, &mut plan.scratch()), (&mut video, &mut scratch)] {
+            let mut to = vec![0.0; 200 * 200];
+            plan.condition(&depth, &rgb, &mut to, scratch).unwrap();
+            seen.push(to);
+        }
+    }
+    let flips = |seen: &[Vec<f32>]| {
+        let pairs = seen.windows(2).map(|pair| pair[0].iter().zip(&pair[1]));
+        pairs.flatten().filter(|(a, b)| (**a - **b).abs() > 0.05).count()
+    };
+    assert_eq!(alone[0], video[0]);
+    let (alone, video) = (flips(&alone), flips(&video));
+    assert!(alone > 100 && 4 * video < alone, "{alone} {video}");
+}
+
+/// A disc that moves is where it is now, and the wall appears where it was.
+#[test]
+fn what_moves_leaves_no_trail() {
+    let first = Case::disc(4, (0, 0));
+    let plan = Conditioner::new((50, 50), first.crop, (200, 200), true).unwrap();
+    let mut scratch = plan.scratch();
+    for step in 0..5 {
+        let mut case = Case::disc(4, (0, 0));
+        let moved = |x: usize| (x + 8 * step).min(199);
+        case.rgb = Array3::from_shape_fn((3, 200, 200), |(c, y, x)| first.rgb[(c, y, moved(x))]);
+        case.depth = Array2::from_shape_fn((50, 50), |(y, x)| first.depth[(y, (x + 2 * step).min(49))]);
+        let mut to = vec![0.0; 200 * 200];
+        let (depth, rgb) = (case.depth.as_slice().unwrap(), case.rgb.as_slice().unwrap());
+        plan.condition(depth, rgb, &mut to, &mut scratch).unwrap();
+        let alone = case.condition(true).unwrap();
+        let trail = to.iter().zip(&alone).filter(|(a, b)| (**a - **b).abs() > 0.03).count();
+        assert_eq!(trail, 0, "{step}");
+    }
+}
+
 #[test]
 fn holes_take_the_surface_of_their_colour() {
     let (h, w) = (24, 32);
