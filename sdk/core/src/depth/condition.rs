@@ -21,6 +21,7 @@ mod contradict;
 mod edges;
 mod fill;
 mod history;
+mod lanes;
 mod narrow;
 mod pixels;
 pub mod reference;
@@ -121,7 +122,7 @@ impl Conditioner {
             colours: vec![Moments::default(); size],
             fill: FillScratch::new(size),
             smooth: SmoothScratch::new(self.depth),
-            pixels: Pixels::new(size, self.out.0 * self.out.1),
+            pixels: Pixels::new(self.depth.0, self.out),
         }
     }
 

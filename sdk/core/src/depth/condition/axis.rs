@@ -53,6 +53,14 @@ impl AxisMap {
         }
     }
 
+    /// Returns the display pixels that lie in the readings `cells`.
+    pub(super) fn inside_all(&self, cells: std::ops::Range<usize>) -> std::ops::Range<usize> {
+        let mut inside = cells.map(|cell| self.inside(cell)).filter(|pixels| !pixels.is_empty());
+        let first = inside.next().unwrap_or(0..0);
+        let end = inside.last().map_or(first.end, |last| last.end);
+        first.start..end
+    }
+
     /// Returns the readings on both sides of a display pixel, and the share of the second.
     pub(super) fn beside(&self, pixel: usize) -> (usize, usize, f32) {
         let (cell, offset) = (self.cell[pixel] as usize, self.offset[pixel]);

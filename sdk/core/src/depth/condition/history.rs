@@ -2,6 +2,9 @@
 //! to frame. A pixel whose colour stays therefore prefers the surface that it had, and its depth follows slowly. Where
 //! something moves, colours at edges change, and the pixel is decided anew.
 
+use super::lanes::{LANES, Lanes, lanes, load, store};
+use rayon::prelude::*;
+
 /// The lead of the surface that the pixel had.
 const KEEP: f32 = 6.0;
 /// The largest difference of depth to the surface that the pixel had, as a share of the volume.
@@ -11,52 +14,98 @@ const ALIKE: f32 = 0.1;
 /// The share of the way to its new depth that a pixel moves in a frame.
 const SHARE: f32 = 0.5;
 
-/// The last depth of a pixel at an edge, and its colour then.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Choice {
-    depth: f32,
-    colour: [u8; 3],
-    is_known: bool,
+/// The last depth of each pixel at an edge, and its colour then.
+pub(super) struct History {
+    /// NaN where there is none.
+    depth: Vec<f32>,
+    /// The amplitudes in bytes, (H, 3, W).
+    colours: Vec<u8>,
 }
 
-impl Choice {
-    /// Returns the lead of each surface, by its depth, for a pixel of this `colour`: [`KEEP`] for the surface nearest to
-    /// the last depth, and 0 for all others.
-    pub(super) fn leads<const N: usize>(&self, colour: [f32; 3], depths: impl Iterator<Item = f32>) -> [f32; N] {
-        let mut leads = [0.0; N];
-        if self.holds(colour) {
-            let apart = depths.map(|depth| (depth - self.depth).abs()).enumerate();
-            let nearest = apart.min_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some((i, _)) = nearest.filter(|(_, apart)| *apart <= SAME) {
-                leads[i] = KEEP;
+impl History {
+    pub(super) fn new(pixels: usize) -> Self {
+        History {
+            depth: vec![f32::NAN; pixels],
+            colours: vec![0; 3 * pixels],
+        }
+    }
+
+    /// Forgets all choices.
+    pub(super) fn reset(&mut self) {
+        self.depth.fill(f32::NAN);
+    }
+
+    /// Returns the line `y` of `width` pixels.
+    pub(super) fn line(&self, y: usize, width: usize) -> Line<&[f32], &[u8]> {
+        Line {
+            depth: &self.depth[y * width..][..width],
+            colours: &self.colours[3 * y * width..][..3 * width],
+        }
+    }
+
+    /// Returns all lines of `width` pixels.
+    pub(super) fn lines(&mut self, width: usize) -> impl IndexedParallelIterator<Item = Line<&mut [f32], &mut [u8]>> {
+        let colours = self.colours.par_chunks_exact_mut(3 * width);
+        (self.depth.par_chunks_exact_mut(width))
+            .zip(colours)
+            .map(|(depth, colours)| Line { depth, colours })
+    }
+}
+
+/// A line of pixels.
+pub(super) struct Line<D, C> {
+    depth: D,
+    colours: C,
+}
+
+impl<D: AsRef<[f32]>, C: AsRef<[u8]>> Line<D, C> {
+    /// Returns the last depths of the pixels from `x` on, which have these `colours`. They are NaN where there is none
+    /// or where the colour has changed.
+    #[inline(always)]
+    pub(super) fn held(&self, x: usize, colours: &[Lanes; 3]) -> Lanes {
+        let (depth, bytes) = (self.depth.as_ref(), self.colours.as_ref());
+        let width = depth.len();
+        let mut apart = [0.0; LANES];
+        for (c, colours) in colours.iter().enumerate() {
+            let earlier = load(&bytes[c * width..][..width], x, 0);
+            let change = lanes(|i| colours[i] - f32::from(earlier[i]) * (1.0 / 255.0));
+            apart = lanes(|i| apart[i] + change[i] * change[i]);
+        }
+        let depth = load(depth, x, f32::NAN);
+        lanes(|i| if apart[i] <= ALIKE * ALIKE { depth[i] } else { f32::NAN })
+    }
+}
+
+impl Line<&mut [f32], &mut [u8]> {
+    /// Moves the last depths of `count` pixels from `x` on, which have these `colours`, toward `depths`, and returns
+    /// them.
+    #[inline(always)]
+    pub(super) fn follow(&mut self, (x, count): (usize, usize), colours: &[Lanes; 3], depths: &Lanes) -> Lanes {
+        let held = self.held(x, colours);
+        let moved = lanes(|i| {
+            let step = depths[i] - held[i];
+            let stays = step.abs() <= SAME;
+            if stays { held[i] + SHARE * step } else { depths[i] }
+        });
+        let width = self.depth.len();
+        store(&moved, &mut self.depth[x..x + count]);
+        for (c, colours) in colours.iter().enumerate() {
+            let line = &mut self.colours[c * width + x..][..count];
+            for (to, colour) in line.iter_mut().zip(colours) {
+                *to = (colour * 255.0 + 0.5) as u8;
             }
         }
-        leads
-    }
-
-    /// Returns the depth of a pixel of this `colour` that is `depth` by itself, and remembers it.
-    pub(super) fn follow(&mut self, colour: [f32; 3], depth: f32) -> f32 {
-        let stays = self.holds(colour) && (depth - self.depth).abs() <= SAME;
-        let depth = if stays {
-            self.depth + SHARE * (depth - self.depth)
-        } else {
-            depth
-        };
-        *self = Choice {
-            depth,
-            colour: colour.map(byte),
-            is_known: true,
-        };
-        depth
-    }
-
-    /// Returns whether a pixel of this `colour` has a choice and has kept its colour.
-    fn holds(&self, colour: [f32; 3]) -> bool {
-        let [r, g, b] = [0, 1, 2].map(|c| colour[c] - f32::from(self.colour[c]) * (1.0 / 255.0));
-        self.is_known && r * r + g * g + b * b <= ALIKE * ALIKE
+        moved
     }
 }
 
-fn byte(amplitude: f32) -> u8 {
-    (amplitude * 255.0 + 0.5) as u8
+/// Returns the lead of a surface of this `depth` for pixels with the depths `held`, of which `nearest` is the distance
+/// to the nearest surface.
+#[inline(always)]
+pub(super) fn leads(depth: f32, held: &Lanes, nearest: &Lanes) -> Lanes {
+    lanes(|i| {
+        let apart = (depth - held[i]).abs();
+        let is_nearest = apart <= SAME && apart <= nearest[i];
+        if is_nearest { KEEP } else { 0.0 }
+    })
 }

@@ -3,8 +3,10 @@
 
 use super::axis::AxisMap;
 use super::edges::Kind;
-use super::history::Choice;
-use super::surfaces::{MOST, Place, Readings, Surface};
+use super::history::{self, History};
+use super::lanes::{LANES, Lanes, lanes, load, store};
+use super::surfaces::{MOST, Places, Readings, Surface};
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -21,29 +23,21 @@ pub(super) const NEAR: f32 = 3.0;
 pub(super) const ALIKE: f32 = 0.15;
 /// The least weight of a neighbour by its colour.
 pub(super) const LEAST_ALIKE: f32 = 0.02;
+/// The lead of a first depth that lost the vote.
+const OUTVOTED: f32 = f32::NEG_INFINITY;
+/// The number of rows of readings that are decided together.
+const BAND: usize = 8;
 const SIDE: usize = 2 * REACH + 1;
 
-/// The alternative to the depth of a display pixel at an edge.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Second {
-    depth: f32,
-    /// The lead of the first depth, infinite if there is no second.
-    lead: f32,
-}
-
-impl Second {
-    /// The lead of a first depth that lost the vote.
-    const OUTVOTED: f32 = f32::NEG_INFINITY;
-}
-
-/// The working memory for readings and pixels of one shape.
+/// The working memory for readings and pixels of one shape, and the choices of earlier frames.
 pub(super) struct Pixels {
-    /// The second depth of each pixel. Only those at edges are used.
-    seconds: Vec<Second>,
-    /// The earlier choice of each pixel.
-    history: Vec<Choice>,
-    /// A row of readings between two rows, for each row.
-    between: Vec<f32>,
+    /// The alternative to the depth of each pixel at an edge.
+    second: Vec<f32>,
+    /// The lead of the first depth, infinite if there is no second.
+    lead: Vec<f32>,
+    history: History,
+    /// Two rows of readings, interpolated along the row, for each band.
+    stretched: Vec<f32>,
     near: [f32; SIDE * SIDE],
 }
 
@@ -58,19 +52,21 @@ pub(super) struct Decider<'a> {
 }
 
 impl Pixels {
-    pub(super) fn new(readings: usize, pixels: usize) -> Self {
+    /// Creates the memory for `rows` rows of readings and (H, W) pixels.
+    pub(super) fn new(rows: usize, (height, width): (usize, usize)) -> Self {
         let square = |i: usize| (i as f32 - REACH as f32) * (i as f32 - REACH as f32);
         Pixels {
-            seconds: vec![Second::default(); pixels],
-            history: vec![Choice::default(); pixels],
-            between: vec![0.0; readings],
+            second: vec![0.0; height * width],
+            lead: vec![0.0; height * width],
+            history: History::new(height * width),
+            stretched: vec![0.0; rows.div_ceil(BAND) * 2 * width],
             near: std::array::from_fn(|i| quarter(square(i / SIDE) + square(i % SIDE), NEAR)),
         }
     }
 
     /// Forgets earlier choices.
     pub(super) fn reset(&mut self) {
-        self.history.fill(Choice::default());
+        self.history.reset();
     }
 
     /// Writes the depth of each pixel to `to`.
@@ -78,120 +74,164 @@ impl Pixels {
         let width = decider.x.cell.len();
         let lines = Lines {
             depth: to,
-            seconds: &mut self.seconds,
-            history: &self.history,
-            between: &mut self.between,
+            second: &mut self.second,
+            lead: &mut self.lead,
+            stretched: &mut self.stretched,
         };
-        decider.rows(0..decider.y.pixels.len(), lines);
-        let first = &*to;
-        self.seconds
-            .par_chunks_exact_mut(width)
+        decider.bands(0..decider.y.pixels.len().div_ceil(BAND), lines, &self.history);
+        let (first, near) = (&*to, &self.near);
+        (self.lead.par_chunks_exact_mut(width))
+            .zip(self.second.par_chunks_exact(width))
             .enumerate()
-            .for_each(|(y, seconds)| {
-                for x in decider.edge_pixels(y) {
-                    let second = &mut seconds[x];
-                    if second.lead < NEIGHBOURS {
-                        let votes = decider.votes(first, second.depth, (y, x), &self.near);
-                        if second.lead + NEIGHBOURS * votes <= 0.0 {
-                            second.lead = Second::OUTVOTED;
-                        }
-                    }
-                }
-            });
+            .for_each(|(y, (lead, second))| wide!(decider.vote(first, second, y, near, lead)));
         (to.par_chunks_exact_mut(width))
-            .zip(self.seconds.par_chunks_exact(width))
-            .zip(self.history.par_chunks_exact_mut(width))
+            .zip(self.second.par_chunks_exact(width))
+            .zip(self.lead.par_chunks_exact(width))
+            .zip(self.history.lines(width))
             .enumerate()
-            .for_each(|(y, ((to, seconds), history))| {
-                for x in decider.edge_pixels(y) {
-                    let is_outvoted = seconds[x].lead == Second::OUTVOTED;
-                    let depth = if is_outvoted { seconds[x].depth } else { to[x] };
-                    to[x] = history[x].follow(decider.colour(y * width + x), depth);
-                }
-            });
+            .for_each(|(y, (((to, second), lead), mut line))| wide!(decider.finish(y, (second, lead), &mut line, to)));
     }
 }
 
-/// Lines of the display, and one row of readings for each row of readings in them.
+/// Lines of the display, and two stretched rows for each band of readings in them.
 struct Lines<'a> {
     depth: &'a mut [f32],
-    seconds: &'a mut [Second],
-    history: &'a [Choice],
-    between: &'a mut [f32],
+    second: &'a mut [f32],
+    lead: &'a mut [f32],
+    stretched: &'a mut [f32],
 }
 
 impl Lines<'_> {
-    /// Splits after `pixels` pixels and `readings` readings.
-    fn split(&mut self, pixels: usize, readings: usize) -> (Lines<'_>, Lines<'_>) {
+    /// Splits after `pixels` pixels and `stretched` values of stretched rows.
+    fn split(&mut self, pixels: usize, stretched: usize) -> (Lines<'_>, Lines<'_>) {
         let (depth, below_depth) = self.depth.split_at_mut(pixels);
-        let (seconds, below_seconds) = self.seconds.split_at_mut(pixels);
-        let (history, below_history) = self.history.split_at(pixels);
-        let (between, below_between) = self.between.split_at_mut(readings);
+        let (second, below_second) = self.second.split_at_mut(pixels);
+        let (lead, below_lead) = self.lead.split_at_mut(pixels);
+        let (stretched, below_stretched) = self.stretched.split_at_mut(stretched);
         let above = Lines {
             depth,
-            seconds,
-            history,
-            between,
+            second,
+            lead,
+            stretched,
         };
         let below = Lines {
             depth: below_depth,
-            seconds: below_seconds,
-            history: below_history,
-            between: below_between,
+            second: below_second,
+            lead: below_lead,
+            stretched: below_stretched,
         };
         (above, below)
     }
 }
 
 impl Decider<'_> {
-    /// Decides the pixels of `rows` of readings, half of them on another thread.
-    fn rows(&self, rows: Range<usize>, mut lines: Lines<'_>) {
-        if rows.len() <= 1 {
-            return rows.for_each(|row| self.row(row, &mut lines));
+    /// Decides the pixels of `bands` of readings, half of them on another thread.
+    fn bands(&self, bands: Range<usize>, mut lines: Lines<'_>, history: &History) {
+        if bands.len() <= 1 {
+            return bands.for_each(|band| {
+                let rows = band * BAND..((band + 1) * BAND).min(self.y.pixels.len());
+                wide!(self.interpolate(self.lines(rows.clone()), &mut lines));
+                let first = self.lines(rows.clone()).start;
+                rows.for_each(|row| self.row(row, first, &mut lines, history));
+            });
         }
-        let line = |row: usize| self.y.cell.partition_point(|cell| (*cell as usize) < row);
-        let middle = (rows.start + rows.end) / 2;
-        let pixels = (line(middle) - line(rows.start)) * self.x.cell.len();
-        let (above, below) = lines.split(pixels, (middle - rows.start) * self.x.pixels.len());
+        let (width, middle) = (self.x.cell.len(), (bands.start + bands.end) / 2);
+        let pixels = self.lines(bands.start * BAND..middle * BAND).len() * width;
+        let (above, below) = lines.split(pixels, 2 * width * (middle - bands.start));
         rayon::join(
-            || self.rows(rows.start..middle, above),
-            || self.rows(middle..rows.end, below),
+            || self.bands(bands.start..middle, above, history),
+            || self.bands(middle..bands.end, below, history),
         );
     }
 
-    /// Decides the pixels of a row of readings.
-    fn row(&self, row: usize, lines: &mut Lines<'_>) {
-        let (h, w) = (self.y.pixels.len(), self.x.pixels.len());
-        let width = self.x.cell.len();
-        let inside = self.y.inside(row);
-        for (y, line) in inside.clone().zip(lines.depth.chunks_exact_mut(width)) {
+    /// Returns the lines of the display in `rows` of readings.
+    fn lines(&self, rows: Range<usize>) -> Range<usize> {
+        let line = |row: usize| self.y.cell.partition_point(|cell| (*cell as usize) < row);
+        line(rows.start)..line(rows.end)
+    }
+
+    /// Interpolates the depth of `lines` between the readings.
+    #[inline(always)]
+    fn interpolate(&self, which: Range<usize>, lines: &mut Lines<'_>) {
+        let (w, width) = (self.x.pixels.len(), self.x.cell.len());
+        let (even, odd) = lines.stretched.split_at_mut(width);
+        // The row of readings that each of the two holds.
+        let mut held = [usize::MAX; 2];
+        for (y, to) in which.zip(lines.depth.chunks_exact_mut(width)) {
             let (above, below, share) = self.y.beside(y);
-            let [above, below] = [above, below].map(|row| &self.readings.depth[row * w..][..w]);
-            for ((to, a), b) in lines.between.iter_mut().zip(above).zip(below) {
-                *to = a + share * (b - a);
+            for row in [above, below] {
+                if held[row % 2] != row {
+                    let stretched = if row % 2 == 0 { &mut *even } else { &mut *odd };
+                    self.stretch(&self.readings.depth[row * w..][..w], stretched);
+                    held[row % 2] = row;
+                }
             }
-            for (x, to) in line.iter_mut().enumerate() {
-                let (left, right, share) = self.x.beside(x);
-                let (a, b) = (lines.between[left], lines.between[right]);
+            let of = |row: usize| if row % 2 == 0 { &even[..] } else { &odd[..] };
+            for ((to, a), b) in to.iter_mut().zip(of(above)).zip(of(below)) {
                 *to = (a + share * (b - a)).clamp(0.0, 1.0);
             }
         }
+    }
+
+    /// Interpolates a row of readings at the places of pixels.
+    #[inline(always)]
+    fn stretch(&self, row: &[f32], to: &mut [f32]) {
+        if self.x.offset.iter().all(|offset| *offset == 0.0) {
+            to.iter_mut()
+                .zip(&self.x.cell)
+                .for_each(|(to, cell)| *to = row[*cell as usize]);
+            return;
+        }
+        for (x, to) in to.iter_mut().enumerate() {
+            let (left, right, share) = self.x.beside(x);
+            let (a, b) = (row[left], row[right]);
+            *to = a + share * (b - a);
+        }
+    }
+
+    /// Decides the pixels at the edges of a row of readings. The `lines` begin with the display's line `first`.
+    fn row(&self, row: usize, first: usize, lines: &mut Lines<'_>, history: &History) {
+        let (h, w) = (self.y.pixels.len(), self.x.pixels.len());
+        let inside = self.y.inside(row);
         if inside.is_empty() {
             return;
         }
         let rows = [row.saturating_sub(1), row, (row + 1).min(h - 1)];
         let mut surfaces = [Surface::default(); MOST];
         for column in self.edges(row) {
+            let pixels = self.x.inside(column);
+            if pixels.is_empty() {
+                continue;
+            }
             let columns = [column.saturating_sub(1), column, (column + 1).min(w - 1)];
             let around: [usize; 9] = std::array::from_fn(|k| rows[k / 3] * w + columns[k % 3]);
             let count = self.readings.surfaces(&around, &mut surfaces);
-            for y in inside.clone() {
-                for x in self.x.inside(column) {
-                    let at = (y - inside.start) * width + x;
-                    let (first, second) = self.choose(&surfaces[..count], &lines.history[at], y, x);
-                    lines.depth[at] = first;
-                    lines.seconds[at] = second;
-                }
+            let surfaces = &surfaces[..count];
+            wide!(self.cell(surfaces, (inside.clone(), pixels), first, lines, history));
+        }
+    }
+
+    /// Decides the pixels (`rows`, `columns`) of a reading.
+    #[inline(always)]
+    fn cell(
+        &self,
+        surfaces: &[Surface],
+        (rows, columns): (Range<usize>, Range<usize>),
+        first: usize,
+        lines: &mut Lines<'_>,
+        history: &History,
+    ) {
+        let width = self.x.cell.len();
+        for y in rows {
+            let line = history.line(y, width);
+            for x in columns.clone().step_by(LANES) {
+                let colours = self.colours(y * width + x);
+                let places = Places::new(&load(&self.x.offset, x, 0.0), self.y.offset[y]);
+                let [depth, second, lead] = choose(surfaces, &places, &colours, &line.held(x, &colours));
+                let (at, count) = ((y - first) * width + x, LANES.min(columns.end - x));
+                store(&depth, &mut lines.depth[at..at + count]);
+                store(&second, &mut lines.second[at..at + count]);
+                store(&lead, &mut lines.lead[at..at + count]);
             }
         }
     }
@@ -205,76 +245,175 @@ impl Decider<'_> {
             .map(|(column, _)| column)
     }
 
-    /// Returns the pixels of line `y` at edges.
-    fn edge_pixels(&self, y: usize) -> impl Iterator<Item = usize> {
-        self.edges(self.y.cell[y] as usize)
-            .flat_map(|column| self.x.inside(column))
+    /// Returns the first and the number of neighbouring pixels of line `y` at edges, up to [`LANES`].
+    #[inline(always)]
+    fn edge_pixels(&self, y: usize) -> EdgePixels<'_> {
+        let w = self.x.pixels.len();
+        EdgePixels {
+            kinds: &self.readings.kinds[self.y.cell[y] as usize * w..][..w],
+            x: self.x,
+            column: 0,
+            run: 0..0,
+        }
     }
 
-    /// Chooses the first and the second of `surfaces` for the pixel (`y`, `x`) with its `earlier` choice.
-    fn choose(&self, surfaces: &[Surface], earlier: &Choice, y: usize, x: usize) -> (f32, Second) {
-        let place = Place::new(self.x.offset[x], self.y.offset[y]);
-        let colour = self.colour(y * self.x.cell.len() + x);
-        let mut likelihoods = [f32::NEG_INFINITY; MOST];
-        let mut most = f32::NEG_INFINITY;
-        for (likelihood, surface) in likelihoods.iter_mut().zip(surfaces) {
-            *likelihood = surface.likelihood(colour);
-            most = likelihood.max(most);
-        }
-        let leads: [f32; MOST] = earlier.leads(colour, surfaces.iter().map(|surface| surface.depth));
-        let (mut first, mut second) = ((f32::NEG_INFINITY, 0), (f32::NEG_INFINITY, 0));
-        for (i, (surface, likelihood)) in surfaces.iter().zip(likelihoods).enumerate() {
-            let score = PLACE * place.of(&surface.covers) + (likelihood - most).max(-MOST_EVIDENCE) + leads[i];
-            if score > first.0 {
-                second = first;
-                first = (score, i);
-            } else if score > second.0 {
-                second = (score, i);
-            }
-        }
-        let depth = |i: usize| surfaces[i].depth_at(&place).clamp(0.0, 1.0);
-        let lead = first.0 - second.0;
-        let depth_of_second = if lead < NEIGHBOURS { depth(second.1) } else { 0.0 };
-        (
-            depth(first.1),
-            Second {
-                depth: depth_of_second,
-                lead,
-            },
-        )
-    }
-
-    fn colour(&self, at: usize) -> [f32; 3] {
+    /// Returns the red, green and blue amplitudes of the pixels from `at` on.
+    #[inline(always)]
+    fn colours(&self, at: usize) -> [Lanes; 3] {
         let size = self.rgb.len() / 3;
-        [self.rgb[at], self.rgb[size + at], self.rgb[2 * size + at]]
+        let (red, others) = self.rgb.split_at(size);
+        let (green, blue) = others.split_at(size);
+        [load(red, at, 0.0), load(green, at, 0.0), load(blue, at, 0.0)]
     }
 
-    /// Returns the mean vote of the neighbours of the pixel (`y`, `x`), 1 for its `first` depth and −1 for its
-    /// `second`, or 1 at the border.
-    fn votes(&self, first: &[f32], second: f32, (y, x): (usize, usize), near: &[f32; SIDE * SIDE]) -> f32 {
+    /// Marks the pixels of line `y` that lose the vote of their neighbours as [`OUTVOTED`].
+    #[inline(always)]
+    fn vote(&self, first: &[f32], second: &[f32], y: usize, near: &[f32; SIDE * SIDE], lead: &mut [f32]) {
         let (width, height) = (self.x.cell.len(), self.y.cell.len());
-        if y < REACH || x < REACH || y + REACH >= height || x + REACH >= width {
-            return 1.0;
+        if y < REACH || y + REACH >= height {
+            return;
         }
-        let (own, colour) = (first[y * width + x], self.colour(y * width + x));
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for (dy, near) in near.chunks_exact(SIDE).enumerate() {
-            let start = (y + dy - REACH) * width + x - REACH;
-            for (i, near) in (start..start + SIDE).zip(near) {
-                let theirs = self.colour(i);
-                let [r, g, b] = [0, 1, 2].map(|c| theirs[c] - colour[c]);
-                let weight = near * quarter(r * r + g * g + b * b, ALIKE).max(LEAST_ALIKE);
-                let for_first = (first[i] - own).abs() <= (first[i] - second).abs();
-                sum += if for_first { weight } else { -weight };
-                weights += weight;
+        for (x, count) in self.edge_pixels(y) {
+            // Pixels at the border keep their depth.
+            let (x, count) = (
+                x.max(REACH),
+                (x + count).min(width - REACH).saturating_sub(x.max(REACH)),
+            );
+            if !lead[x..x + count].iter().any(|lead| *lead < NEIGHBOURS) {
+                continue;
             }
+            let votes = self.votes(first, &load(second, x, 0.0), y * width + x, near);
+            for (lead, vote) in lead[x..x + count].iter_mut().zip(votes) {
+                if *lead < NEIGHBOURS && *lead + NEIGHBOURS * vote <= 0.0 {
+                    *lead = OUTVOTED;
+                }
+            }
+        }
+    }
+
+    /// Gives the pixels of line `y` that were outvoted their `second` depth, and all at edges a share of their history.
+    #[inline(always)]
+    fn finish(
+        &self,
+        y: usize,
+        (second, lead): (&[f32], &[f32]),
+        line: &mut history::Line<&mut [f32], &mut [u8]>,
+        to: &mut [f32],
+    ) {
+        for (x, count) in self.edge_pixels(y) {
+            let (first, second, lead) = (load(to, x, 0.0), load(second, x, 0.0), load(lead, x, 0.0));
+            let depth = lanes(|i| if lead[i] == OUTVOTED { second[i] } else { first[i] });
+            let depth = line.follow((x, count), &self.colours(y * self.x.cell.len() + x), &depth);
+            store(&depth, &mut to[x..x + count]);
+        }
+    }
+
+    /// Returns the mean votes of the neighbours of the pixels from `at` on, 1 for their `first` depth and −1 for their
+    /// `second`.
+    #[inline(always)]
+    fn votes(&self, first: &[f32], second: &Lanes, at: usize, near: &[f32; SIDE * SIDE]) -> Lanes {
+        let width = self.x.cell.len();
+        let (own, colours) = (load(first, at, 0.0), self.colours(at));
+        let (mut sum, mut weights) = ([0.0; LANES], [0.0; LANES]);
+        for (k, near) in near.iter().enumerate() {
+            let i = at + (k / SIDE) * width + k % SIDE - REACH * width - REACH;
+            let (theirs, depth) = (self.colours(i), load(first, i, 0.0));
+            let weight = lanes(|i| {
+                let [r, g, b] = [
+                    theirs[0][i] - colours[0][i],
+                    theirs[1][i] - colours[1][i],
+                    theirs[2][i] - colours[2][i],
+                ];
+                near * quarter(r * r + g * g + b * b, ALIKE).max(LEAST_ALIKE)
+            });
+            sum = lanes(|i| {
+                let for_first = (depth[i] - own[i]).abs() <= (depth[i] - second[i]).abs();
+                sum[i] + if for_first { weight[i] } else { -weight[i] }
+            });
+            weights = lanes(|i| weights[i] + weight[i]);
         }
         // The pixel itself has no vote.
-        (sum - 1.0) / (weights - 1.0)
+        lanes(|i| (sum[i] - 1.0) / (weights[i] - 1.0))
     }
 }
 
+/// The pixels of a line at edges, up to [`LANES`] at a time: the first, and their number.
+struct EdgePixels<'a> {
+    kinds: &'a [Kind],
+    x: &'a AxisMap,
+    column: usize,
+    /// The pixels of the present run of readings at edges.
+    run: Range<usize>,
+}
+
+impl Iterator for EdgePixels<'_> {
+    type Item = (usize, usize);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, usize)> {
+        while self.run.is_empty() {
+            let rest = &self.kinds[self.column..];
+            let start = self.column + rest.iter().position(|kind| *kind != Kind::Inside)?;
+            let length = self.kinds[start..].iter().position(|kind| *kind == Kind::Inside);
+            self.column = length.map_or(self.kinds.len(), |length| start + length);
+            self.run = self.x.inside_all(start..self.column);
+        }
+        let (x, count) = (self.run.start, LANES.min(self.run.len()));
+        self.run.start += count;
+        Some((x, count))
+    }
+}
+
+/// Chooses among `surfaces` for pixels with earlier depths `held`, and returns the depth of the first and of the second
+/// surface, and the lead of the first.
+#[inline(always)]
+fn choose(surfaces: &[Surface], places: &Places, colours: &[Lanes; 3], held: &Lanes) -> [Lanes; 3] {
+    if let [surface] = surfaces {
+        return [surface.depth_at(places), [0.0; LANES], [f32::INFINITY; LANES]];
+    }
+    let mut likelihoods = [[0.0; LANES]; MOST];
+    let (mut most, mut nearest) = ([f32::NEG_INFINITY; LANES], [f32::INFINITY; LANES]);
+    for (surface, likelihood) in surfaces.iter().zip(&mut likelihoods) {
+        *likelihood = surface.likelihood(colours);
+        most = lanes(|i| {
+            if likelihood[i] > most[i] {
+                likelihood[i]
+            } else {
+                most[i]
+            }
+        });
+        let apart = lanes(|i| (surface.depth - held[i]).abs());
+        nearest = lanes(|i| if apart[i] < nearest[i] { apart[i] } else { nearest[i] });
+    }
+    let (mut first, mut second) = ([f32::NEG_INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let (mut depth, mut depth_of_second) = ([0.0; LANES], [0.0; LANES]);
+    for (surface, likelihood) in surfaces.iter().zip(&likelihoods) {
+        let covers = places.of(&surface.covers);
+        let leads = history::leads(surface.depth, held, &nearest);
+        let theirs = surface.depth_at(places);
+        let score = lanes(|i| {
+            let evidence = (likelihood[i] - most[i]).max(-MOST_EVIDENCE);
+            PLACE * covers[i] + evidence + leads[i]
+        });
+        // The former first surface, or this one, may be the second.
+        let lost = lanes(|i| if score[i] > first[i] { first[i] } else { score[i] });
+        let lost_depth = lanes(|i| if score[i] > first[i] { depth[i] } else { theirs[i] });
+        depth_of_second = lanes(|i| {
+            if score[i] > second[i] {
+                lost_depth[i]
+            } else {
+                depth_of_second[i]
+            }
+        });
+        second = lanes(|i| if score[i] > second[i] { lost[i] } else { second[i] });
+        depth = lanes(|i| if score[i] > first[i] { theirs[i] } else { depth[i] });
+        first = lanes(|i| if score[i] > first[i] { score[i] } else { first[i] });
+    }
+    [depth, depth_of_second, lanes(|i| first[i] - second[i])]
+}
+
 /// Returns a weight that falls from 1 to a quarter where `square` is that of `distance`.
+#[inline(always)]
 fn quarter(square: f32, distance: f32) -> f32 {
     let fall = 1.0 + square * (1.0 / (distance * distance));
     1.0 / (fall * fall)

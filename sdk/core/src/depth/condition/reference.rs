@@ -187,9 +187,9 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
                 near(column, k % 3, readings.dim().1),
             )
         });
-        let place = surfaces::Place::new(columns.offset(x), rows.offset(y));
+        let place = place_of(columns.offset(x), rows.offset(y));
         if clean || !kinds[(row, column)].0 {
-            let depth = place.of(&around.map(|at| readings[at]));
+            let depth = interpolated(&place, &around.map(|at| readings[at]));
             return (depth, 0.0, f64::INFINITY);
         }
         let rounds = around.map(|at| match kinds[at] {
@@ -210,7 +210,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
         let most = surfaces.iter().map(likelihood).fold(f64::NEG_INFINITY, f64::max);
         let mut scores: Vec<(f64, f32)> = (surfaces.iter())
             .map(|surface| {
-                let covered = f64::from(place.of(&surface.covers));
+                let covered = f64::from(interpolated(&place, &surface.covers));
                 let colour = (likelihood(surface) - most).max(-f64::from(pixels::MOST_EVIDENCE));
                 (f64::from(pixels::PLACE) * covered + colour, surface.depth_at(&place))
             })
@@ -464,13 +464,23 @@ impl Surface {
         }
     }
 
-    fn depth_at(&self, place: &surfaces::Place) -> f32 {
-        let known = place.of(&self.has);
+    fn depth_at(&self, place: &[f32; 9]) -> f32 {
+        let known = interpolated(place, &self.has);
         match known > 0.05 {
-            true => self.depth + place.of(&self.differences) / known,
+            true => self.depth + interpolated(place, &self.differences) / known,
             false => self.depth,
         }
     }
+}
+
+/// Returns the bilinear weights of 3×3 readings at the offset `dx`, `dy` from the middle one.
+fn place_of(dx: f32, dy: f32) -> [f32; 9] {
+    let weight = |offset: f32, k: usize| (1.0 - (offset - (k as f32 - 1.0)).abs()).max(0.0);
+    std::array::from_fn(|k| weight(dx, k % 3) * weight(dy, k / 3))
+}
+
+fn interpolated(place: &[f32; 9], values: &[f32; 9]) -> f32 {
+    place.iter().zip(values).map(|(weight, value)| weight * value).sum()
 }
 
 /// The colours of a reading's pixels.

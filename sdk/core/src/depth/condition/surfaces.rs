@@ -7,6 +7,7 @@
 
 use super::colour::Moments;
 use super::edges::Kind;
+use super::lanes::{Lanes, lanes};
 
 /// The largest difference between the readings of a surface and their mean, as a share of the volume.
 pub(super) const TOLERANCE: f32 = 0.03;
@@ -70,23 +71,27 @@ impl Surface {
         self.peak = -1.5 * libm::logf(variance);
     }
 
-    /// Returns the logarithm of the probability of a colour, plus a constant.
-    pub(super) fn likelihood(&self, colour: [f32; 3]) -> f32 {
-        let [r, g, b] = [
-            colour[0] - self.colour[0],
-            colour[1] - self.colour[1],
-            colour[2] - self.colour[2],
-        ];
-        (r * r + g * g + b * b) * self.narrow + self.peak
+    /// Returns the logarithms of the probabilities of `colours`, plus a constant.
+    #[inline(always)]
+    pub(super) fn likelihood(&self, colours: &[Lanes; 3]) -> Lanes {
+        lanes(|i| {
+            let [r, g, b] = [
+                colours[0][i] - self.colour[0],
+                colours[1][i] - self.colour[1],
+                colours[2][i] - self.colour[2],
+            ];
+            (r * r + g * g + b * b) * self.narrow + self.peak
+        })
     }
 
-    /// Returns the depth of the surface at a place.
-    pub(super) fn depth_at(&self, place: &Place) -> f32 {
-        let known = place.of(&self.has);
-        match known > 0.05 {
-            true => self.depth + place.of(&self.slopes) / known,
-            false => self.depth,
-        }
+    /// Returns the depth of the surface at places.
+    #[inline(always)]
+    pub(super) fn depth_at(&self, places: &Places) -> Lanes {
+        let (known, slopes) = (places.of(&self.has), places.of(&self.slopes));
+        lanes(|i| {
+            let slope = if known[i] > 0.05 { slopes[i] / known[i] } else { 0.0 };
+            (self.depth + slope).clamp(0.0, 1.0)
+        })
     }
 }
 
@@ -220,35 +225,40 @@ fn split(surfaces: &mut [Surface], at: usize, depth: f32) -> bool {
     true
 }
 
-/// A place among 3×3 readings, for bilinear interpolation.
-pub(super) struct Place {
-    /// The first of the four readings around it.
-    first: usize,
-    /// Their weights.
-    weights: [f32; 4],
+/// Places among 3×3 readings on one line, for bilinear interpolation.
+pub(super) struct Places {
+    /// The first of the two rows of readings around the line, and their weights.
+    row: usize,
+    rows: [f32; 2],
+    /// The weights of the three columns.
+    columns: [Lanes; 3],
 }
 
-impl Place {
-    /// Returns the place at the offset `dx`, `dy` from the middle reading, each −½..=½.
-    pub(super) fn new(dx: f32, dy: f32) -> Self {
-        let (left, right_share) = if dx < 0.0 { (0, 1.0 + dx) } else { (1, dx) };
-        let (top, bottom_share) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
-        let (left_share, top_share) = (1.0 - right_share, 1.0 - bottom_share);
-        Place {
-            first: 3 * top + left,
-            weights: [
-                top_share * left_share,
-                top_share * right_share,
-                bottom_share * left_share,
-                bottom_share * right_share,
+impl Places {
+    /// Returns the places at the offsets `dx`, `dy` from the middle reading, each −½..=½.
+    #[inline(always)]
+    pub(super) fn new(dx: &Lanes, dy: f32) -> Self {
+        let (row, below) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
+        Places {
+            row,
+            rows: [1.0 - below, below],
+            columns: [
+                lanes(|i| (-dx[i]).max(0.0)),
+                lanes(|i| 1.0 - dx[i].abs()),
+                lanes(|i| dx[i].max(0.0)),
             ],
         }
     }
 
     /// Interpolates `values` of the readings.
-    pub(super) fn of(&self, values: &[f32; 9]) -> f32 {
-        let [a, b, c, d] = self.weights;
-        let i = self.first;
-        a * values[i] + b * values[i + 1] + c * values[i + 3] + d * values[i + 4]
+    #[inline(always)]
+    pub(super) fn of(&self, values: &[f32; 9]) -> Lanes {
+        let [above, below] = self.rows;
+        let values = &values[3 * self.row..][..6];
+        let left = above * values[0] + below * values[3];
+        let middle = above * values[1] + below * values[4];
+        let right = above * values[2] + below * values[5];
+        let [l, m, r] = &self.columns;
+        lanes(|i| left * l[i] + middle * m[i] + right * r[i])
     }
 }
