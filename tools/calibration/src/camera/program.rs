@@ -90,9 +90,7 @@ impl CaptureProgram {
         // The processes that the program starts are ended with it.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut child = command
-            .spawn()
-            .map_err(|e| refuse(format!("cannot be started: {e}")))?;
+        let mut child = command.spawn().map_err(|e| refuse(format!("cannot be started: {e}")))?;
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(refuse("has no standard input and output".into()));
         };
