@@ -57,7 +57,7 @@ impl AxisMap {
     pub(super) fn inside_all(&self, cells: std::ops::Range<usize>) -> std::ops::Range<usize> {
         let mut inside = cells.map(|cell| self.inside(cell)).filter(|pixels| !pixels.is_empty());
         let first = inside.next().unwrap_or(0..0);
-        let end = inside.last().map_or(first.end, |last| last.end);
+        let end = inside.next_back().map_or(first.end, |last| last.end);
         first.start..end
     }
 

@@ -161,12 +161,12 @@ impl Decider<'_> {
             let (above, below, share) = self.y.beside(y);
             for row in [above, below] {
                 if held[row % 2] != row {
-                    let stretched = if row % 2 == 0 { &mut *even } else { &mut *odd };
+                    let stretched = if row.is_multiple_of(2) { &mut *even } else { &mut *odd };
                     self.stretch(&self.readings.depth[row * w..][..w], stretched);
                     held[row % 2] = row;
                 }
             }
-            let of = |row: usize| if row % 2 == 0 { &even[..] } else { &odd[..] };
+            let of = |row: usize| if row.is_multiple_of(2) { &even[..] } else { &odd[..] };
             for ((to, a), b) in to.iter_mut().zip(of(above)).zip(of(below)) {
                 *to = (a + share * (b - a)).clamp(0.0, 1.0);
             }
