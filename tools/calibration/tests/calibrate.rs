@@ -55,6 +55,7 @@ fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: usize)
 }
 
 #[test]
+#[ignore = "slow: 18 seconds of a core"]
 fn per_pixel_calibration_brings_phases_and_black_back() {
     let simulated = simulated();
     let curves = [0, 1, 2].map(|colour| measured(&simulated, colour));
@@ -185,6 +186,7 @@ fn bad_captures_are_told_one_by_one() {
 }
 
 #[test]
+#[ignore = "slow: 13 seconds of a core"]
 fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     let simulated = simulated();
     let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();

@@ -386,6 +386,7 @@ mod tests {
 
     /// Compares the sweep with its definition.
     #[test]
+    #[ignore = "slow: 12 seconds of a core in software"]
     fn the_sweep_is_its_oracle() {
         let depths: [fn(usize, usize) -> f32; 6] = [
             scene,

@@ -31,6 +31,7 @@ const LUT: [&str; 12] = [
 ];
 
 #[test]
+#[ignore = "slow: 20 seconds of a core"]
 fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     let folder = Folder::new();
     let rehearse = [

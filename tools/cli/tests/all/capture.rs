@@ -99,6 +99,7 @@ fn spoiled(folder: &Folder, source: &str, name: &str, change: impl Fn(&Photograp
 
 /// Bad photographs are asked for again, and a run that ends is resumed. The table is that of the rehearsal.
 #[test]
+#[ignore = "slow: 20 seconds of a core"]
 fn bad_photographs_are_asked_for_again_and_good_ones_once() {
     let folder = rehearsed(
         r#"6) cp dark.png "$photo" ;;
