@@ -1,29 +1,12 @@
-// Handles the page: dropped files, the camera, the slider. The worker owns the session.
+// Handles the page: dropped files, the camera, the slider, the screen of the hologram. A worker has the session.
+import { Frame, WorkerSession } from "./phasefront/worker.js";
+
 const at = (id) => document.getElementById(id);
 const DEPTH_MM = 6;
 const STEPS = Number(at("focus").max);
 
 const state = { focus: STEPS / 2, source: "", frames: 0, method: "rgbd-8", width: 640, localSteps: 1, backend: "cpu" };
 globalThis.state = state;
-
-const worker = new Worker("worker.js", { type: "module" });
-const waiting = new Map();
-let last = 0;
-worker.addEventListener("message", ({ data: { id, answer, error } }) => {
-  const { done, fail } = waiting.get(id);
-  waiting.delete(id);
-  if (error === undefined) done(answer);
-  else fail(new Error(error));
-});
-
-worker.addEventListener("error", () => say(new Error("the worker cannot start; is a file of the page missing?")));
-
-function ask(kind, said = {}) {
-  return new Promise((done, fail) => {
-    waiting.set(++last, { done, fail });
-    worker.postMessage({ id: last, kind, ...said });
-  });
-}
 
 function say(error) {
   at("wrong").hidden = !error;
@@ -58,44 +41,94 @@ function newest(fulfil) {
 
 const zOf = (focus) => (0.5 - focus / STEPS) * DEPTH_MM;
 
-function draw(id, width, height, pixels) {
+function draw(id, image) {
+  const { width, height } = image;
   const canvas = at(id).querySelector("canvas");
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   // Keep the controls in sight.
   canvas.style.maxWidth = `calc(72vh * ${width / height})`;
-  canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(pixels.buffer), width), 0, 0);
+  canvas.getContext("2d").putImageData(image, 0, 0);
 }
 
-let made;
+let session, planned, hologram, said;
+
+// The session of these options. A new one is made if they change.
+async function sessionOf({ method, localSteps, width, height, video, backend }) {
+  const wanted = JSON.stringify([method, localSteps, width, height, video, backend]);
+  if (wanted === planned) return;
+  session?.close();
+  session = planned = hologram = undefined;
+  const options = {
+    target: { width, height },
+    method: method === "sweep" ? { kind: "sweep" } : { kind: "trained", network: method },
+    localSteps,
+    backend,
+  };
+  session = await WorkerSession.open(options, video ? "video" : "image");
+  await session.warmUp();
+  planned = wanted;
+}
+
+// Returns how often it was called for `calls` in the last second.
+function rate(calls) {
+  const now = performance.now();
+  calls.push(now);
+  while (calls[0] < now - 1000) calls.shift();
+  return calls.length;
+}
+
+const frameTimes = [];
+const viewTimes = [];
 async function look() {
-  if (!state.frames) return;
+  const mine = hologram;
+  if (!mine) return;
   const zMm = zOf(state.focus);
   at("focus").value = state.focus;
   at("z").textContent = `${zMm < 0 ? "−" : "+"}${Math.abs(zMm).toFixed(2)} mm`;
-  const { ms, width, height, pixels } = await ask("view", { zMm });
-  draw("shown", width, height, pixels);
-  const { times } = made;
+  const { width, height, times } = mine.info;
+  const start = performance.now();
+  let seen;
+  try {
+    seen = await mine.preview(zMm, width, height);
+  } catch (error) {
+    // A newer hologram has replaced it, and is looked at next.
+    if (mine !== hologram) return;
+    throw error;
+  }
+  draw("shown", seen);
   at("times").textContent =
-    `${made.width}×${made.height} in ${made.ms.toFixed(0)} ms: method ${times.methodMs.toFixed(0)}, ` +
+    `${width}×${height} in ${said.ms.toFixed(0)} ms: method ${times.methodMs.toFixed(0)}, ` +
     `encoding ${times.encodeMs.toFixed(0)}, depth and colour ${(times.depthMs + times.colourMs).toFixed(0)}; ` +
-    `this view ${ms.toFixed(0)} ms; ${made.backend || "plane sweep"}` +
-    (state.backend === "webgpu" ? `: ${made.backendWhy}` : "");
+    `this view ${(performance.now() - start).toFixed(0)} ms; ` +
+    `in the last second ${said.rate} holograms, ${rate(viewTimes)} views`;
 }
-const view = newest(look);
+
+// Views are not computed more often than the display shows them.
+const view = newest(async () => {
+  await look();
+  await new Promise(requestAnimationFrame);
+});
 
 let picture, stream;
 async function show() {
   if (!picture) return;
   const { method, localSteps, width, backend } = state;
   const height = Math.round((width * picture.depth.height) / picture.depth.width);
-  const options = { method, localSteps, width, height, video: Boolean(stream), backend };
+  await sessionOf({ method, localSteps, width, height, video: Boolean(stream), backend });
   const colour = pixels(picture.colour, width, height, true);
   // Depth is not interpolated, because a mean of two depths lies on neither surface.
   const depth = pixels(picture.depth, width, height, false);
   if (at("white").checked) depth.data = depth.data.map((value) => 255 - value);
-  const timestampNs = BigInt(Math.round(performance.now() * 1e6));
-  made = await ask("frame", { options, colour, depth, timestampNs });
-  draw("phases", made.width, made.height, made.levels);
+  const start = performance.now();
+  const frame = new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestamp: start * 1000 });
+  const made = await session.process(frame, { transfer: [colour.data.buffer] });
+  said = { ms: performance.now() - start, rate: rate(frameTimes) };
+  hologram?.close();
+  hologram = made;
+  const size = await made.outputSize("rgba");
+  draw("phases", new ImageData(await made.output({ layout: "rgba" }), size.width));
+  const { backend: name, backendWhy } = await session.statistics();
+  at("computed").textContent = backend === "webgpu" ? `${name}: ${backendWhy}` : name;
   state.frames++;
   await look();
 }
@@ -191,23 +224,48 @@ function focus(to) {
   return view();
 }
 
-let sweep = 0;
+let sweep;
 function stop() {
-  clearInterval(sweep);
-  sweep = 0;
+  sweep = undefined;
   at("play").setAttribute("aria-pressed", "false");
 }
 
-function play() {
+// Moves the focus there and back, from one end to the other in 3.6 seconds.
+async function play() {
   const was = sweep;
   stop();
   if (was) return;
-  let step = 1;
+  const mine = (sweep = {});
   at("play").setAttribute("aria-pressed", "true");
-  sweep = setInterval(() => {
-    if (state.focus + step < 0 || state.focus + step > STEPS) step = -step;
-    focus(state.focus + step);
-  }, 60);
+  let direction = STEPS / 3600;
+  let last = await new Promise(requestAnimationFrame);
+  while (sweep === mine) {
+    const now = await new Promise(requestAnimationFrame);
+    if (state.focus <= 0) direction = Math.abs(direction);
+    if (state.focus >= STEPS) direction = -Math.abs(direction);
+    focus(state.focus + direction * (now - last));
+    last = now;
+  }
+}
+
+// The screens of the computer, once the browser may tell them.
+let screens = [];
+async function findScreens() {
+  ({ screens } = await getScreenDetails());
+  at("screen").replaceChildren(
+    ...screens.map(({ label, width, height }, i) => new Option(`${label || `Screen ${i + 1}`}, ${width}×${height}`, i)),
+  );
+  at("screen").parentElement.hidden = false;
+  const other = screens.findIndex(({ isPrimary }) => !isPrimary);
+  at("screen").value = Math.max(other, 0);
+}
+
+// Shows the hologram on the whole screen, one pixel of it on one of the screen.
+async function fullScreen() {
+  const screen = screens[at("screen").value];
+  await at("stage").requestFullscreen({ navigationUI: "hide", ...(screen && { screen }) });
+  const canvas = at("stage").querySelector("canvas");
+  at("stage").style.setProperty("--width", `${canvas.width / devicePixelRatio}px`);
 }
 
 at("focus").addEventListener("input", () => {
@@ -215,6 +273,9 @@ at("focus").addEventListener("input", () => {
   focus(Number(at("focus").value));
 });
 at("play").addEventListener("click", play);
+at("full").addEventListener("click", () => fullScreen().catch(say));
+at("screens").hidden = !("getScreenDetails" in globalThis);
+at("screens").addEventListener("click", () => findScreens().catch(say));
 at("sample").addEventListener("click", sample);
 at("camera").addEventListener("click", camera);
 at("white").addEventListener("change", () => refresh());
@@ -229,10 +290,8 @@ at("shown")
   .querySelector("canvas")
   .addEventListener("click", async (event) => {
     const box = event.currentTarget.getBoundingClientRect();
-    const { zMm } = await ask("focus", {
-      x: (event.clientX - box.left) / box.width,
-      y: (event.clientY - box.top) / box.height,
-    });
+    const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+    const zMm = await hologram.zAt(x, y);
     stop();
     focus(Math.round((0.5 - zMm / DEPTH_MM) * STEPS));
   });
@@ -278,6 +337,4 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
 });
 
-work(1);
-await ask("load").then(sample, say);
-work(-1);
+await sample();

@@ -76,12 +76,15 @@ impl RawFrame {
         let matrix = if bt709 { YuvMatrix::Bt709 } else { YuvMatrix::Bt601 };
         let yuv = YuvEncoding { matrix, video_range };
         let colour_format = match format {
-            "rgba" => ColourFormat::Rgba,
-            "bgra" => ColourFormat::Bgra,
-            "rgb" => ColourFormat::Rgb,
-            "nv12" => ColourFormat::Nv12(yuv),
-            "yuv420" => ColourFormat::Yuv420(yuv),
-            other => return Err(unknown("colour format", other, "rgba, bgra, rgb, nv12, yuv420")),
+            "RGBA" | "RGBX" => ColourFormat::Rgba,
+            "BGRA" | "BGRX" => ColourFormat::Bgra,
+            "RGB" => ColourFormat::Rgb,
+            "NV12" => ColourFormat::Nv12(yuv),
+            "I420" => ColourFormat::Yuv420(yuv),
+            other => {
+                let known = "RGBA, RGBX, BGRA, BGRX, RGB, NV12, I420";
+                return Err(unknown("colour format", other, known));
+            }
         };
         Ok(RawFrame {
             timestamp_ns,

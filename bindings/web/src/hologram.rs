@@ -34,7 +34,7 @@ impl RawHologram {
         let (height, width) = self.core.shape();
         let range = self.core.range_m().map(|(near, far)| [near, far].map(JsValue::from));
         object([
-            ("timestampNs", self.core.timestamp_ns().into()),
+            ("timestamp", (self.core.timestamp_ns() as f64 / 1e3).into()),
             ("width", width.into()),
             ("height", height.into()),
             ("colours", self.core.colours().into()),

@@ -56,8 +56,8 @@ export async function run() {
     const pose = { rotation: [1], translationM: [] };
     session.process(new Frame(colour(), depth(), { cameras: { colour: camera, depth: camera, pose } }));
   });
-  video.process(new Frame(colour(), depth(), { timestampNs: 9n })).close();
-  refused("timestamp", "", () => video.process(new Frame(colour(), depth(), { timestampNs: 8n })));
+  video.process(new Frame(colour(), depth(), { timestamp: 9 })).close();
+  refused("timestamp", "", () => video.process(new Frame(colour(), depth(), { timestamp: 8 })));
 
   const hologram = session.process(new Frame(colour(), depth()));
   const view = new ImageData(10, 8);

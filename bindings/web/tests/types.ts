@@ -15,7 +15,7 @@ export async function show(context: CanvasRenderingContext2D, metres: Float32Arr
   const frame = new Frame(
     context.getImageData(0, 0, 640, 480),
     { width: 160, height: 120, data: metres },
-    { timestampNs: 1n },
+    { timestamp: 1 },
   );
   const hologram = session.process(frame);
   const near: number | undefined = hologram.info.rangeM?.[0];

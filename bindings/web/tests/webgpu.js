@@ -14,7 +14,7 @@ function frame(width, height, time = 0) {
       depth[at] = 600 + (((x >> 3) * 409 + (y >> 3) * 57 + 40 * time) % 900);
     }
   }
-  return new Frame({ width, height, data }, { width, height, data: depth }, { timestampNs: BigInt(1 + time) * 33000000n });
+  return new Frame({ width, height, data }, { width, height, data: depth }, { timestamp: (1 + time) * 33000 });
 }
 
 /** Returns the mean of |exp(iφ) − exp(iφ')| for the levels of two holograms in equal phase steps. */

@@ -1,8 +1,5 @@
-import { PhasefrontError, bytesOf, guard, release, whole } from "./error.js";
-import { RawFrame } from "./raw/phasefront_web.js";
-
-/** The memory layout of a colour image. `nv12` has two planes, `yuv420` three, the others one. */
-export type ColourFormat = "rgba" | "bgra" | "rgb" | "nv12" | "yuv420";
+/** The memory layout of a colour image, by the names of WebCodecs and `RGB`. */
+export type ColourFormat = PackedColour["format"] | PlanarColour["format"];
 
 /**
  * The meaning of a depth image's numbers: metres, inverse metres, millimetres, Android's DEPTH16; normalized, where 0 is
@@ -39,21 +36,22 @@ export interface Plane {
 export interface PackedColour extends Plane {
   readonly width: number;
   readonly height: number;
-  /** The layout; `rgba` by default. */
-  readonly format?: "rgba" | "bgra" | "rgb";
+  /** The layout; `RGBA` by default. */
+  readonly format?: "RGBA" | "RGBX" | "BGRA" | "BGRX" | "RGB";
 }
 
-/** A colour image of luma and chroma, as in a `VideoFrame`. */
+/** A colour image of luma and chroma, as a decoder makes it: `NV12` has two planes, `I420` three. */
 export interface PlanarColour {
   readonly width: number;
   readonly height: number;
-  readonly format: "nv12" | "yuv420";
+  readonly format: "NV12" | "I420";
   /** The planes in the order of the format. */
   readonly planes: readonly Plane[];
-  /** The matrix that converts luma and chroma to colour; `bt601` by default. */
-  readonly matrix?: "bt601" | "bt709";
-  /** Whether luma ranges from 16 to 235 instead of 0 to 255. */
-  readonly videoRange?: boolean;
+  /**
+   * The matrix that converts luma and chroma to colour, `smpte170m` by default (that of BT.601, as `bt470bg`), or `bt709`;
+   * and whether luma ranges from 0 to 255, as by default, or from 16 to 235.
+   */
+  readonly colorSpace?: Pick<VideoColorSpaceInit, "matrix" | "fullRange">;
 }
 
 /** A depth image. A grey picture in an `ImageData` is a depth image with `pixelStride: 4`. */
@@ -99,96 +97,26 @@ export interface Cameras {
 
 /** The optional properties of a frame. */
 export interface FrameOptions {
-  /** The capture time in nanoseconds of any monotonic clock. Image sessions ignore it. */
-  readonly timestampNs?: bigint;
+  /**
+   * The capture time in microseconds of any monotonic clock; by default that of a `VideoFrame`. Image sessions ignore it.
+   */
+  readonly timestamp?: number;
   readonly confidence?: ConfidenceImage;
-  /** The orientation; upright by default. */
+  /** The orientation; by default upright, or that of a `VideoFrame`. It is that of the colour and of the depth. */
   readonly orientation?: Orientation;
   /** The cameras, if colour and depth have different fields of view. */
   readonly cameras?: Cameras;
 }
 
-const COLOUR_BYTES = { rgba: [4], bgra: [4], rgb: [3], nv12: [1, 2], yuv420: [1, 1, 1] } as const;
-const CONFIDENCE_BYTES = 1;
-
-function depthBytes(format: DepthFormat): number {
-  return format.endsWith("f32") ? 4 : format.endsWith("u8") ? 1 : 2;
-}
-
-function depthFormat(depth: DepthImage): DepthFormat {
-  if (depth.format !== undefined) return depth.format;
-  if (depth.data instanceof Float32Array) return "metres-f32";
-  if (depth.data instanceof Uint16Array) return "millimetres-u16";
-  if (depth.data instanceof Uint8Array || depth.data instanceof Uint8ClampedArray) return "normalized-u8";
-  throw new PhasefrontError(
-    "frame",
-    "frame: depth is no Float32Array (metres), Uint16Array (millimetres) or Uint8Array (normalized); say its format",
-  );
-}
-
-/** Returns the bytes and strides of a plane of `width` pixels of `pixel` bytes. */
-function strides(what: string, plane: Plane, width: number, pixel: number): [Uint8Array, number, number] {
-  const pixelStride = whole(`frame: the pixel stride of ${what}`, plane.pixelStride ?? pixel, "frame");
-  const rowStride = whole(`frame: the row stride of ${what}`, plane.rowStride ?? width * pixelStride, "frame");
-  return [bytesOf(`frame: ${what}`, plane.data, "frame"), rowStride, pixelStride];
-}
-
-function size(what: string, image: { readonly width: number; readonly height: number }): [number, number] {
-  return [
-    whole(`frame: the width of ${what}`, image.width, "frame"),
-    whole(`frame: the height of ${what}`, image.height, "frame"),
-  ];
-}
-
-/** The colour and depth of one moment. Arrays are read when a session processes the frame. */
+/** The colour and depth of one moment. Images are read when a session processes the frame. */
 export class Frame {
+  /**
+   * `colour` may be a `VideoFrame` of a camera or a decoder, or an `ImageBitmap`; the caller closes it after the session
+   * has processed the frame. Only asynchronous calls take a `VideoFrame`.
+   */
   constructor(
-    readonly colour: PackedColour | PlanarColour,
+    readonly colour: PackedColour | PlanarColour | VideoFrame | ImageBitmap,
     readonly depth: DepthImage,
     readonly options: FrameOptions = {},
   ) {}
-
-  /** @internal Copies the frame into the module's memory. The caller frees it. */
-  toRaw(): RawFrame {
-    const { colour, depth, options } = this;
-    const format: ColourFormat = colour.format ?? "rgba";
-    const planes = "planes" in colour ? colour.planes : [colour];
-    const pixels = COLOUR_BYTES[format] ?? [];
-    const [width, height] = size("colour", colour);
-    const [matrix, videoRange] =
-      "planes" in colour ? [colour.matrix ?? "bt601", colour.videoRange ?? false] : ["bt601", false];
-    const raw = guard(
-      () => new RawFrame(options.timestampNs ?? 0n, format, width, height, matrix === "bt709", videoRange),
-    );
-    try {
-      planes.forEach((plane, index) => {
-        const across = index === 0 ? width : Math.ceil(width / 2);
-        const parts = strides("colour", plane, across, pixels[index] ?? 1);
-        guard(() => raw.colourPlane(...parts));
-      });
-      const of = depthFormat(depth);
-      const parts = strides("depth", depth, depth.width, depthBytes(of));
-      guard(() => raw.depth(of, ...size("depth", depth), ...parts));
-      this.describe(raw);
-    } catch (error) {
-      release(raw);
-      throw error;
-    }
-    return raw;
-  }
-
-  private describe(raw: RawFrame): void {
-    const { confidence, orientation, cameras } = this.options;
-    if (confidence) {
-      const parts = strides("confidence", confidence, confidence.width, CONFIDENCE_BYTES);
-      guard(() => raw.confidence(confidence.format ?? "u8", ...size("confidence", confidence), ...parts));
-    }
-    if (orientation) guard(() => raw.orientation(orientation.degrees, orientation.mirrored ?? false));
-    if (cameras) {
-      const of = ({ fx, fy, cx, cy }: Intrinsics) => [fx, fy, cx, cy];
-      const pose = cameras.pose ? [...cameras.pose.rotation, ...cameras.pose.translationM] : [];
-      const numbers = Float64Array.of(...of(cameras.colour), ...of(cameras.depth), ...pose);
-      guard(() => raw.cameras(numbers));
-    }
-  }
 }

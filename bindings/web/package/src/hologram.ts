@@ -1,3 +1,4 @@
+/// <reference lib="esnext.disposable" preserve="true" />
 import { PhasefrontError, bytesOf, guard, release, whole } from "./error.js";
 import type { RawHologram } from "./raw/phasefront_web.js";
 
@@ -16,8 +17,8 @@ export interface FrameTimes {
 
 /** The metadata of a hologram. */
 export interface HologramInfo {
-  /** The timestamp of the frame. */
-  readonly timestampNs: bigint;
+  /** The timestamp of the frame in microseconds. */
+  readonly timestamp: number;
   readonly width: number;
   readonly height: number;
   /** The number of colours of the levels, C: 3, or 1 with one laser. */
@@ -170,6 +171,11 @@ export class Hologram {
   close(): void {
     release(this.#raw);
     this.#raw = undefined;
+  }
+
+  /** Does as {@link close} does, where a `using` declaration goes out of scope. */
+  [Symbol.dispose](): void {
+    this.close();
   }
 
   /** @internal */

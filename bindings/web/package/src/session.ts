@@ -1,7 +1,9 @@
+/// <reference lib="esnext.disposable" preserve="true" />
 import { PhasefrontError, guard, guardAsync, release, whole } from "./error.js";
 import type { Frame } from "./frame.js";
 import { Hologram, type FrameTimes } from "./hologram.js";
 import type { Network } from "./network.js";
+import { rawFrame, rawFrameAsync } from "./raw-frame.js";
 import { RawMethod, RawOptions, RawSession } from "./raw/phasefront_web.js";
 import { Target, type Display } from "./target.js";
 
@@ -15,17 +17,17 @@ export type RunningMode = "image" | "video";
  * The method that computes holograms: a trained network; the plane sweep, for any display; or an automatic choice by
  * each frame's depth.
  */
-export type Method =
-  | { readonly kind: "trained"; readonly network: Network }
+export type Method<N = Network> =
+  | { readonly kind: "trained"; readonly network: N }
   | { readonly kind: "sweep" }
-  | { readonly kind: "auto"; readonly network: Network };
+  | { readonly kind: "auto"; readonly network: N };
 
 /** The encoding of the field as phases. Omitted values are those of the publication. */
-export type Encoding =
+export type Encoding<N = Network> =
   | { readonly kind: "double-phase" }
   | { readonly kind: "anti-alias"; readonly sigma?: number; readonly width?: number }
   | { readonly kind: "band-limit"; readonly k?: number }
-  | { readonly kind: "deep"; readonly prefilter: Network };
+  | { readonly kind: "deep"; readonly prefilter: N };
 
 /**
  * The amplitude that full light represents: near the frame's largest and smoothed over time; the frame's largest; or a
@@ -38,8 +40,8 @@ export type Brightness =
 export type Quality = { readonly kind: "adaptive" } | { readonly kind: "fixed"; readonly qualityLevel: number };
 
 /** A quality level. A hologram smaller than the modulator is displayed in its centre. */
-export interface QualityLevel {
-  readonly method: Method;
+export interface QualityLevel<N = Network> {
+  readonly method: Method<N>;
   readonly width: number;
   readonly height: number;
   /** The session's value by default. */
@@ -48,14 +50,14 @@ export interface QualityLevel {
   readonly midpointSteps?: number;
 }
 
-/** The options of a session. Omitted options have their defaults. */
-export interface SessionOptions {
+/** The options of a session. Omitted options have their defaults. `N` are its networks, `T` is its target. */
+export interface SessionOptions<N = Network, T = Target | Display> {
   /** The target of the holograms; the paper's display by default. */
-  readonly target?: Target | Display;
+  readonly target?: T;
   /** The method; by default the built-in network if it was trained for the display, otherwise the plane sweep. */
-  readonly method?: Method;
+  readonly method?: Method<N>;
   /** The quality levels, best first; by default only `method` at the modulator's resolution. */
-  readonly qualityLevels?: readonly QualityLevel[];
+  readonly qualityLevels?: readonly QualityLevel<N>[];
   /** The choice of the quality level; `adaptive` by default. */
   readonly quality?: Quality;
   /**
@@ -64,7 +66,7 @@ export interface SessionOptions {
    */
   readonly targetRateHz?: number;
   /** The encoding; `anti-alias` by default. */
-  readonly encoding?: Encoding;
+  readonly encoding?: Encoding<N>;
   /** The brightness; `smoothed` by default. */
   readonly brightness?: Brightness;
   /** The share of full light below which phases are pulled to 0; by default that of the encoding. */
@@ -212,7 +214,7 @@ export class Session {
   processAsync(frame: Frame): Promise<Hologram> {
     const compute = async () => {
       const session = this.#open();
-      const raw = frame.toRaw();
+      const raw = await rawFrameAsync(frame);
       try {
         return Hologram.of(await guardAsync(() => session.processAsync(raw)));
       } finally {
@@ -232,7 +234,7 @@ export class Session {
    */
   process(frame: Frame): Hologram {
     const session = this.#openNow();
-    const raw = frame.toRaw();
+    const raw = rawFrame(frame);
     try {
       return Hologram.of(guard(() => session.process(raw)));
     } finally {
@@ -280,6 +282,11 @@ export class Session {
     this.#raw = undefined;
     if (this.#waiting) void this.#waiting.then(() => release(raw));
     else release(raw);
+  }
+
+  /** Does as {@link close} does, where a `using` declaration goes out of scope. */
+  [Symbol.dispose](): void {
+    this.close();
   }
 
   #openNow(): RawSession {
