@@ -3,3 +3,4 @@
 pub(crate) mod neon;
 pub(crate) mod neon_dotprod;
 pub(crate) mod neon_i8mm;
+pub(crate) mod winograd;

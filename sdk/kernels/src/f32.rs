@@ -5,7 +5,7 @@
 //! they fuse products into sums, so they agree to rounding and not bit for bit.
 
 use crate::rows::Rows;
-use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
+use crate::wavefront::{self, Chain, Geometry, LastRows, Scratch, Slots, SlotsMut, SourceRow, Tiling};
 use crate::{Isa, OUTPUTS};
 
 /// One layer.
@@ -191,6 +191,10 @@ impl Chain for F32Chain {
         self.layers.len() + 1
     }
 
+    fn step(&self) -> usize {
+        1
+    }
+
     fn side(&self) -> usize {
         self.side
     }
@@ -215,19 +219,20 @@ impl Chain for F32Chain {
         copy_rows(source, &mut out[self.layers[0].outputs * geometry.stride()..], geometry);
     }
 
-    fn hidden_row(&self, i: usize, window: Window<'_, f32>, skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
-        (self.kernels.hidden_row)(&self.layers[i], &window.rows(), skip, out, geometry);
-    }
-
-    fn last_row(
+    fn hidden_rows(
         &self,
-        pixel: usize,
-        window: Window<'_, f32>,
-        out: [&mut [f32]; OUTPUTS],
-        from: usize,
+        i: usize,
+        rows: Slots<'_, f32>,
+        skip: Option<Slots<'_, f32>>,
+        mut out: SlotsMut<'_, f32>,
         geometry: Geometry,
     ) {
-        (self.kernels.last_row)(&self.last[pixel], &window.rows(), out, from, geometry);
+        let skip = skip.map(|skip| skip.rows::<1>()[0]);
+        (self.kernels.hidden_row)(&self.layers[i], &rows.rows(), skip, out.row_mut(0), geometry);
+    }
+
+    fn last_rows(&self, pixel: usize, rows: Slots<'_, f32>, mut out: LastRows<'_>, from: usize, geometry: Geometry) {
+        (self.kernels.last_row)(&self.last[pixel], &rows.rows(), out.planes(0), from, geometry);
     }
 }
 

@@ -16,7 +16,8 @@
 //! group.
 
 use crate::rows::Rows;
-use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
+use crate::wavefront::{self, Chain, Geometry, LastRows, Scratch, Slots, SlotsMut, SourceRow, Tiling};
+use crate::winograd;
 use crate::{Isa, OUTPUTS};
 
 /// The channels of a group, which are adjacent in memory.
@@ -106,9 +107,13 @@ impl Packed {
     /// Packs a layer for `kernels`. `next_zero` represents 0 in the input of the next layer.
     fn new(taps: &Taps<'_>, next_zero: u8, kernels: &Kernels) -> Packed {
         let layer = taps.layer;
+        let (offset, weights) = match &kernels.layers {
+            LayerKernels::Rows(rows) => (rows.offset, (rows.pack)(taps)),
+            LayerKernels::Tiles(tiles) => (0, winograd::pack(taps, tiles.filters)),
+        };
         let of_filter = |(w, b): (&[i8], &i32)| {
             let weights: i32 = w.iter().map(|&w| i32::from(w)).sum();
-            b + (kernels.offset - i32::from(layer.zero_point)) * weights
+            b + (offset - i32::from(layer.zero_point)) * weights
         };
         let filters = layer.kernel.chunks_exact(layer.inputs * 9);
         let mut bias: Vec<i32> = filters.zip(&layer.bias).map(of_filter).collect();
@@ -126,7 +131,7 @@ impl Packed {
                 Some(_) => 0,
                 None => next_zero,
             },
-            weights: (kernels.pack)(taps),
+            weights,
         }
     }
 }
@@ -183,36 +188,37 @@ impl Taps<'_> {
         }
         words
     }
-
-    /// Returns each of [`Self::dot_words`] as two words of two 16-bit weights: the even channels, then the odd ones.
-    #[cfg(target_arch = "wasm32")]
-    pub(crate) fn pair_words(&self, sizes: &[usize]) -> Vec<i32> {
-        let pair = |low: i8, high: i8| i32::from(low) & 0xffff | i32::from(high) << 16;
-        let dots = self.dot_words(sizes);
-        dots.iter()
-            .flat_map(|word| {
-                let [a, b, c, d] = word.to_le_bytes().map(|w| w as i8);
-                [pair(a, c), pair(b, d)]
-            })
-            .collect()
-    }
 }
 
 /// The kernels of an instruction set.
 #[derive(Clone, Copy)]
-#[allow(clippy::type_complexity)]
 pub(crate) struct Kernels {
-    pub(crate) pack: fn(&Taps<'_>) -> Vec<i32>,
-    /// Computes a row of a hidden layer: layer, three rows, the skip's row, the row of features to write.
-    pub(crate) hidden_row: fn(&Packed, Window<'_, u8>, Option<&[u8]>, &mut [u8], Geometry),
-    /// Computes a row of the last layer: layer, three rows, the output planes' rows, the first pixel to compute.
-    pub(crate) last_row: fn(&Packed, Window<'_, u8>, [&mut [f32]; OUTPUTS], usize, Geometry),
-    /// The offset that these kernels subtract from the activations on loading. The biases compensate for it.
-    pub(crate) offset: i32,
+    pub(crate) layers: LayerKernels,
     /// [`quantise_row`], compiled for the instruction set.
     pub(crate) quantise_row: fn(SourceRow<'_>, Rounding, &mut [u8], Geometry),
     /// [`rescale_row`], compiled for the instruction set.
     pub(crate) rescale_row: fn(&mut [u8], f32, u8, Geometry),
+}
+
+/// The kernels that compute layers.
+#[derive(Clone, Copy)]
+pub(crate) enum LayerKernels {
+    Rows(RowKernels),
+    #[allow(dead_code, reason = "some processors have no kernels for tiles")]
+    Tiles(winograd::Kernels),
+}
+
+/// The kernels that compute layers row by row.
+#[derive(Clone, Copy)]
+#[allow(clippy::type_complexity)]
+pub(crate) struct RowKernels {
+    pub(crate) pack: fn(&Taps<'_>) -> Vec<i32>,
+    /// Computes a row of a hidden layer: layer, three rows, the skip's row, the row of features to write.
+    pub(crate) hidden_row: fn(&Packed, Slots<'_, u8>, Option<&[u8]>, &mut [u8], Geometry),
+    /// Computes a row of the last layer: layer, three rows, the output planes' rows, the first pixel to compute.
+    pub(crate) last_row: fn(&Packed, Slots<'_, u8>, [&mut [f32]; OUTPUTS], usize, Geometry),
+    /// The offset that these kernels subtract from the activations on loading. The biases compensate for it.
+    pub(crate) offset: i32,
 }
 
 /// The conversion of `channels` input channels to u8, rounded to `to`, after a rounding to `before` if there is one.
@@ -232,6 +238,8 @@ fn kernels(isa: Isa) -> Option<Kernels> {
         Isa::Avx512Vnni => crate::x86::avx512_vnni::kernels(),
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => crate::x86::avx2::int8_kernels(),
+        #[cfg(target_arch = "aarch64")]
+        Isa::Neon => Some(crate::arm::winograd::INT8),
         #[cfg(target_arch = "aarch64")]
         Isa::NeonDotprod => crate::arm::neon_dotprod::kernels(),
         #[cfg(target_arch = "aarch64")]
@@ -395,9 +403,10 @@ fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
     }
     for (o, (&bias, &multiplier)) in layer.bias.iter().zip(&layer.multiplier).enumerate() {
         let weights = &layer.kernel[o * per_filter..][..per_filter];
-        let reach: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum::<i64>() + 2 * i64::from(bias).abs();
-        if 2 * reach > i64::from(i32::MAX) {
-            return Err(format!("sums of filter {o} do not fit 32 bits"));
+        let products: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum();
+        let reach = products + 2 * i64::from(bias).abs();
+        if products >= winograd::LARGEST || 2 * reach > i64::from(i32::MAX) {
+            return Err(format!("sums of filter {o} are too large"));
         }
         let normal = multiplier.is_normal() && multiplier > 0.0;
         if !normal || (!is_last && 2.0 * reach as f64 * f64::from(multiplier) > LARGEST) {
@@ -429,6 +438,13 @@ impl Chain for Int8Chain {
 
     fn layers(&self) -> usize {
         self.layers.len() + 1
+    }
+
+    fn step(&self) -> usize {
+        match self.kernels.layers {
+            LayerKernels::Rows(_) => 1,
+            LayerKernels::Tiles(_) => winograd::SIDE,
+        }
     }
 
     fn side(&self) -> usize {
@@ -471,19 +487,32 @@ impl Chain for Int8Chain {
         (self.kernels.quantise_row)(source, rounding, out, geometry);
     }
 
-    fn hidden_row(&self, i: usize, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-        (self.kernels.hidden_row)(&self.layers[i], window, skip, out, geometry);
-    }
-
-    fn last_row(
+    fn hidden_rows(
         &self,
-        pixel: usize,
-        window: Window<'_, u8>,
-        out: [&mut [f32]; OUTPUTS],
-        from: usize,
+        i: usize,
+        rows: Slots<'_, u8>,
+        skip: Option<Slots<'_, u8>>,
+        mut out: SlotsMut<'_, u8>,
         geometry: Geometry,
     ) {
-        (self.kernels.last_row)(&self.last[pixel], window, out, from, geometry);
+        let layer = &self.layers[i];
+        match &self.kernels.layers {
+            LayerKernels::Rows(kernels) => {
+                let skip = skip.map(|skip| skip.rows::<1>()[0]);
+                (kernels.hidden_row)(layer, rows, skip, out.row_mut(0), geometry);
+            }
+            LayerKernels::Tiles(kernels) => {
+                (kernels.hidden_rows)(layer, &rows.rows(), skip.map(|skip| skip.rows()), out, geometry);
+            }
+        }
+    }
+
+    fn last_rows(&self, pixel: usize, rows: Slots<'_, u8>, mut out: LastRows<'_>, from: usize, geometry: Geometry) {
+        let layer = &self.last[pixel];
+        match &self.kernels.layers {
+            LayerKernels::Rows(kernels) => (kernels.last_row)(layer, rows, out.planes(0), from, geometry),
+            LayerKernels::Tiles(kernels) => (kernels.last_rows)(layer, &rows.rows(), out, from, geometry),
+        }
     }
 }
 

@@ -12,6 +12,9 @@
 //!
 //! [`fir`] is separate: it is the filter that propagates a wave from plane to plane.
 //!
+//! On some instruction sets the hidden layers of the int8 chain run in tiles of 4×4 outputs, which takes a quarter of
+//! the products and gives the same bits (`winograd`).
+//!
 //! A chain may run at half the resolution. Its last layer then has an output for each of a square's four pixels
 //! (`places`).
 //!
@@ -28,6 +31,15 @@ mod rows;
 mod tiles;
 mod wavefront;
 mod wide;
+#[cfg_attr(
+    not(any(
+        target_arch = "x86_64",
+        target_arch = "aarch64",
+        all(target_arch = "wasm32", target_feature = "simd128")
+    )),
+    allow(dead_code)
+)]
+mod winograd;
 
 mod portable;
 

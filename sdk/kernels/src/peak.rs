@@ -17,6 +17,8 @@ const ROUNDS: u64 = 10_000;
 /// A function that runs rounds of multiply-accumulates in registers and returns their number.
 type Burn = fn(u64) -> u64;
 
+// Tiles take one product of 16 bits for four multiply-accumulates, so each lane of their steps counts as four.
+
 /// Defines a [`Burn`] with `$sums` registers, initially `$zero`, and `$features`. Each `$step` does `$lanes`
 /// multiply-accumulates.
 macro_rules! burn {
@@ -48,8 +50,8 @@ macro_rules! burn {
 }
 
 #[cfg(target_arch = "x86_64")]
-burn!(avx2_int8, "avx2", ymm_reg "/* {0} */", 12 x 32, _mm256_setzero_si256(),
-    |sum, x| _mm256_add_epi16(sum, _mm256_maddubs_epi16(sum, x)));
+burn!(avx2_int8, "avx2", ymm_reg "/* {0} */", 12 x 64, _mm256_setzero_si256(),
+    |sum, x| _mm256_add_epi32(sum, _mm256_madd_epi16(sum, x)));
 #[cfg(target_arch = "x86_64")]
 burn!(avx2_f32, "avx2,fma", ymm_reg "/* {0} */", 12 x 8, _mm256_setzero_ps(), |sum, x| _mm256_fmadd_ps(x, x, sum));
 #[cfg(target_arch = "x86_64")]
@@ -59,6 +61,9 @@ burn!(avx512_vnni, "avx512f,avx512bw,avx512vnni", zmm_reg "/* {0} */", 24 x 64, 
     |sum, x| _mm512_dpbusd_epi32(sum, x, x));
 #[cfg(target_arch = "aarch64")]
 burn!(neon, "neon", vreg "/* {0:v} */", 24 x 4, vdupq_n_f32(0.0), |sum, x| vfmaq_f32(sum, x, x));
+#[cfg(target_arch = "aarch64")]
+burn!(neon_int8, "neon", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
+    |sum, x| vmlal_high_s16(sum, vreinterpretq_s16_s32(x), vreinterpretq_s16_s32(x)));
 #[cfg(target_arch = "aarch64")]
 burn!(neon_dotprod, "neon,dotprod", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
     |sum, x| crate::arm::neon_dotprod::dot::<0>(sum, vreinterpretq_s8_s32(x), vreinterpretq_s8_s32(x)));
@@ -95,6 +100,8 @@ pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
         Isa::Avx512Vnni => avx512_vnni,
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => avx2_int8,
+        #[cfg(target_arch = "aarch64")]
+        Isa::Neon => neon_int8,
         #[cfg(target_arch = "aarch64")]
         Isa::NeonDotprod => neon_dotprod,
         #[cfg(target_arch = "aarch64")]

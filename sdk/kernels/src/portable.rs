@@ -1,14 +1,16 @@
 //! Kernels in plain Rust: the definition that every other instruction set is tested against.
 
-use crate::int8::{GROUP, Kernels, Packed, Taps, quantise_row, rescale_row};
-use crate::wavefront::{Geometry, Window};
+use crate::int8::{GROUP, Kernels, LayerKernels, Packed, RowKernels, Taps, quantise_row, rescale_row};
+use crate::wavefront::{Geometry, Slots};
 use crate::{OUTPUTS, f32};
 
 pub(crate) const INT8: Kernels = Kernels {
-    pack,
-    hidden_row,
-    last_row,
-    offset: 0,
+    layers: LayerKernels::Rows(RowKernels {
+        pack,
+        hidden_row,
+        last_row,
+        offset: 0,
+    }),
     quantise_row,
     rescale_row,
 };
@@ -36,8 +38,8 @@ fn sum(layer: &Packed, rows: &[&[u8]; 3], filter: usize, x: usize, geometry: Geo
     sum
 }
 
-fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-    let rows = window.rows();
+fn hidden_row(layer: &Packed, rows: Slots<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+    let rows = rows.rows();
     for filter in 0..layer.outputs {
         let at = filter / GROUP * geometry.stride() + geometry.start() + filter % GROUP;
         for x in 0..geometry.width {
@@ -58,8 +60,8 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
     }
 }
 
-fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-    let rows = window.rows();
+fn last_row(layer: &Packed, rows: Slots<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+    let rows = rows.rows();
     for (filter, out) in out.into_iter().enumerate() {
         for (x, out) in out.iter_mut().enumerate() {
             *out = sum(layer, &rows, filter, from + x, geometry) as f32 * layer.multiplier[filter];

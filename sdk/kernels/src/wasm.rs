@@ -1,3 +1,4 @@
 //! Kernels for WebAssembly.
 
 pub(crate) mod simd128;
+mod winograd;

@@ -2,8 +2,9 @@
 //!
 //! `x[i]` is layer `i`'s input. When row `r + 1` of `x[i]` is written, row `r` of `x[i+1]` can be computed: it needs
 //! rows `r−1 … r+1` of `x[i]`, and row `r` of `x[i−1]` for a skip. A ring of three rows of each `x[i]` is therefore
-//! enough. A row is stored group by group (see [`Geometry`]) with [`MARGIN`] pixels before and after it, which hold the
-//! padding value at the frame's edges.
+//! enough. A chain that computes its layers in tiles advances by the rows of a tile instead of one, and its rings have
+//! three rows more. A row is stored group by group (see [`Geometry`]) with [`MARGIN`] pixels before and after it, which
+//! hold the padding value at the frame's edges.
 //!
 //! At a band's inner edges the rows beyond are computed again, one more for each remaining layer, so that the result is
 //! bit-identical however the frame is cut. The same holds for columns if a band is cut into strips.
@@ -11,6 +12,7 @@
 use crate::OUTPUTS;
 use crate::places::{Places, runs};
 use crate::rows::{Band, Rows, grown};
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 /// The pixels before a row's first and after its last pixel. Kernels may read one and write up to this many past the
@@ -18,8 +20,8 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) const MARGIN: usize = 16;
 /// The divisor of the length of rows in pixels, so that kernels write whole blocks.
 pub(crate) const BLOCK: usize = 64;
-/// The number of rows kept of each layer's input.
-const RING: usize = 3;
+/// The rows of a layer's input that a row of its output needs.
+const WINDOW: usize = 3;
 
 /// The division of a frame into bands and strips. The result does not depend on it. Rows and columns are those of the
 /// chain's places: pixels, or squares of two by two at half the resolution.
@@ -32,7 +34,8 @@ pub struct Tiling {
 }
 
 /// Returns a tiling for `chain` on the current pool: up to three bands per thread, so that a slower core gets fewer of
-/// them, if at most a sixteenth is computed twice; and strips whose rings fit in [`Chain::CACHE`].
+/// them, if at most a sixteenth is computed twice; and strips of which three rows of each layer's input fit in
+/// [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let places = Places {
         side: chain.side(),
@@ -41,7 +44,7 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
     let (height, width) = places.size();
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
-        .map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>())
+        .map(|i| WINDOW * chain.groups(i) * C::GROUP * size_of::<C::Element>())
         .sum();
     let threads = rayon::current_num_threads();
     // At each edge between two bands layer i computes layers − 1 − i rows on both sides.
@@ -124,10 +127,12 @@ pub(crate) trait Chain: Sync {
     type Element: Copy + Default + Send + Sync;
     /// The channels of a group: the adjacent elements of one pixel.
     const GROUP: usize;
-    /// The bytes that the rings of a strip may occupy.
+    /// The bytes that three rows of each layer's input may occupy in a strip.
     const CACHE: usize;
 
     fn layers(&self) -> usize;
+    /// Returns the rows by which the chain advances.
+    fn step(&self) -> usize;
     /// Returns the pixels along each side of a place: 1, or 2 at half the resolution.
     fn side(&self) -> usize;
     /// Returns the channels of a place of the network's input.
@@ -140,41 +145,82 @@ pub(crate) trait Chain: Sync {
     fn input_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
     /// Writes the concatenated part of a row of `x[last]`. `out` is the whole row.
     fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
-    /// Runs layer `i` on three rows of `x[i]` and writes the features of a row of `x[i+1]`. `skip` is the row of
-    /// `x[i−1]`.
-    fn hidden_row(
+    /// Runs layer `i` and writes the features of rows of `x[i+1]`. `rows` of `x[i]` start one row above them, and those
+    /// of `skip`, in `x[i−1]`, with the first.
+    fn hidden_rows(
         &self,
         i: usize,
-        window: Window<'_, Self::Element>,
-        skip: Option<&[Self::Element]>,
-        out: &mut [Self::Element],
+        rows: Slots<'_, Self::Element>,
+        skip: Option<Slots<'_, Self::Element>>,
+        out: SlotsMut<'_, Self::Element>,
         geometry: Geometry,
     );
-    /// Runs the last layer for one pixel of each place (see [`crate::places`]) and writes places `from..from +
-    /// out[c].len()` of the row to the output planes' rows.
-    fn last_row(
+    /// Runs the last layer for one pixel of each place (see [`crate::places`]) and writes the places `from..` of the
+    /// rows in `out` to the output planes' rows. `rows` start one row above.
+    fn last_rows(
         &self,
         pixel: usize,
-        window: Window<'_, Self::Element>,
-        out: [&mut [f32]; OUTPUTS],
+        rows: Slots<'_, Self::Element>,
+        out: LastRows<'_>,
         from: usize,
         geometry: Geometry,
     );
 }
 
-/// Three rows of a layer's input, adjacent in memory but rotated: the row above is in slot `first` and the next rows in
-/// the following slots, modulo 3.
+/// Rows in a ring: the first is in slot `first` and the next rows in the following slots, modulo the ring's.
 #[derive(Clone, Copy)]
-pub(crate) struct Window<'a, E> {
+pub(crate) struct Slots<'a, E> {
     pub(crate) slots: &'a [E],
+    /// The elements of a row.
+    pub(crate) row: usize,
     pub(crate) first: usize,
 }
 
-impl<'a, E> Window<'a, E> {
-    /// Returns the rows from top to bottom.
-    pub(crate) fn rows(&self) -> [&'a [E]; RING] {
-        let length = self.slots.len() / RING;
-        std::array::from_fn(|k| &self.slots[(self.first + k) % RING * length..][..length])
+impl<'a, E> Slots<'a, E> {
+    /// Returns the element at which row `k` starts.
+    pub(crate) fn start(&self, k: usize) -> usize {
+        (self.first + k) * self.row % self.slots.len()
+    }
+
+    /// Returns the first `N` rows.
+    pub(crate) fn rows<const N: usize>(&self) -> [&'a [E]; N] {
+        std::array::from_fn(|k| &self.slots[self.start(k)..][..self.row])
+    }
+}
+
+/// Rows in a ring, to be written.
+pub(crate) struct SlotsMut<'a, E> {
+    pub(crate) slots: &'a mut [E],
+    pub(crate) row: usize,
+    pub(crate) first: usize,
+    /// The rows to write, of those that the chain advances by.
+    pub(crate) valid: Range<usize>,
+}
+
+impl<E> SlotsMut<'_, E> {
+    /// Returns row `k`.
+    pub(crate) fn row_mut(&mut self, k: usize) -> &mut [E] {
+        let start = (self.first + k) * self.row % self.slots.len();
+        &mut self.slots[start..][..self.row]
+    }
+}
+
+/// Rows of the output planes, to be written.
+pub(crate) struct LastRows<'a> {
+    /// The rows to write, of those that the chain advances by.
+    pub(crate) valid: Range<usize>,
+    /// The first row's planes, one after another.
+    pub(crate) values: &'a mut [f32],
+    /// The number of elements from one row to the next.
+    pub(crate) row: usize,
+    /// The places of a row.
+    pub(crate) count: usize,
+}
+
+impl LastRows<'_> {
+    /// Returns the planes' rows of row `k`.
+    pub(crate) fn planes(&mut self, k: usize) -> [&mut [f32]; OUTPUTS] {
+        runs(&mut self.values[k * self.row..][..OUTPUTS * self.count], self.count)
     }
 }
 
@@ -271,46 +317,58 @@ impl<E> Default for Memory<E> {
     }
 }
 
-/// The last three rows of one layer's input, with row `r` in slot `r mod 3`.
+/// The last rows of one layer's input, with row `r` in slot `r` modulo their number.
 #[derive(Debug, Default)]
 struct Ring<E> {
     memory: Vec<E>,
     /// The start of the first slot, aligned to a cache line for speed.
     start: usize,
     row: usize,
+    count: usize,
 }
 
 impl<E: Copy + Default> Ring<E> {
-    fn prepare(&mut self, row: usize, zero: E) {
+    fn prepare(&mut self, count: usize, row: usize, zero: E) {
         const LINE: usize = 64;
-        let needed = RING * row + LINE;
+        let needed = count * row + LINE;
         if self.memory.len() < needed {
             self.memory.resize(needed, zero);
         }
         self.memory.fill(zero);
         self.start = self.memory.as_ptr().align_offset(LINE).min(LINE);
-        self.row = row;
+        (self.count, self.row) = (count, row);
     }
 
-    fn slot(row: isize) -> usize {
-        row.rem_euclid(RING as isize) as usize
+    fn slot(&self, row: isize) -> usize {
+        row.rem_euclid(self.count as isize) as usize
     }
 
-    fn row(&self, row: isize) -> &[E] {
-        &self.memory[self.start + Self::slot(row) * self.row..][..self.row]
-    }
-
-    fn row_mut(&mut self, row: isize) -> &mut [E] {
-        &mut self.memory[self.start + Self::slot(row) * self.row..][..self.row]
-    }
-
-    /// Returns the rows around `row`.
-    fn window(&self, row: isize) -> Window<'_, E> {
-        Window {
-            slots: &self.memory[self.start..][..RING * self.row],
-            first: Self::slot(row - 1),
+    /// Returns the rows from `row` on.
+    fn rows(&self, row: isize) -> Slots<'_, E> {
+        Slots {
+            slots: &self.memory[self.start..][..self.count * self.row],
+            row: self.row,
+            first: self.slot(row),
         }
     }
+
+    /// Returns the rows from `row` on, of which `valid` are to be written.
+    fn rows_mut(&mut self, row: isize, valid: Range<usize>) -> SlotsMut<'_, E> {
+        let first = self.slot(row);
+        SlotsMut {
+            slots: &mut self.memory[self.start..][..self.count * self.row],
+            row: self.row,
+            first,
+            valid,
+        }
+    }
+}
+
+/// Returns the part of `rows` in the `count` rows from `first` on, relative to `first`.
+fn part(first: isize, count: usize, rows: Range<isize>) -> Range<usize> {
+    let from = first.max(rows.start);
+    let to = (first + count as isize).min(rows.end).max(from);
+    (from - first) as usize..(to - first) as usize
 }
 
 /// Runs `chain` on a frame, reading input from `rows` and writing output through them to `planes`, each (H, W).
@@ -411,7 +469,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
         R: Rows<PLANES>,
     {
         let chain = self.chain;
-        let layers = chain.layers();
+        let (layers, advance) = (chain.layers(), chain.step());
         // The strip with the halo that its last layer needs, one pixel per layer, within the frame.
         let start = left.saturating_sub(layers);
         let end = (right + layers).min(self.width);
@@ -420,62 +478,76 @@ impl<C: Chain, R> Frame<'_, C, R> {
             rings.resize_with(layers, Ring::default);
         }
         for (i, ring) in rings.iter_mut().take(layers).enumerate() {
-            ring.prepare(chain.groups(i) * geometry.stride(), chain.zero(i));
+            ring.prepare(advance + 2, chain.groups(i) * geometry.stride(), chain.zero(i));
         }
         let columns = end - start;
         let input = grown(input, chain.inputs() * columns);
         let side = self.places.side;
-        let output = grown(output, side * side * OUTPUTS * (right - left));
+        let count = right - left;
+        let places = side * side * OUTPUTS * count;
+        let output = grown(output, advance * places);
         let rows = band.rows();
         let (top, bottom) = ((rows.start / side) as isize, rows.end.div_ceil(side) as isize);
         let (height, depth) = (self.height as isize, layers as isize);
-        for step in top - depth..bottom + depth {
+        for step in (top - depth..bottom + depth).step_by(advance) {
             if self.rows.given_up() {
                 return;
             }
             for (i, reach) in (1..=depth).rev().enumerate() {
-                let row = step - i as isize;
-                if !(top - reach..bottom + reach).contains(&row) {
-                    continue;
-                }
+                let first = step - i as isize;
+                let needed = part(first, advance, top - reach..bottom + reach);
+                let inside = part(first, advance, (top - reach).max(0)..(bottom + reach).min(height));
                 let (before, ring) = rings.split_at_mut(i);
-                let out = ring[0].row_mut(row);
-                if !(0..height).contains(&row) {
-                    out.fill(chain.zero(i));
-                    continue;
+                let mut out = ring[0].rows_mut(first, inside.clone());
+                for k in needed.filter(|k| !inside.contains(k)) {
+                    out.row_mut(k).fill(chain.zero(i));
                 }
-                if i == 0 || i == layers - 1 {
-                    let run = (row as usize, start, columns);
-                    self.places.read(self.rows, run, band, pixels, input);
+                if i > 0 && !inside.is_empty() {
+                    let skip = has_skip(i).then(|| before[i - 2].rows(first));
+                    chain.hidden_rows(i - 1, before[i - 1].rows(first - 1), skip, out, geometry);
                 }
-                let source = SourceRow {
-                    planes: input,
-                    plane: columns,
-                };
-                match i {
-                    0 => chain.input_row(source, out, geometry),
-                    _ => {
-                        let skip = has_skip(i).then(|| before[i - 2].row(row));
-                        chain.hidden_row(i - 1, before[i - 1].window(row), skip, out, geometry);
+                for k in inside {
+                    let mut out = ring[0].rows_mut(first + k as isize, 0..1);
+                    let out = out.row_mut(0);
+                    if i == 0 || i == layers - 1 {
+                        let run = ((first + k as isize) as usize, start, columns);
+                        self.places.read(self.rows, run, band, pixels, input);
+                    }
+                    let source = SourceRow {
+                        planes: input,
+                        plane: columns,
+                    };
+                    if i == 0 {
+                        chain.input_row(source, out, geometry);
+                    }
+                    if i == layers - 1 {
+                        chain.concatenated_row(source, out, geometry);
+                    }
+                    // The next layer reads one pixel past the row, which is padding at the frame's edge.
+                    let past = geometry.start() + geometry.width * geometry.group;
+                    for group in out.chunks_exact_mut(geometry.stride()) {
+                        group[past..past + geometry.group].fill(chain.zero(i));
                     }
                 }
-                if i == layers - 1 {
-                    chain.concatenated_row(source, out, geometry);
-                }
-                // The next layer reads one pixel past the row, which is padding at the frame's edge.
-                let past = geometry.start() + geometry.width * geometry.group;
-                for group in out.chunks_exact_mut(geometry.stride()) {
-                    group[past..past + geometry.group].fill(chain.zero(i));
-                }
             }
-            let row = step - depth;
-            if (top..bottom).contains(&row) {
-                let window = rings[layers - 1].window(row);
-                for (pixel, out) in output.chunks_exact_mut(OUTPUTS * (right - left)).enumerate() {
-                    chain.last_row(pixel, window, runs(out, right - left), left - start, geometry);
-                }
-                let run = (row as usize, left, right - left);
-                self.places.write(self.rows, run, band, pixels, output);
+            let first = step - depth;
+            let valid = part(first, advance, top..bottom);
+            if valid.is_empty() {
+                continue;
+            }
+            for pixel in 0..side * side {
+                let out = LastRows {
+                    valid: valid.clone(),
+                    values: &mut output[pixel * OUTPUTS * count..],
+                    row: places,
+                    count,
+                };
+                chain.last_rows(pixel, rings[layers - 1].rows(first - 1), out, left - start, geometry);
+            }
+            for k in valid {
+                let run = ((first + k as isize) as usize, left, count);
+                self.places
+                    .write(self.rows, run, band, pixels, &mut output[k * places..][..places]);
             }
         }
     }

@@ -110,22 +110,19 @@ pub(crate) fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.dot_words(&vec![FILTERS; taps.outputs().div_ceil(FILTERS)])
 }
 
-/// The factors that are applied to the sums of some filters.
-pub(crate) struct Constants<'a> {
-    pub(crate) multiplier: &'a [f32],
-    pub(crate) skip: Option<SkipSum>,
-    pub(crate) zero_point: u8,
-}
-
-/// Converts the sums of four filters at four pixels to 16 bytes at `out`. `skip` holds the skip's bytes at the same
-/// position.
-pub(crate) fn requantise(sums: [int32x4_t; GROUP], constants: &Constants<'_>, skip: Option<&[u8]>, out: &mut [u8]) {
-    let (skip, out) = (skip.map(|skip| &skip[..16]), &mut out[..16]);
-    // SAFETY: NEON is available, and the slices hold 16 bytes.
+/// Converts the sums of four filters at four pixels to 16 bytes, saturating. `skip` holds the skip's bytes.
+#[inline(always)]
+pub(crate) fn requantised(
+    sums: [int32x4_t; GROUP],
+    multiplier: &[f32],
+    skip: Option<(SkipSum, uint8x16_t)>,
+    zero_point: u8,
+) -> uint8x16_t {
+    // SAFETY: NEON is available.
     unsafe {
         let values: [int32x4_t; GROUP] = std::array::from_fn(|k| {
-            let v = vmulq_n_f32(vcvtq_f32_s32(sums[k]), constants.multiplier[k]);
-            let (Some(factors), Some(skip)) = (constants.skip, skip) else {
+            let v = vmulq_n_f32(vcvtq_f32_s32(sums[k]), multiplier[k]);
+            let Some((factors, skip)) = skip else {
                 return vcvtnq_s32_f32(v);
             };
             let v = vmaxq_f32(v, vdupq_n_f32(0.0));
@@ -134,18 +131,23 @@ pub(crate) fn requantise(sums: [int32x4_t; GROUP], constants: &Constants<'_>, sk
                 None => v,
             };
             // Byte k of each group, widened.
-            let groups = vreinterpretq_u32_u8(vld1q_u8(skip.as_ptr()));
+            let groups = vreinterpretq_u32_u8(skip);
             let bytes = vandq_u32(vshlq_u32(groups, vdupq_n_s32(-8 * k as i32)), vdupq_n_u32(255));
             vcvtnq_s32_f32(vaddq_f32(a, vmulq_n_f32(vcvtq_f32_u32(bytes), factors.skip)))
         });
         let narrow = |v| vqmovun_s16(v);
         let ab = narrow(vcombine_s16(vqmovn_s32(values[0]), vqmovn_s32(values[1])));
         let cd = narrow(vcombine_s16(vqmovn_s32(values[2]), vqmovn_s32(values[3])));
-        // Four pixels of a, then of b, c and d. The table transposes this 4×4 block.
-        const TURN: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
-        let bytes = vqtbl1q_u8(vcombine_u8(ab, cd), vld1q_u8(TURN.as_ptr()));
-        vst1q_u8(out.as_mut_ptr(), vqaddq_u8(bytes, vdupq_n_u8(constants.zero_point)));
+        vqaddq_u8(turned(vcombine_u8(ab, cd)), vdupq_n_u8(zero_point))
     }
+}
+
+/// Transposes a 4×4 block of bytes.
+#[inline(always)]
+pub(crate) fn turned(bytes: uint8x16_t) -> uint8x16_t {
+    const TURN: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
+    // SAFETY: NEON is available, and the table has 16 bytes.
+    unsafe { vqtbl1q_u8(bytes, vld1q_u8(TURN.as_ptr())) }
 }
 
 /// The parts of a layer that one call of a dot-product kernel needs, with bounds checks of its reads.
@@ -216,37 +218,36 @@ macro_rules! int8_kernels {
             sums
         }
 
-        fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-            let rows = window.rows();
+        fn hidden_row(layer: &Packed, rows: Slots<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+            let rows = rows.rows();
             for first in (0..layer.outputs).step_by(FILTERS) {
                 for x in (0..geometry.width).step_by(SPAN) {
                     // SAFETY: `kernels` has detected the feature.
                     let sums = unsafe { sums(layer, first, &rows, x, geometry) };
                     for g in 0..FILTERS / GROUP {
-                        let constants = Constants {
-                            multiplier: &layer.multiplier[first + g * GROUP..][..GROUP],
-                            skip: layer.skip,
-                            zero_point: layer.zero_point,
-                        };
+                        let multiplier = &layer.multiplier[first + g * GROUP..][..GROUP];
                         for b in 0..BLOCKS {
                             let group = (first / GROUP + g) * geometry.stride();
                             let at = group + geometry.start() + (x + 4 * b) * GROUP;
                             let four = std::array::from_fn(|k| sums[g * GROUP + k][b]);
-                            requantise(four, &constants, skip.map(|skip| &skip[at..]), &mut out[at..]);
+                            let skip = skip.map(|skip| &skip[at..][..16]);
+                            let out = &mut out[at..][..16];
+                            // SAFETY: NEON is available, and the slices hold 16 bytes.
+                            unsafe {
+                                let skip = layer.skip.zip(skip.map(|skip| vld1q_u8(skip.as_ptr())));
+                                vst1q_u8(
+                                    out.as_mut_ptr(),
+                                    requantised(four, multiplier, skip, layer.zero_point),
+                                );
+                            }
                         }
                     }
                 }
             }
         }
 
-        fn last_row(
-            layer: &Packed,
-            window: Window<'_, u8>,
-            out: [&mut [f32]; OUTPUTS],
-            from: usize,
-            geometry: Geometry,
-        ) {
-            let rows = window.rows();
+        fn last_row(layer: &Packed, rows: Slots<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+            let rows = rows.rows();
             last_row_by_blocks(out, from, |x, values| {
                 for start in (0..BLOCK).step_by(SPAN) {
                     // SAFETY: `kernels` has detected the feature.

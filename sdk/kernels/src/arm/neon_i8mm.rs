@@ -3,19 +3,21 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
-use crate::arm::neon::{BLOCKS, Constants, Dots, FILTERS, SPAN, int8_kernels, pack, requantise, store};
-use crate::int8::{GROUP, Kernels, Packed, quantise_row, rescale_row};
-use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
+use crate::arm::neon::{BLOCKS, Dots, FILTERS, SPAN, int8_kernels, pack, requantised, store};
+use crate::int8::{GROUP, Kernels, LayerKernels, Packed, RowKernels, quantise_row, rescale_row};
+use crate::wavefront::{BLOCK, Geometry, Slots, last_row_by_blocks};
 use std::arch::aarch64::*;
 use std::arch::asm;
 
 /// Returns the kernels if the processor supports them.
 pub(crate) fn kernels() -> Option<Kernels> {
     std::arch::is_aarch64_feature_detected!("i8mm").then_some(Kernels {
-        pack,
-        hidden_row,
-        last_row,
-        offset: 0,
+        layers: LayerKernels::Rows(RowKernels {
+            pack,
+            hidden_row,
+            last_row,
+            offset: 0,
+        }),
         quantise_row,
         rescale_row,
     })

@@ -1,21 +1,15 @@
-//! Kernels for WebAssembly's 128-bit vectors: 4 filters at a time, 8 pixels of int8 or 12 of f32. There is no
-//! detection: a module with these instructions does not load where they are missing.
-//!
-//! Pixels are widened to 16 bits, with the even and the odd channels of a group apart, and multiplied and summed in
-//! pairs.
+//! Kernels for WebAssembly's 128-bit vectors: 4 filters at a time, 12 pixels of f32. The int8 layers run in tiles
+//! ([`super::winograd`]). There is no detection: a module with these instructions does not load where they are missing.
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
 use crate::f32;
-use crate::int8::{self, GROUP, Packed, SkipSum, Taps, quantise_row, rescale_row};
-use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
+use crate::int8::{self, GROUP, LayerKernels, SkipSum, quantise_row, rescale_row};
+use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
 use std::arch::wasm32::*;
 
 pub(crate) const INT8: int8::Kernels = int8::Kernels {
-    pack,
-    hidden_row,
-    last_row,
-    offset: 0,
+    layers: LayerKernels::Tiles(super::winograd::SIMD128),
     quantise_row,
     rescale_row,
 };
@@ -27,89 +21,7 @@ pub(crate) const F32: f32::Kernels = f32::Kernels {
 };
 
 /// The number of pixel registers computed together.
-const INT8_BLOCKS: usize = 2;
 const F32_BLOCKS: usize = 3;
-
-/// Packs words of two 16-bit weights as `[4 filters][ky][group][kx][filter][even, odd]`.
-fn pack(taps: &Taps<'_>) -> Vec<i32> {
-    taps.pair_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)])
-}
-
-fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-    let rows = window.rows();
-    let groups = layer.outputs / GROUP;
-    assert!(out.len() >= groups * geometry.stride());
-    assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
-    let zero = u8x16_splat(layer.zero_point);
-    for g in 0..groups {
-        let multiplier = &layer.multiplier[g * GROUP..][..GROUP];
-        for x in (0..geometry.width).step_by(4 * INT8_BLOCKS) {
-            let sums = int8_sums(layer, g, &rows, x, geometry);
-            #[allow(clippy::needless_range_loop)]
-            for b in 0..INT8_BLOCKS {
-                let at = g * geometry.stride() + geometry.start() + (x + 4 * b) * GROUP;
-                let four = std::array::from_fn(|k| sums[k][b]);
-                // SAFETY: 16 bytes at `at` are inside the group, whose blocks are whole.
-                unsafe {
-                    let value = match (layer.skip, skip) {
-                        (Some(factors), Some(skip)) => {
-                            requantise_sum(four, multiplier, factors, v128_load(skip.as_ptr().add(at).cast()))
-                        }
-                        _ => requantise(four, multiplier),
-                    };
-                    v128_store(out.as_mut_ptr().add(at).cast(), u8x16_add_sat(value, zero));
-                }
-            }
-        }
-    }
-}
-
-/// Returns the sums of the four filters of group `g` at `4·INT8_BLOCKS` pixels from `x`.
-#[inline(always)]
-fn int8_sums(
-    layer: &Packed,
-    g: usize,
-    rows: &[&[u8]; 3],
-    x: usize,
-    geometry: Geometry,
-) -> [[v128; INT8_BLOCKS]; GROUP] {
-    let words = 9 * layer.groups * GROUP * 2;
-    let weights = &layer.weights[g * words..][..words];
-    assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
-    assert!(x + 4 * INT8_BLOCKS <= geometry.padded && MARGIN >= 1 && geometry.group == GROUP);
-    let even = i16x8_splat(255);
-    let mut sums = [[i32x4_splat(0); INT8_BLOCKS]; GROUP];
-    for (sums, bias) in sums.iter_mut().zip(&layer.bias[g * GROUP..]) {
-        *sums = [i32x4_splat(*bias); INT8_BLOCKS];
-    }
-    // SAFETY: by the asserts above, rows extend one pixel past the block, and there are as many weights as the loops
-    // read.
-    unsafe {
-        let mut weight = weights.as_ptr();
-        for row in rows {
-            let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
-            for _ in 0..layer.groups {
-                for kx in 0..3 {
-                    let halves: [[v128; 2]; INT8_BLOCKS] = std::array::from_fn(|b| {
-                        let bytes = v128_load(pixels.add((kx + 4 * b) * GROUP).cast());
-                        [v128_and(bytes, even), u16x8_shr(bytes, 8)]
-                    });
-                    for sums in &mut sums {
-                        for half in 0..2 {
-                            let pair = v128_load32_splat(weight.cast());
-                            weight = weight.add(1);
-                            for (sum, halves) in sums.iter_mut().zip(halves) {
-                                *sum = i32x4_add(*sum, i32x4_dot_i16x8(halves[half], pair));
-                            }
-                        }
-                    }
-                }
-                pixels = pixels.wrapping_add(geometry.stride());
-            }
-        }
-    }
-    sums
-}
 
 /// Returns `sat(rint(v))` in 32 bits: adding 1.5·2²³ leaves no fraction bits.
 #[inline(always)]
@@ -127,13 +39,13 @@ fn scaled(sums: [v128; GROUP], multiplier: &[f32]) -> [v128; GROUP] {
 
 /// Returns `sat(rint(sum · multiplier))` of four filters as one register of groups.
 #[inline(always)]
-fn requantise(sums: [v128; GROUP], multiplier: &[f32]) -> v128 {
+pub(super) fn requantise(sums: [v128; GROUP], multiplier: &[f32]) -> v128 {
     pack_groups(scaled(sums, multiplier).map(rounded))
 }
 
 /// Requantises the sums of four filters and adds a skip.
 #[inline(always)]
-fn requantise_sum(sums: [v128; GROUP], multiplier: &[f32], factors: SkipSum, skip: v128) -> v128 {
+pub(super) fn requantise_sum(sums: [v128; GROUP], multiplier: &[f32], factors: SkipSum, skip: v128) -> v128 {
     let values = scaled(sums, multiplier);
     pack_groups(std::array::from_fn(|k| {
         let a = match factors.relu {
@@ -154,24 +66,6 @@ fn requantise_sum(sums: [v128; GROUP], multiplier: &[f32], factors: SkipSum, ski
 fn pack_groups([a, b, c, d]: [v128; GROUP]) -> v128 {
     let (ab, cd) = (v128_or(a, i32x4_shl(b, 8)), v128_or(c, i32x4_shl(d, 8)));
     v128_or(ab, i32x4_shl(cd, 16))
-}
-
-fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-    let rows = window.rows();
-    last_row_by_blocks(out, from, |x, values| {
-        for g in 0..OUTPUTS.div_ceil(GROUP) {
-            for start in (0..BLOCK).step_by(4 * INT8_BLOCKS) {
-                let sums = int8_sums(layer, g, &rows, x + start, geometry);
-                for (o, sums) in (g * GROUP..OUTPUTS).zip(sums) {
-                    let multiplier = f32x4_splat(layer.multiplier[o]);
-                    store(
-                        &mut values[o][start..],
-                        sums.map(|sum| f32x4_mul(f32x4_convert_i32x4(sum), multiplier)),
-                    );
-                }
-            }
-        }
-    });
 }
 
 /// Stores the registers that are inside the block.

@@ -10,8 +10,8 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
-use crate::int8::{GROUP, Kernels, Packed, Taps};
-use crate::wavefront::{BLOCK, Geometry, Window};
+use crate::int8::{GROUP, Kernels, LayerKernels, Packed, RowKernels, Taps};
+use crate::wavefront::{BLOCK, Geometry, Slots};
 use crate::x86::avx2::{quantise_row, rescale_row};
 use crate::x86::avx512_vnni::{self, check_rows, requantise};
 use std::arch::asm;
@@ -31,10 +31,12 @@ const PANEL: usize = 48;
 /// Returns the kernels if the processor and the system support them.
 pub(crate) fn kernels() -> Option<Kernels> {
     available().then_some(Kernels {
-        pack,
-        hidden_row,
-        last_row,
-        offset: 0,
+        layers: LayerKernels::Rows(RowKernels {
+            pack,
+            hidden_row,
+            last_row,
+            offset: 0,
+        }),
         quantise_row,
         rescale_row,
     })
@@ -193,7 +195,7 @@ thread_local! {
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 fn each_block(
     layer: &Packed,
-    window: Window<'_, u8>,
+    window: Slots<'_, u8>,
     first: usize,
     span: (usize, usize),
     geometry: Geometry,
@@ -211,7 +213,7 @@ fn each_block(
 fn each_block_in(
     Work { biases, panels, sums }: &mut Work,
     layer: &Packed,
-    window: Window<'_, u8>,
+    window: Slots<'_, u8>,
     first: usize,
     (from, to): (usize, usize),
     geometry: Geometry,
@@ -347,7 +349,7 @@ unsafe fn finish(sums: &mut Sums, wide: bool, narrow: bool) {
     }
 }
 
-fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+fn hidden_row(layer: &Packed, window: Slots<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     for first in (0..layer.outputs).step_by(FILTERS) {
         // SAFETY: `kernels` has detected the features.
         unsafe { hidden_filters(layer, first, window, skip, out, geometry) };
@@ -358,7 +360,7 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
 fn hidden_filters(
     layer: &Packed,
     first: usize,
-    window: Window<'_, u8>,
+    window: Slots<'_, u8>,
     skip: Option<&[u8]>,
     out: &mut [u8],
     geometry: Geometry,
@@ -377,7 +379,7 @@ fn hidden_filters(
     });
 }
 
-fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+fn last_row(layer: &Packed, window: Slots<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     // SAFETY: `kernels` has detected the features.
     unsafe { last_filters(layer, window, out, from, geometry) }
 }
@@ -385,7 +387,7 @@ fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], 
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 fn last_filters(
     layer: &Packed,
-    window: Window<'_, u8>,
+    window: Slots<'_, u8>,
     mut out: [&mut [f32]; OUTPUTS],
     from: usize,
     geometry: Geometry,

@@ -1,23 +1,17 @@
-//! The int8 and f32 kernels for AVX2: 8 pixels per register, 4 filters at a time.
-//!
-//! The byte multiply of AVX2 adds two products in 16 bits. The taps of two filters are packed in runs whose sums fit 16
-//! bits for any activations ([`runs`]), so only a run's end needs 32 bits.
+//! The int8 and f32 kernels for AVX2: 8 pixels per register, 4 filters at a time. The int8 layers run in tiles
+//! ([`super::winograd`]).
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
 use crate::f32;
-use crate::int8::{self, GROUP, MOST_GROUPS, Packed, Rounding, SkipSum};
-use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
-use crate::x86::runs::{self, Words};
+use crate::int8::{self, GROUP, LayerKernels, Rounding, SkipSum};
+use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, last_row_by_blocks};
 use std::arch::x86_64::*;
 
 /// Returns the int8 kernels if the processor supports them.
 pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
     available().then_some(int8::Kernels {
-        pack: runs::pack,
-        hidden_row,
-        last_row,
-        offset: 0,
+        layers: LayerKernels::Tiles(super::winograd::AVX2),
         quantise_row,
         rescale_row,
     })
@@ -38,160 +32,12 @@ fn available() -> bool {
 }
 
 /// The number of pixel registers computed together.
-const INT8_BLOCKS: usize = 4;
 const F32_BLOCKS: usize = 3;
-
-/// The sums of four filters at `8·INT8_BLOCKS` pixels.
-type Int8Sums = [[__m256i; INT8_BLOCKS]; GROUP];
-
-fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-    let places = Places::new(layer, window, geometry);
-    // SAFETY: `int8_kernels` has detected the features.
-    unsafe { int8_filters(layer, &places, skip, out, geometry) }
-}
-
-#[target_feature(enable = "avx2,fma")]
-fn int8_filters(layer: &Packed, places: &Places<'_>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-    let groups = layer.outputs / GROUP;
-    assert!(out.len() >= groups * geometry.stride());
-    assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
-    let zero = _mm256_set1_epi8(layer.zero_point as i8);
-    for x in (0..geometry.width).step_by(8 * INT8_BLOCKS) {
-        let mut words = layer.weights.as_chunks().0;
-        for g in 0..groups {
-            let (bias, multiplier) = (
-                &layer.bias[g * GROUP..][..GROUP],
-                &layer.multiplier[g * GROUP..][..GROUP],
-            );
-            let sums;
-            (sums, words) = int8_sums(words, bias, places, x);
-            #[allow(clippy::needless_range_loop)]
-            for b in 0..INT8_BLOCKS {
-                let at = g * geometry.stride() + geometry.start() + (x + 8 * b) * GROUP;
-                let four = std::array::from_fn(|k| sums[k][b]);
-                // SAFETY: 32 bytes at `at` are inside the group, whose blocks are whole.
-                unsafe {
-                    let value = match (layer.skip, skip) {
-                        (Some(factors), Some(skip)) => {
-                            let skip = _mm256_loadu_si256(skip.as_ptr().add(at).cast());
-                            requantise_sum(four, multiplier, factors, skip)
-                        }
-                        _ => requantise(four, multiplier),
-                    };
-                    _mm256_storeu_si256(out.as_mut_ptr().add(at).cast(), _mm256_adds_epu8(value, zero));
-                }
-            }
-        }
-    }
-}
-
-/// The places of a layer's taps in its window.
-struct Places<'a> {
-    slots: &'a [u8],
-    /// The place of each tap `(ky·groups + group)·3 + kx` for the first pixel of a row.
-    starts: [u32; 9 * MOST_GROUPS],
-    padded: usize,
-}
-
-impl<'a> Places<'a> {
-    fn new(layer: &Packed, window: Window<'a, u8>, geometry: Geometry) -> Self {
-        let row = window.slots.len() / 3;
-        assert!(row >= layer.groups * geometry.stride() && window.slots.len() <= u32::MAX as usize);
-        assert!(MARGIN >= 1 && geometry.group == GROUP);
-        let mut starts = [0; 9 * MOST_GROUPS];
-        for (tap, start) in starts[..9 * layer.groups].iter_mut().enumerate() {
-            let (ky, group, kx) = (tap / 3 / layer.groups, tap / 3 % layer.groups, tap % 3);
-            let at = (window.first + ky) % 3 * row + group * geometry.stride();
-            *start = (at + geometry.start() + kx * GROUP - GROUP) as u32;
-        }
-        Places {
-            slots: window.slots,
-            starts,
-            padded: geometry.padded,
-        }
-    }
-}
-
-/// Returns the sums of the four filters of a group at `8·INT8_BLOCKS` pixels from `x`, and the words of the next group.
-/// A group has two pairs of filters; of the last layer's second group only one exists.
-#[inline]
-#[target_feature(enable = "avx2")]
-fn int8_sums<'a>(mut words: &'a [Words], bias: &[i32], places: &Places<'_>, x: usize) -> (Int8Sums, &'a [Words]) {
-    assert!(x + 8 * INT8_BLOCKS <= places.padded);
-    let mut sums = [[_mm256_setzero_si256(); INT8_BLOCKS]; GROUP];
-    for (pair, bias) in sums.as_chunks_mut::<2>().0.iter_mut().zip(bias.as_chunks::<2>().0) {
-        for (sums, bias) in pair.iter_mut().zip(bias) {
-            *sums = [_mm256_set1_epi32(*bias); INT8_BLOCKS];
-        }
-        let Some(([runs, ..], rest)) = words.split_first() else {
-            break;
-        };
-        words = rest;
-        for _ in 0..*runs {
-            let [taps, ..] = words[0];
-            let (run, rest) = words[1..].split_at(taps as usize);
-            words = rest;
-            // SAFETY: `pack` wrote places of the layer's taps, whose rows extend one pixel past the block.
-            unsafe { add_run(run, places, x, pair) };
-        }
-    }
-    (sums, words)
-}
-
-/// Adds the products of a run's taps to the sums of a pair of filters. The run's sums fit 16 bits.
-///
-/// # Safety
-/// [`products`]' contract.
-#[inline]
-#[target_feature(enable = "avx2")]
-unsafe fn add_run(run: &[Words], places: &Places<'_>, x: usize, pair: &mut [[__m256i; INT8_BLOCKS]; 2]) {
-    let Some((first, rest)) = run.split_first() else {
-        return;
-    };
-    // SAFETY: the caller upholds this function's contract.
-    unsafe {
-        let mut narrow = products(first, places, x);
-        for tap in rest {
-            let products = products(tap, places, x);
-            for (narrow, products) in narrow.as_flattened_mut().iter_mut().zip(products.as_flattened()) {
-                *narrow = _mm256_add_epi16(*narrow, *products);
-            }
-        }
-        let ones = _mm256_set1_epi16(1);
-        for (sum, narrow) in pair.as_flattened_mut().iter_mut().zip(narrow.as_flattened()) {
-            *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(*narrow, ones));
-        }
-    }
-}
-
-/// Returns the products of a tap for a pair of filters, added in twos.
-///
-/// # Safety
-/// The tap's place must be below 9 times the layer's groups, and `x + 8·INT8_BLOCKS` within the padded row.
-#[inline]
-#[target_feature(enable = "avx2")]
-unsafe fn products([place, first, second]: &Words, places: &Places<'_>, x: usize) -> [[__m256i; INT8_BLOCKS]; 2] {
-    // SAFETY: the caller upholds this function's contract.
-    unsafe {
-        let start = *places.starts.get_unchecked(*place as usize) as usize;
-        let pixels = places.slots.as_ptr().add(start + x * GROUP);
-        let mut products = [[_mm256_setzero_si256(); INT8_BLOCKS]; 2];
-        // Loads each weight by itself: from one load of both the compiler would move them through general registers.
-        for (products, four) in products.iter_mut().zip([first, second]) {
-            let four = _mm256_castps_si256(_mm256_broadcast_ss(&*std::ptr::from_ref(four).cast()));
-            for (b, products) in products.iter_mut().enumerate() {
-                let bytes = _mm256_loadu_si256(pixels.add(8 * b * GROUP).cast());
-                *products = _mm256_maddubs_epi16(bytes, four);
-            }
-        }
-        products
-    }
-}
 
 /// Returns `sat(rint(sum · multiplier))` of four filters as one register of groups.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
+pub(super) fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
     pack_groups(std::array::from_fn(|k| {
         _mm256_cvtps_epi32(_mm256_mul_ps(
             _mm256_cvtepi32_ps(sums[k]),
@@ -203,7 +49,7 @@ fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
 /// Requantises the sums of four filters and adds a skip.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn requantise_sum(sums: [__m256i; GROUP], multiplier: &[f32], factors: SkipSum, skip: __m256i) -> __m256i {
+pub(super) fn requantise_sum(sums: [__m256i; GROUP], multiplier: &[f32], factors: SkipSum, skip: __m256i) -> __m256i {
     pack_groups(std::array::from_fn(|k| {
         let v = _mm256_mul_ps(_mm256_cvtepi32_ps(sums[k]), _mm256_set1_ps(multiplier[k]));
         let v = _mm256_max_ps(v, _mm256_setzero_ps());
@@ -230,33 +76,6 @@ fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
     let bytes = _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
     let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(0x0f0b_0703, 0x0e0a_0602, 0x0d09_0501, 0x0c08_0400));
     _mm256_shuffle_epi8(bytes, turn)
-}
-
-fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-    let places = Places::new(layer, window, geometry);
-    last_row_by_blocks(out, from, |x, values| {
-        // SAFETY: `int8_kernels` has detected the features.
-        unsafe { int8_last_block(layer, &places, x, values) }
-    });
-}
-
-#[target_feature(enable = "avx2,fma")]
-fn int8_last_block(layer: &Packed, places: &Places<'_>, x: usize, values: &mut [[f32; BLOCK]; OUTPUTS]) {
-    for start in (0..BLOCK).step_by(8 * INT8_BLOCKS) {
-        let mut words = layer.weights.as_chunks().0;
-        for (g, values) in values.chunks_mut(GROUP).enumerate() {
-            let sums;
-            (sums, words) = int8_sums(words, &layer.bias[g * GROUP..][..GROUP], places, x + start);
-            for (o, (values, sums)) in values.iter_mut().zip(sums).enumerate() {
-                let multiplier = _mm256_set1_ps(layer.multiplier[g * GROUP + o]);
-                for (values, sum) in values[start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
-                    let value = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), multiplier);
-                    // SAFETY: the slice holds 8 values.
-                    unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
-                }
-            }
-        }
-    }
 }
 
 fn f32_hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {

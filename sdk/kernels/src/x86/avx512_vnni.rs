@@ -2,18 +2,20 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
-use crate::int8::{GROUP, Kernels, Packed, SkipSum, Taps};
-use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
+use crate::int8::{GROUP, Kernels, LayerKernels, Packed, RowKernels, SkipSum, Taps};
+use crate::wavefront::{BLOCK, Geometry, MARGIN, Slots, last_row_by_blocks};
 use crate::x86::avx2::{quantise_row, rescale_row};
 use std::arch::x86_64::*;
 
 /// Returns the kernels if the processor supports them.
 pub(crate) fn kernels() -> Option<Kernels> {
     available().then_some(Kernels {
-        pack,
-        hidden_row,
-        last_row,
-        offset: 0,
+        layers: LayerKernels::Rows(RowKernels {
+            pack,
+            hidden_row,
+            last_row,
+            offset: 0,
+        }),
         quantise_row,
         rescale_row,
     })
@@ -31,8 +33,8 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.dot_words(&vec![together; outputs / together])
 }
 
-fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
-    let rows = window.rows();
+fn hidden_row(layer: &Packed, rows: Slots<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+    let rows = rows.rows();
     check_rows(&rows, layer.groups, geometry);
     let mut x = 0;
     while x < geometry.width {
@@ -49,8 +51,8 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
     }
 }
 
-fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-    let rows = window.rows();
+fn last_row(layer: &Packed, rows: Slots<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+    let rows = rows.rows();
     last_row_by_blocks(out, from, |x, values| {
         // SAFETY: `kernels` has detected the features.
         unsafe { last_block(layer, &rows, x, values, geometry) }
