@@ -9,7 +9,7 @@ mod hologram_png;
 use image::imageops::FilterType::Nearest;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::session::Event;
-use phasefront::{Display, LiveSession};
+use phasefront::{Display, LiveSession, SessionOptions};
 use std::error::Error;
 use std::path::Path;
 use std::sync::mpsc;
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // only forwards holograms, because no frame is processed while it is busy.
     let (sender, holograms) = mpsc::channel();
     let display = Display::default().with_size(HEIGHT, WIDTH)?;
-    let mut options = phasefront_models::session_options(display);
+    let mut options = SessionOptions::for_target(display);
     options.target_rate_hz = Some(RATE_HZ as f64);
     let session = LiveSession::new(options, move |event| match event {
         Event::Processed(hologram) => drop(sender.send(hologram)),

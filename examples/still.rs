@@ -8,7 +8,7 @@
 mod hologram_png;
 
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
-use phasefront::{Display, ImageSession};
+use phasefront::{Display, ImageSession, SessionOptions};
 use std::error::Error;
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // A session plans its work once and then makes holograms of any number of frames. The display is the target: here
     // the paper's, with 8 µm pixels and three lasers, and as many pixels as the picture.
     let display = Display::default().with_size(height, width)?;
-    let session = ImageSession::new(phasefront_models::session_options(display))?;
+    let session = ImageSession::new(SessionOptions::for_target(display))?;
 
     // A frame borrows the images' bytes. A plane takes the number of bytes from one row to the next and from one pixel
     // to the next.

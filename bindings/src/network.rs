@@ -103,27 +103,27 @@ pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
 #[cfg(feature = "built-in-network")]
 mod built_in {
     use super::{DeepPair, Network};
-    use phasefront_models::Precision::Int8;
+    use phasefront::models::Precision::Int8;
     use std::sync::Arc;
 
     pub(super) fn network(name: &str) -> Option<Arc<phasefront::Network>> {
-        phasefront_models::network(name, Int8)
+        phasefront::models::network(name, Int8)
     }
 
     /// Returns the names of the networks.
     pub(super) fn names() -> String {
-        let names: Vec<_> = phasefront_models::NETWORKS.iter().map(|model| model.name).collect();
+        let names: Vec<_> = phasefront::models::NETWORKS.iter().map(|model| model.name).collect();
         names.join(", ")
     }
 
     /// Returns a list of the offsets that have a pair.
     pub(super) fn offsets() -> String {
-        let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+        let offsets = phasefront::models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
         format!("there are pairs for {} mm", offsets.collect::<Vec<_>>().join(", "))
     }
 
     pub(super) fn pair(display: &phasefront::Display) -> Option<DeepPair> {
-        let pair = phasefront_models::pair_for(display, Int8)?;
+        let pair = phasefront::models::pair_for(display, Int8)?;
         let of = |core| Arc::new(Network { core });
         Some(DeepPair {
             hologram: of(pair.hologram),

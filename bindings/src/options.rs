@@ -303,7 +303,7 @@ pub fn phone_options(
 
 #[cfg(feature = "built-in-network")]
 fn default_options(target: &phasefront::Target) -> session::SessionOptions {
-    phasefront_models::session_options(target.clone())
+    session::SessionOptions::for_target(target.clone())
 }
 
 #[cfg(not(feature = "built-in-network"))]

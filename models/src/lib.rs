@@ -2,14 +2,15 @@
 //! volume of 6 mm. The card of each network, the `.md` next to its file, has its measurements.
 //!
 //! ```
-//! use phasefront::Display;
+//! use phasefront_core::display::Display;
 //!
-//! let options = phasefront_models::session_options(Display::default().with_offset_m(6e-3)?);
-//! assert_eq!(options.quality_levels.len(), 1);
-//! # Ok::<(), phasefront::Error>(())
+//! assert!(phasefront_models::default_network(&Display::default()).is_some());
 //! ```
+//!
+//! The crate `phasefront` has this one as `phasefront::models`, by its feature `models`.
 
-use phasefront::{Display, Method, Network, SessionOptions, Sweep, Target};
+use phasefront_core::display::Display;
+use phasefront_core::method::network::Network;
 use std::sync::Arc;
 
 /// The number format that a network computes in.
@@ -152,23 +153,6 @@ pub fn default_network(display: &Display) -> Option<Arc<Network>> {
     network("rgbd-8", Precision::Int8).filter(|network| network.check_display(display).is_ok())
 }
 
-/// Returns the default options for `target`: a network if one was trained for its display, otherwise the plane sweep;
-/// AA-DPM with one local step.
-pub fn session_options(target: impl Into<Target>) -> SessionOptions {
-    let target = target.into();
-    let method = match default_network(&target.display) {
-        Some(network) => Method::Network(network),
-        None => Method::Sweep(Sweep::for_display(&target.display)),
-    };
-    SessionOptions::new(target, method)
-}
-
-/// Compiles the code of the README and of the guide.
-#[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-#[doc = include_str!("../../docs/rust.md")]
-struct Pages;
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -195,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_display_gets_a_network_that_was_trained_for_it_or_the_sweep() {
+    fn a_display_gets_only_networks_that_were_trained_for_it() {
         for (display, trained, paired) in [
             ("offset_mm = 0", true, true),
             ("offset_mm = 6", true, true),
@@ -204,9 +188,7 @@ mod tests {
         ] {
             let display = Display::from_toml(display).unwrap();
             assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
-            let method = &session_options(display).quality_levels[0].method;
-            assert_eq!(matches!(method, Method::Network(_)), trained, "{method:?}");
-            assert_eq!(matches!(method, Method::Sweep(_)), !trained, "{method:?}");
+            assert_eq!(default_network(&display).is_some(), trained);
         }
     }
 }

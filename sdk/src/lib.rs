@@ -38,11 +38,12 @@
 //! | [`Hologram::of_field`] | your own complex field, to levels |
 //! | [`output`] | converts levels to the images that a modulator takes, and back; commercially available modulators |
 //!
-//! The bundled networks are in the crate `phasefront-models`.
+//! With the feature `models`, [`models`] has the bundled networks, and [`SessionOptions::for_target`] chooses one.
 //!
 //! # Features
 //!
 //! - `tract`, on by default: runs networks that the kernels do not support on tract. Without it they are refused.
+//! - `models`: the bundled networks in int8, 0.3 MB.
 //! - `gpu`: computes whole frames on Vulkan, Metal or DirectX 12. Select it with
 //!   [`SessionOptions::backend`](session::SessionOptions::backend).
 //!
@@ -68,6 +69,8 @@
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+#[cfg(feature = "models")]
+pub use phasefront_models as models;
 pub use {ndarray, num_complex};
 
 pub mod input;
@@ -100,3 +103,9 @@ pub use phasefront_core::method::sweep::Sweep;
 pub use phasefront_core::pipeline::{FrameReport, Pipeline, PipelineScratch};
 pub use phasefront_core::runtime::error::{Error, Result};
 pub use session::{Hologram, ImageSession, LiveSession, SessionOptions, VideoSession};
+
+/// Compiles the code of the README and of the guide.
+#[cfg(all(doctest, feature = "models"))]
+#[doc = include_str!("../../README.md")]
+#[doc = include_str!("../../docs/rust.md")]
+struct Pages;

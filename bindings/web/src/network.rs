@@ -1,8 +1,8 @@
 //! Networks, loaded from bytes or built in.
 
 use crate::error::{Answer, error, object, of_core};
+use phasefront::models::Precision::Int8;
 use phasefront::{Display, Network};
-use phasefront_models::Precision::Int8;
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
 
@@ -30,8 +30,8 @@ impl RawNetwork {
     /// Throws an error of kind `network` for any other name.
     #[wasm_bindgen(js_name = builtIn)]
     pub fn built_in(name: &str) -> Answer<RawNetwork> {
-        let core = phasefront_models::network(name, Int8).ok_or_else(|| {
-            let names: Vec<_> = phasefront_models::NETWORKS.iter().map(|model| model.name).collect();
+        let core = phasefront::models::network(name, Int8).ok_or_else(|| {
+            let names: Vec<_> = phasefront::models::NETWORKS.iter().map(|model| model.name).collect();
             let names = names.join(", ");
             error(
                 "network",
@@ -50,8 +50,8 @@ impl RawNetwork {
     #[wasm_bindgen(js_name = builtInPair)]
     pub fn built_in_pair(offset_mm: f64) -> Answer<Vec<RawNetwork>> {
         let display = Display::default().with_offset_m(offset_mm * 1e-3).map_err(of_core)?;
-        let pair = phasefront_models::pair_for(&display, Int8).ok_or_else(|| {
-            let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+        let pair = phasefront::models::pair_for(&display, Int8).ok_or_else(|| {
+            let offsets = phasefront::models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
             let offsets = offsets.collect::<Vec<_>>().join(", ");
             error(
                 "network",

@@ -63,7 +63,7 @@ impl RawOptions {
     #[wasm_bindgen(js_name = withDefaults)]
     pub fn with_defaults(target: &RawTarget) -> RawOptions {
         RawOptions {
-            core: phasefront_models::session_options(target.core.clone()),
+            core: SessionOptions::for_target(target.core.clone()),
         }
     }
 
