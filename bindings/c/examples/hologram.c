@@ -45,7 +45,8 @@ int main(int count, char **arguments) {
     ok(pf_options_new(target, PF_METHOD_DEFAULT, NULL, &options));
     ok(pf_session_new(options, PF_RUNNING_MODE_IMAGE, NULL, &session));
 
-    PfFrame frame = {.colour = {.format = PF_COLOUR_FORMAT_RGB,
+    PfFrame frame = {.size = sizeof frame,
+                     .colour = {.format = PF_COLOUR_FORMAT_RGB,
                                 .width = colour.width,
                                 .height = colour.height,
                                 .planes = {{colours, PNG_IMAGE_SIZE(colour), colour.width * 3, 3}}},

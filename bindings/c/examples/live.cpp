@@ -33,6 +33,7 @@ int main() try {
                 colour[3 * p] = colour[3 * p + 1] = colour[3 * p + 2] = static_cast<std::uint8_t>(p / width);
             }
             PfFrame frame{};
+            frame.size = sizeof frame;
             frame.timestamp_ns = (i + 1) * 66666667;
             frame.colour = {PF_COLOUR_FORMAT_RGB, width, height, PF_YUV_MATRIX_BT601, false, {}};
             frame.colour.planes[0] = {colour.data(), colour.size(), width * 3, 3};

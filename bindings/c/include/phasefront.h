@@ -262,6 +262,8 @@ typedef struct PfFrameTimes {
 
 // The properties of a hologram.
 typedef struct PfHologramInfo {
+  // The size of this struct, sizeof(PfHologramInfo). Set it before the call.
+  size_t size;
   // The timestamp of the frame.
   uint64_t timestamp_ns;
   // The width in pixels.
@@ -344,6 +346,8 @@ typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *messag
 
 // A quality level: a method, a resolution and the number of correction steps.
 typedef struct PfQualityLevel {
+  // The size of this struct, sizeof(PfQualityLevel). Set it before the call.
+  size_t size;
   // The method, a PfMethod except PF_METHOD_DEFAULT.
   uint32_t method;
   // The network of PF_METHOD_TRAINED and PF_METHOD_AUTO; otherwise NULL.
@@ -375,6 +379,8 @@ typedef struct PfQualityChange {
 // `context` must live until on_closed is called, which may free it. If pf_session_new fails, no function is called and
 // the context still belongs to the caller.
 typedef struct PfListener {
+  // The size of this struct, sizeof(PfListener). Set it before the call.
+  size_t size;
   // The first argument of each function.
   void *context;
   // Reports that a frame became a hologram. The listener must free it with pf_hologram_free.
@@ -468,8 +474,10 @@ typedef struct PfCameras {
   double translation_m[3];
 } PfCameras;
 
-// A frame: colour, depth, and their relation. Initialize it with zeros.
+// A frame: colour, depth, and their relation. Initialize it with its size and zeros: `PfFrame frame = {sizeof frame};`.
 typedef struct PfFrame {
+  // The size of this struct, sizeof(PfFrame). Set it before the call.
+  size_t size;
   // The time at which the frame was taken, in nanoseconds of any clock that runs forward.
   uint64_t timestamp_ns;
   // The colour image.
@@ -489,6 +497,8 @@ typedef struct PfFrame {
 // The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
 // pending.
 typedef struct PfStatistics {
+  // The size of this struct, sizeof(PfStatistics). Set it before the call.
+  size_t size;
   // Frames that were submitted.
   uint64_t submitted;
   // Frames that became holograms.

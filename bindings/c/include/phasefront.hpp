@@ -166,6 +166,7 @@ class Hologram : public detail::Object<PfHologram, pf_hologram_free> {
     // The size, the timestamp and the times of the stages.
     PfHologramInfo info() const {
         PfHologramInfo info{};
+        info.size = sizeof info;
         check(pf_hologram_info(get(), &info));
         return info;
     }
@@ -244,6 +245,7 @@ class Session : public detail::Object<PfSession, pf_session_free> {
     // The rates, drops and times.
     PfStatistics statistics() const {
         PfStatistics statistics{};
+        statistics.size = sizeof statistics;
         check(pf_session_statistics(get(), &statistics));
         return statistics;
     }
@@ -251,6 +253,7 @@ class Session : public detail::Object<PfSession, pf_session_free> {
   private:
     static PfSession *live(const Options &options, std::unique_ptr<Listener> listener) {
         PfListener calls{};
+        calls.size = sizeof calls;
         calls.context = listener.get();
         // No exception may leave a function that C calls, so these end the program.
         calls.on_processed = [](void *context, PfHologram *given) noexcept {

@@ -1,6 +1,6 @@
 //! Camera frames and their layout in memory.
 
-use crate::pointer::{bytes, pick, read};
+use crate::pointer::{Extensible, bytes, pick, read};
 use crate::status::Result;
 use phasefront_ffi::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
@@ -207,10 +207,12 @@ pub struct PfCameras {
     pub translation_m: [f64; 3],
 }
 
-/// A frame: colour, depth, and their relation. Initialize it with zeros.
+/// A frame: colour, depth, and their relation. Initialize it with its size and zeros: `PfFrame frame = {sizeof frame};`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfFrame {
+    /// The size of this struct, sizeof(PfFrame). Set it before the call.
+    pub size: usize,
     /// The time at which the frame was taken, in nanoseconds of any clock that runs forward.
     pub timestamp_ns: u64,
     /// The colour image.
@@ -225,6 +227,11 @@ pub struct PfFrame {
     pub mirrored: bool,
     /// The cameras; NULL if depth and colour have the same field of view.
     pub cameras: *const PfCameras,
+}
+
+// SAFETY: its first field is its size.
+unsafe impl Extensible for PfFrame {
+    const NAME: &'static str = "PfFrame";
 }
 
 /// The memory and the description of a frame.

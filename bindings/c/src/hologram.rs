@@ -1,6 +1,6 @@
 //! Results: objects whose memory is read in place.
 
-use crate::pointer::{free, give, object, pick, read};
+use crate::pointer::{Extensible, free, give, give_sized, object, pick, read};
 use crate::status::{PfStatus, call};
 use phasefront_ffi::{FrameTimes, Layout, OutputSize, Placement, RawHologram, RawMemory, RawPlanes};
 use std::sync::Arc;
@@ -43,6 +43,8 @@ impl From<FrameTimes> for PfFrameTimes {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfHologramInfo {
+    /// The size of this struct, sizeof(PfHologramInfo). Set it before the call.
+    pub size: usize,
     /// The timestamp of the frame.
     pub timestamp_ns: u64,
     /// The width in pixels.
@@ -63,6 +65,11 @@ pub struct PfHologramInfo {
     pub valid_depth: f32,
     /// The time that each stage took.
     pub times: PfFrameTimes,
+}
+
+// SAFETY: its first field is its size.
+unsafe impl Extensible for PfHologramInfo {
+    const NAME: &'static str = "PfHologramInfo";
 }
 
 /// The arrangement of the colours' levels in images for a modulator's driver.
@@ -182,9 +189,10 @@ pub struct PfPlanesInfo {
 pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mut PfHologramInfo) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe {
-        give(info, "info", || {
+        give_sized(info, "info", || {
             let known = read(hologram, "hologram")?.0.info();
             Ok(PfHologramInfo {
+                size: size_of::<PfHologramInfo>(),
                 timestamp_ns: known.timestamp_ns as u64,
                 width: known.width as u32,
                 height: known.height as u32,

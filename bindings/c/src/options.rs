@@ -1,7 +1,7 @@
 //! The options of a session.
 
 use crate::network::{PfDepthNetwork, PfNetwork};
-use crate::pointer::{change, free, give, object, pick, read};
+use crate::pointer::{Extensible, change, free, give, object, pick, read, read_sized};
 use crate::status::{PfStatus, Result, call};
 use crate::target::PfTarget;
 use phasefront_ffi::{
@@ -39,6 +39,8 @@ const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfQualityLevel {
+    /// The size of this struct, sizeof(PfQualityLevel). Set it before the call.
+    pub size: usize,
     /// The method, a PfMethod except PF_METHOD_DEFAULT.
     pub method: u32,
     /// The network of PF_METHOD_TRAINED and PF_METHOD_AUTO; otherwise NULL.
@@ -51,6 +53,11 @@ pub struct PfQualityLevel {
     pub local_steps: i32,
     /// The number of steps at the midpoint; negative for the session's number.
     pub midpoint_steps: i32,
+}
+
+// SAFETY: its first field is its size.
+unsafe impl Extensible for PfQualityLevel {
+    const NAME: &'static str = "PfQualityLevel";
 }
 
 /// The options of a session.
@@ -130,7 +137,7 @@ pub unsafe extern "C" fn pf_options_push_quality_level(
     // SAFETY: the rules of this border.
     unsafe {
         try_set(options, |options| {
-            let quality_level = read(quality_level, "quality_level")?;
+            let quality_level = read_sized(quality_level, "quality_level")?;
             let method = method_of(quality_level.method, quality_level.network)?.ok_or_else(|| {
                 PhasefrontError::Setting(
                     "method of a quality level is PF_METHOD_DEFAULT; name one of the others".into(),

@@ -17,6 +17,51 @@ pub(crate) unsafe fn read<'a, T>(pointer: *const T, name: &str) -> Result<&'a T>
     unsafe { pointer.as_ref() }.ok_or_else(|| null(name))
 }
 
+/// A struct that later versions may extend.
+///
+/// # Safety
+/// Its first field is its size in bytes, a `usize`, which the caller sets.
+pub(crate) unsafe trait Extensible {
+    /// The name in C.
+    const NAME: &'static str;
+}
+
+/// Checks that `pointer` points at a struct of this version's size.
+///
+/// # Safety
+/// It is NULL, or valid for reads of its size.
+unsafe fn check_size<T: Extensible>(pointer: *const T, name: &str) -> Result<()> {
+    // SAFETY: the caller's promise, and that of the trait.
+    let size = *unsafe { read(pointer.cast::<usize>(), name) }?;
+    if size == size_of::<T>() {
+        return Ok(());
+    }
+    let (of, right) = (T::NAME, size_of::<T>());
+    Err(PhasefrontError::Setting(format!(
+        "{name}->size is {size}; it is sizeof({of}), {right}"
+    )))
+}
+
+/// Returns the struct that `pointer` points at.
+///
+/// # Safety
+/// It is NULL, or valid for reads as long as `'a`.
+pub(crate) unsafe fn read_sized<'a, T: Extensible>(pointer: *const T, name: &str) -> Result<&'a T> {
+    // SAFETY: the caller's promise, here and below.
+    unsafe { check_size(pointer, name) }?;
+    unsafe { read(pointer, name) }
+}
+
+/// Writes the result of `make` to the struct `to`, whose size the caller has set.
+///
+/// # Safety
+/// `to` is NULL, or valid for a write and for a read of its size.
+pub(crate) unsafe fn give_sized<T: Extensible>(to: *mut T, name: &str, make: impl FnOnce() -> Result<T>) -> Result<()> {
+    // SAFETY: the caller's promise, here and below.
+    unsafe { check_size(to, name) }?;
+    unsafe { give(to, name, make) }
+}
+
 /// Returns the value that `pointer` points at, to be changed.
 ///
 /// # Safety

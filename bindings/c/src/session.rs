@@ -3,7 +3,7 @@
 use crate::frame::PfFrame;
 use crate::hologram::{PfFrameTimes, PfHologram};
 use crate::options::PfOptions;
-use crate::pointer::{free, give, object, pick, read};
+use crate::pointer::{Extensible, free, give, give_sized, object, pick, read, read_sized};
 use crate::status::{PfStatus, Result, c_text, call};
 use phasefront_ffi::{
     DropReason, ListenerError, Quality, QualityChange, QualityReason, RawHologram, RawSession, RunningMode,
@@ -132,6 +132,8 @@ impl From<QualityChange> for PfQualityChange {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PfListener {
+    /// The size of this struct, sizeof(PfListener). Set it before the call.
+    pub size: usize,
     /// The first argument of each function.
     pub context: *mut c_void,
     /// Reports that a frame became a hologram. The listener must free it with pf_hologram_free.
@@ -146,6 +148,11 @@ pub struct PfListener {
     /// Reports that the session is closed. This is the last call. It is made exactly once, before pf_session_free
     /// returns, or after it if pf_session_free does not wait.
     pub on_closed: Option<unsafe extern "C" fn(context: *mut c_void)>,
+}
+
+// SAFETY: its first field is its size.
+unsafe impl Extensible for PfListener {
+    const NAME: &'static str = "PfListener";
 }
 
 struct Listener(PfListener);
@@ -203,6 +210,8 @@ impl SessionListener for Listener {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfStatistics {
+    /// The size of this struct, sizeof(PfStatistics). Set it before the call.
+    pub size: usize,
     /// Frames that were submitted.
     pub submitted: u64,
     /// Frames that became holograms.
@@ -227,9 +236,15 @@ pub struct PfStatistics {
     pub backend_why: [c_char; 256],
 }
 
+// SAFETY: its first field is its size.
+unsafe impl Extensible for PfStatistics {
+    const NAME: &'static str = "PfStatistics";
+}
+
 impl From<Statistics> for PfStatistics {
     fn from(statistics: Statistics) -> Self {
         PfStatistics {
+            size: size_of::<PfStatistics>(),
             submitted: statistics.submitted as u64,
             processed: statistics.processed as u64,
             failed: statistics.failed as u64,
@@ -285,9 +300,11 @@ pub unsafe extern "C" fn pf_session_new(
         give(session, "session", || {
             let options = read(options, "options")?.0.clone();
             let mode = pick(&RUNNING_MODES, mode, "mode")?;
-            let listener = listener
-                .as_ref()
-                .map(|listener| Arc::new(Listener(*listener)) as Arc<_>);
+            let listener = if listener.is_null() {
+                None
+            } else {
+                Some(Arc::new(Listener(*read_sized(listener, "listener")?)) as Arc<_>)
+            };
             Ok(object(PfSession(RawSession::new(options, mode, listener)?)))
         })
     })
@@ -313,7 +330,7 @@ pub unsafe extern "C" fn pf_session_process(
     // SAFETY: the rules of this border.
     call(|| unsafe {
         give(hologram, "hologram", || {
-            let taken = read(frame, "frame")?.take()?;
+            let taken = read_sized(frame, "frame")?.take()?;
             let [luma_or_colour, chroma, chroma_v] = taken.colour;
             let hologram = read(session, "session")?.0.process(
                 luma_or_colour,
@@ -339,7 +356,7 @@ pub unsafe extern "C" fn pf_session_submit(
     // SAFETY: the rules of this border.
     call(|| unsafe {
         give(dropped, "dropped", || {
-            let taken = read(frame, "frame")?.take()?;
+            let taken = read_sized(frame, "frame")?.take()?;
             let [luma_or_colour, chroma, chroma_v] = taken.colour;
             let reason = read(session, "session")?.0.submit(
                 luma_or_colour,
@@ -419,7 +436,7 @@ pub unsafe extern "C" fn pf_session_step_by_itself(session: *const PfSession) ->
 pub unsafe extern "C" fn pf_session_statistics(session: *const PfSession, statistics: *mut PfStatistics) -> PfStatus {
     // SAFETY: the rules of this border.
     call(|| unsafe {
-        give(statistics, "statistics", || {
+        give_sized(statistics, "statistics", || {
             Ok(read(session, "session")?.0.statistics().into())
         })
     })

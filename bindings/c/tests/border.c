@@ -29,7 +29,8 @@ static uint8_t colour[WIDTH * HEIGHT * 3];
 static uint8_t depth[WIDTH * HEIGHT];
 
 static PfFrame frame_at(uint64_t timestamp_ns) {
-    return (PfFrame){.timestamp_ns = timestamp_ns,
+    return (PfFrame){.size = sizeof(PfFrame),
+                     .timestamp_ns = timestamp_ns,
                      .colour = {.format = PF_COLOUR_FORMAT_RGB,
                                 .width = WIDTH,
                                 .height = HEIGHT,
@@ -45,7 +46,7 @@ typedef struct Heard {
 } Heard;
 
 static void on_processed(void *context, PfHologram *hologram) {
-    PfHologramInfo info;
+    PfHologramInfo info = {.size = sizeof info};
     ok(pf_hologram_info(hologram, &info));
     assert(info.width == WIDTH && info.height == HEIGHT);
     pf_hologram_free(hologram);
@@ -88,7 +89,7 @@ static void mistakes(PfTarget *target, PfOptions *options) {
     refused(pf_options_new(target, 7, NULL, &options), PF_STATUS_SETTING, "method is 7");
     refused(pf_options_new(target, PF_METHOD_TRAINED, NULL, &options), PF_STATUS_SETTING, "network is NULL");
     refused(pf_options_set_backend(options, 2), PF_STATUS_SETTING, "backend is 2");
-    PfQualityLevel quality_level = {.method = PF_METHOD_DEFAULT, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
+    PfQualityLevel quality_level = {.size = sizeof quality_level, .method = PF_METHOD_DEFAULT, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
     refused(pf_options_push_quality_level(options, &quality_level), PF_STATUS_SETTING, "PF_METHOD_DEFAULT");
     refused(pf_session_new(options, 3, NULL, &no_session), PF_STATUS_SETTING, "mode is 3");
     refused(pf_session_new(options, PF_RUNNING_MODE_LIVE, NULL, &no_session), PF_STATUS_SESSION, "listener");
@@ -197,8 +198,11 @@ static void modulators(void) {
 
 static void live(const PfOptions *options) {
     Heard heard = {0};
-    PfListener listener = {&heard, on_processed, on_dropped, on_failed, NULL, on_closed};
+    PfListener listener = {sizeof listener, &heard, on_processed, on_dropped, on_failed, NULL, on_closed};
     PfSession *session = NULL;
+    // A struct of another version's size is refused.
+    PfListener other = {.size = sizeof other + 8};
+    refused(pf_session_new(options, PF_RUNNING_MODE_LIVE, &other, &session), PF_STATUS_SETTING, "sizeof(PfListener)");
     refused(pf_session_new(options, PF_RUNNING_MODE_IMAGE, &listener, &session), PF_STATUS_SESSION, "listener");
     assert(heard.closed == 0);
     ok(pf_session_new(options, PF_RUNNING_MODE_LIVE, &listener, &session));
@@ -214,7 +218,9 @@ static void live(const PfOptions *options) {
     ok(pf_session_set_thermal(session, PF_THERMAL_FAIR));
     refused(pf_session_set_thermal(session, 9), PF_STATUS_SETTING, "thermal is 9");
     refused(pf_session_fix_quality_level(session, 9), PF_STATUS_SETTING, "no quality level 9");
-    PfStatistics statistics;
+    PfStatistics statistics = {0};
+    refused(pf_session_statistics(session, &statistics), PF_STATUS_SETTING, "statistics->size is 0");
+    statistics.size = sizeof statistics;
     do ok(pf_session_statistics(session, &statistics));
     while (statistics.pending > 0);
     ok(pf_session_pause(session));
@@ -258,7 +264,7 @@ static void ended_by_its_listener(const PfOptions *options) {
     Ending *ending = calloc(1, sizeof *ending);
     assert(ending != NULL);
     ending->stage = &stage;
-    PfListener listener = {.context = ending, .on_processed = end_processed, .on_dropped = end_dropped, .on_closed = end_closed};
+    PfListener listener = {.size = sizeof listener, .context = ending, .on_processed = end_processed, .on_dropped = end_dropped, .on_closed = end_closed};
     PfSession *session = NULL;
     ok(pf_session_new(options, PF_RUNNING_MODE_LIVE, &listener, &session));
     ending->session = session;

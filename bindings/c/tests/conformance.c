@@ -65,7 +65,8 @@ static PfPlane plane(const cJSON *json, const uint8_t *memory) {
 
 static PfFrame frame_of(const cJSON *json, const uint8_t *memory) {
     const cJSON *colour = of(json, "colour");
-    PfFrame frame = {.timestamp_ns = (uint64_t)number(json, "timestamp_ns"),
+    PfFrame frame = {.size = sizeof frame,
+                     .timestamp_ns = (uint64_t)number(json, "timestamp_ns"),
                      .colour = {.format = pick(text(colour, "format"), COLOURS, 5),
                                 .width = (uint32_t)number(colour, "width"),
                                 .height = (uint32_t)number(colour, "height"),
@@ -202,7 +203,7 @@ static void run(const cJSON *json, const char *suite, const char *models, const 
         PfFrame frame = frame_of(one, memory);
         PfHologram *hologram = NULL;
         ok(pf_session_process(session, &frame, &hologram), name);
-        PfHologramInfo info;
+        PfHologramInfo info = {.size = sizeof info};
         ok(pf_hologram_info(hologram, &info), "info");
         for (uint32_t colour = 0; colour < info.colours; colour++) {
             const uint8_t *levels = NULL;

@@ -229,6 +229,7 @@ namespace Phasefront
             if (planes.Length > 3) throw new PhasefrontException(Status.Frame, "frame: a colour image has 3 planes at most");
             var native = new NativeFrame
             {
+                Size = Native.SizeOf<NativeFrame>(),
                 TimestampNs = TimestampNs,
                 Colour = new NativeColour
                 {

@@ -26,6 +26,7 @@ namespace Phasefront
     [StructLayout(LayoutKind.Sequential)]
     public struct HologramInfo
     {
+        internal UIntPtr Size;
         /// <summary>The frame's timestamp.</summary>
         public ulong TimestampNs;
         /// <summary>The width in pixels.</summary>
@@ -165,7 +166,8 @@ namespace Phasefront
         {
             get
             {
-                Check(Native.pf_hologram_info(this, out var info));
+                var info = new HologramInfo { Size = Native.SizeOf<HologramInfo>() };
+                Check(Native.pf_hologram_info(this, ref info));
                 return info;
             }
         }

@@ -38,6 +38,7 @@ namespace Phasefront
     [StructLayout(LayoutKind.Sequential)]
     internal struct NativeFrame
     {
+        public UIntPtr Size;
         public ulong TimestampNs;
         public NativeColour Colour;
         public NativeDepth Depth;
@@ -50,6 +51,7 @@ namespace Phasefront
     [StructLayout(LayoutKind.Sequential)]
     internal struct NativeQualityLevel
     {
+        public UIntPtr Size;
         public uint Method;
         public IntPtr Network;
         public uint Width;
@@ -90,6 +92,7 @@ namespace Phasefront
     [StructLayout(LayoutKind.Sequential)]
     internal struct NativeListener
     {
+        public UIntPtr Size;
         public IntPtr Context;
         public Native.OnProcessed OnProcessed;
         public Native.OnDropped OnDropped;
@@ -113,6 +116,9 @@ namespace Phasefront
         private const string Library = "phasefront_c";
 #endif
         private const CallingConvention C = CallingConvention.Cdecl;
+
+        // What the library expects in the first field of structs that later versions may extend.
+        public static UIntPtr SizeOf<T>() => (UIntPtr)(ulong)Marshal.SizeOf<T>();
 
         [UnmanagedFunctionPointer(C)] public delegate void OnProcessed(IntPtr context, IntPtr hologram);
         [UnmanagedFunctionPointer(C)] public delegate void OnDropped(IntPtr context, ulong timestampNs, DropReason reason);
@@ -169,9 +175,9 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_set_thermal(HologramSession session, Thermal thermal);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_fix_quality_level(HologramSession session, uint qualityLevel);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_step_by_itself(HologramSession session);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_statistics(HologramSession session, out Statistics statistics);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_statistics(HologramSession session, ref Statistics statistics);
 
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_info(Hologram hologram, out HologramInfo info);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_info(Hologram hologram, ref HologramInfo info);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_levels(Hologram hologram, uint colour, out IntPtr levels, out UIntPtr length);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_z_at(Hologram hologram, double x, double y, out double zMm);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_write_preview(Hologram hologram, double zMm, uint width, uint height, uint layout, NativeMemory memory);

@@ -81,6 +81,7 @@ namespace Phasefront
     [StructLayout(LayoutKind.Sequential, CharSet = CharSet.Ansi)]
     public struct Statistics
     {
+        internal UIntPtr Size;
         /// <summary>The frames that were submitted to the session.</summary>
         public ulong Submitted;
         /// <summary>The frames that became holograms.</summary>
@@ -155,6 +156,7 @@ namespace Phasefront
             var context = GCHandle.Alloc(hearing);
             var native = new NativeListener
             {
+                Size = Native.SizeOf<NativeListener>(),
                 Context = GCHandle.ToIntPtr(context),
                 OnProcessed = Processed,
                 OnDropped = Dropped,
@@ -216,7 +218,8 @@ namespace Phasefront
         {
             get
             {
-                Check(Native.pf_session_statistics(this, out var statistics));
+                var statistics = new Statistics { Size = Native.SizeOf<Statistics>() };
+                Check(Native.pf_session_statistics(this, ref statistics));
                 return statistics;
             }
         }

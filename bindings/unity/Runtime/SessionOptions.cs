@@ -70,6 +70,7 @@ namespace Phasefront
             {
                 var qualityLevel = new NativeQualityLevel
                 {
+                    Size = Native.SizeOf<NativeQualityLevel>(),
                     Method = (uint)method,
                     Network = native,
                     Width = (uint)width,

@@ -17,6 +17,7 @@ struct Images {
 
     PfFrame frame(std::uint64_t timestamp_ns) const {
         PfFrame frame{};
+        frame.size = sizeof frame;
         frame.timestamp_ns = timestamp_ns;
         frame.colour = {PF_COLOUR_FORMAT_RGB, width, height, PF_YUV_MATRIX_BT601, false, {}};
         frame.colour.planes[0] = {colour.data(), colour.size(), width * 3, 3};
@@ -57,6 +58,14 @@ void errors(const Target &target) {
     const Session session(options, PF_RUNNING_MODE_VIDEO);
     try {
         session.process(PfFrame{});
+        expect(false, "a hologram of a struct without a size");
+    } catch (const Error &error) {
+        expect(error.status() == PF_STATUS_SETTING && std::strstr(error.what(), "sizeof(PfFrame)"), error.what());
+    }
+    try {
+        PfFrame nothing{};
+        nothing.size = sizeof nothing;
+        session.process(nothing);
         expect(false, "a hologram of nothing");
     } catch (const Error &error) {
         expect(error.status() == PF_STATUS_FRAME, error.what());
