@@ -1,5 +1,5 @@
-// Shows holograms of a camera's colour and depth textures on a screen that drives the modulator. Put it on an object
-// with a RawImage that fills the modulator's display, and call Submit for each frame.
+// Shows holograms of submitted frames on a screen that drives the modulator, by a RawImage that fills it. Call Submit for
+// each frame. The scene Live has it and a TestPicture, which submits frames.
 using System.Collections.Concurrent;
 using Phasefront;
 using UnityEngine;
@@ -21,7 +21,8 @@ public sealed class HologramView : MonoBehaviour, ISessionListener
         using (var target = HologramTarget.FromToml($"width = {width}\nheight = {height}"))
         using (var options = SessionOptions.For(target))
             session = HologramSession.Open(options, RunningMode.Live, this);
-        texture = new Texture2D(width, height, TextureFormat.RGBA32, false, true);
+        // Neither filtered nor converted to linear light: a value between two levels is a different phase.
+        texture = new Texture2D(width, height, TextureFormat.RGBA32, false, true) { filterMode = FilterMode.Point };
         modulator.texture = texture;
         levels = new byte[4 * width * height];
     }
