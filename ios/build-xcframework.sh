@@ -60,9 +60,14 @@ fi
 
 sysroot=$(rustc --print sysroot)
 host=$(rustc -vV | sed -n 's/^host: //p')
-if command -v rustup >/dev/null; then rustup target add "${targets[@]}"; fi
 for target in "${targets[@]}"; do
-    cargo rustc --profile "$profile" --package phasefront-ffi "${features[@]}" --target "$target" --crate-type staticlib
+    standard=()
+    [ -d "$sysroot/lib/rustlib/$target/lib" ] || rustup target add "$target" || {
+        # Some mirrors of Rust have no standard library for the simulator. It can be built, which is unstable.
+        rustup component add rust-src
+        standard=(-Z build-std=std,panic_unwind)
+    }
+    ${standard:+env RUSTC_BOOTSTRAP=1} cargo rustc "${standard[@]}" --profile "$profile" --package phasefront-ffi "${features[@]}" --target "$target" --crate-type staticlib
     library="$built/$target/${profile/#dev/debug}/libphasefront_ffi.a"
     mkdir -p "$build/$target"
     cp "$library" "$build/$target/"

@@ -26,4 +26,6 @@ public struct OSSignpostID: Sendable { public init(log: OSLog, object: AnyObject
 public func os_signpost(_: OSSignpostType, log: OSLog, name: StaticString, signpostID: OSSignpostID) {}
 extension ProcessInfo {
     public enum ThermalState: Int, Sendable { case nominal, fair, serious, critical }
+    public var thermalState: ThermalState { fatalError() }
+    public static var thermalStateDidChangeNotification: Notification.Name { fatalError() }
 }

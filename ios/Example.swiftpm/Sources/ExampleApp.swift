@@ -1,4 +1,5 @@
 import Phasefront
+import PhotosUI
 import SwiftUI
 
 @main
@@ -12,9 +13,16 @@ struct ExampleApp: App {
     }
 }
 
+/// What the app shows: the benchmark, a photo, or the camera.
+private struct Shown: Equatable {
+    let isMeasuring: Bool
+    let photo: PhotosPickerItem?
+}
+
 struct ContentView: View {
     @ObservedObject var show: Show
     @State private var isMeasuring = false
+    @State private var photo: PhotosPickerItem?
 
     var body: some View {
         VStack {
@@ -35,13 +43,21 @@ struct ContentView: View {
             HStack {
                 Text(show.statistics)
                     .font(.caption.monospacedDigit())
+                // The picker runs outside the app, so it needs no permission.
+                PhotosPicker("Portrait", selection: $photo, matching: .depthEffectPhotos)
+                if photo != nil { Button("Camera") { photo = nil } }
                 Button("Benchmark") { isMeasuring = true }
             }
         }
         .padding()
         // The session is closed while the benchmark is shown, so that nothing else computes.
-        .task(id: isMeasuring) {
-            if !isMeasuring { await show.run() }
+        .task(id: Shown(isMeasuring: isMeasuring, photo: photo)) {
+            if isMeasuring { return }
+            if let photo {
+                if let data = try? await photo.loadTransferable(type: Data.self) { await show.show(photo: data) }
+            } else {
+                await show.run()
+            }
         }
         .sheet(isPresented: $isMeasuring) { BenchmarkView() }
         .alert("Phasefront", isPresented: $show.hasError) {

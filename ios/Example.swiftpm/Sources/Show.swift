@@ -21,12 +21,14 @@ final class Show: ObservableObject {
         do {
             try HologramLog.sendToSystem()
             let session = try HologramSession(SessionOptions.phone(display: display), mode: .live)
-            let source: FrameSource = CameraSource.isSupported ? CameraSource() : SampleSource()
+            let heat = session.followThermalState()
+            defer { withExtendedLifetime(heat) {} }
+            let source: FrameSource =
+                if CameraSource.isSupported { CameraSource() } else { DepthCameraSource() ?? SampleSource() }
             source.start(session)
             defer { source.stop() }
             for await event in session.events {
                 if Task.isCancelled { break }
-                try session.setThermal(Thermal(ProcessInfo.processInfo.thermalState))
                 switch event {
                 case .processed(let hologram): try await show(hologram, of: session)
                 case .failed(_, let message): say(message)
@@ -56,6 +58,17 @@ final class Show: ObservableObject {
         statistics = String(
             format: "%.1f holograms a second, %lld dropped of %lld\n%@: %.1f ms, of which the method takes %.1f",
             of.rateHz, of.dropped.total, of.submitted, of.backend, of.times.totalMs, of.times.methodMs)
+    }
+
+    /// Shows the hologram of a photo with depth, such as a portrait.
+    func show(photo: Data) async {
+        do {
+            let session = try HologramSession(SessionOptions(display: display), mode: .image)
+            let hologram = try await Task.detached { try session.process(photo: photo) }.value
+            try await show(hologram, of: session)
+        } catch {
+            say(error.localizedDescription)
+        }
     }
 
     /// Focuses on the scene point at (`x`, `y`) of the image, each 0...1.

@@ -62,4 +62,29 @@
                 }
         }
     }
+
+    extension HologramSession {
+        /// Passes the device's thermal state to ``setThermal(_:)`` now and whenever it changes, until the returned object
+        /// is released. The object does not retain the session.
+        public func followThermalState() -> ThermalFollower {
+            let tell = { @Sendable [weak self] in
+                // A closed session needs no state.
+                _ = try? self?.setThermal(Thermal(ProcessInfo.processInfo.thermalState))
+            }
+            tell()
+            return ThermalFollower(
+                NotificationCenter.default.addObserver(
+                    forName: ProcessInfo.thermalStateDidChangeNotification, object: nil, queue: nil
+                ) { _ in tell() })
+        }
+    }
+
+    /// Follows the thermal state of the device for a session, as long as it is retained.
+    public final class ThermalFollower {
+        private let observer: NSObjectProtocol
+
+        init(_ observer: NSObjectProtocol) { self.observer = observer }
+
+        deinit { NotificationCenter.default.removeObserver(observer) }
+    }
 #endif
