@@ -34,8 +34,7 @@ pub struct Tiling {
 }
 
 /// Returns a tiling for `chain` on the current pool: up to three bands per thread, so that a slower core gets fewer of
-/// them, if at most a sixteenth is computed twice; and strips of which three rows of each layer's input fit in
-/// [`Chain::CACHE`].
+/// them, if at most a sixteenth is computed twice; and strips whose rings fit in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let places = Places {
         side: chain.side(),
@@ -44,7 +43,7 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
     let (height, width) = places.size();
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
-        .map(|i| WINDOW * chain.groups(i) * C::GROUP * size_of::<C::Element>())
+        .map(|i| (chain.step() + 2) * chain.groups(i) * C::GROUP * size_of::<C::Element>())
         .sum();
     let threads = rayon::current_num_threads();
     // At each edge between two bands layer i computes layers − 1 − i rows on both sides.
@@ -127,7 +126,7 @@ pub(crate) trait Chain: Sync {
     type Element: Copy + Default + Send + Sync;
     /// The channels of a group: the adjacent elements of one pixel.
     const GROUP: usize;
-    /// The bytes that three rows of each layer's input may occupy in a strip.
+    /// The bytes that the rings of a strip may occupy.
     const CACHE: usize;
 
     fn layers(&self) -> usize;
