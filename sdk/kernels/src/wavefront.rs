@@ -20,8 +20,6 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) const MARGIN: usize = 16;
 /// The divisor of the length of rows in pixels, so that kernels write whole blocks.
 pub(crate) const BLOCK: usize = 64;
-/// The rows of a layer's input that a row of its output needs.
-const WINDOW: usize = 3;
 
 /// The division of a frame into bands and strips. The result does not depend on it. Rows and columns are those of the
 /// chain's places: pixels, or squares of two by two at half the resolution.
