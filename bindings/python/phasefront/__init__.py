@@ -66,18 +66,19 @@ from ._ffi import (
 from ._encode import Modulator, encode
 from ._frame import Frame
 from ._hologram import Hologram
+from ._metrics import Comparison, compare
 from ._session import Dropped, Event, Failed, Processed, QualityChanged, Session, send_log, send_stages, session_options
 from ._target import Target
 
 __all__ = [
-    "Backend", "Brightness", "Cameras", "ColourFormat", "ColourScale", "ConfidenceFormat", "DeepPair", "DepthFormat",
+    "Backend", "Brightness", "Cameras", "ColourFormat", "ColourScale", "Comparison", "ConfidenceFormat", "DeepPair", "DepthFormat",
     "DepthNetwork", "DepthRange",
     "Display", "DisplayError", "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "FileError", "Frame",
     "FrameError", "FrameTimes", "Hologram", "HologramInfo", "InternalError", "Intrinsics", "Layout", "LogLevel",
     "Method", "Modulator", "Network", "NetworkError", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
     "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "Rotation",
     "RunningMode", "Session", "SessionError", "SessionOptions", "SettingError", "Stage", "Statistics", "Target",
-    "Thermal", "TimestampError", "YuvMatrix", "__version__", "built_in_pair", "display_from_toml", "encode",
+    "Thermal", "TimestampError", "YuvMatrix", "__version__", "built_in_pair", "compare", "display_from_toml", "encode",
     "modulator_names", "send_log", "send_stages", "session_options", "version",
 ]  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy
 from numpy.typing import ArrayLike
@@ -111,6 +111,23 @@ def _depth(depth: ArrayLike, depth_format: DepthFormat | None) -> tuple[_Array, 
             "millimetres are uint16: depth.astype(numpy.uint16)"
         )
     return array, depth_format
+
+
+class FrameOptions(TypedDict, total=False):
+    """Arguments of `Frame` that are the same for all frames of a batch."""
+
+    colour_format: ColourFormat | None
+    depth_format: DepthFormat | None
+    orientation: Orientation | None
+    cameras: Cameras | None
+
+
+def batch(what: str, values: ArrayLike) -> _Array:
+    """Returns images along the first axis of an array."""
+    array = _array(what, values)
+    if array.ndim < 3:
+        raise FrameError(f"frames: {what} is {array.shape}; the first axis counts frames, (N, H, W) or (N, H, W, 3)")
+    return array
 
 
 class Frame:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -100,13 +101,19 @@ class Hologram:
         self._raw.write_preview(z_mm, width, height, layout, memory)
         return array
 
-    def refocus(self, z_mm: float) -> NDArray[numpy.float32]:
+    def refocus(self, z_mm: float | Sequence[float] | NDArray[Any]) -> NDArray[numpy.float32]:
         """Returns the displayed image of the whole hologram for an eye focused at `z_mm`, as amplitudes; 1 is white,
-        float32, (C, H, W). Read only.
+        float32, (C, H, W). Read only. For several z it returns their focal stack, (Z, C, H, W).
 
-        Raises `SettingError` if z is too far away.
+        Raises `SettingError` if a z is too far away.
         """
-        return self._numbers(self._raw.refocus(z_mm), numpy.float32)
+        foci = numpy.asarray(z_mm, numpy.float64)
+        if foci.ndim == 0:
+            return self._numbers(self._raw.refocus(float(foci)), numpy.float32)
+        stack = numpy.empty((len(foci), *self._shape), numpy.float32)
+        for image, z in zip(stack, foci):
+            image[...] = self.refocus(z)
+        return stack
 
     def field(self, z_mm: float = 0.0) -> NDArray[numpy.complex64]:
         """Returns the complex field of the levels behind the aperture at `z_mm` (0 is the midpoint), complex64,

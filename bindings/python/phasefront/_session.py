@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, TypeAlias, TypedDict, Unpack
+
+import numpy
+from numpy.typing import ArrayLike, NDArray
 
 from . import _ffi
 from ._ffi import (
@@ -17,6 +20,7 @@ from ._ffi import (
     Display,
     DropReason,
     Encoding,
+    FrameError,
     LogLevel,
     Method,
     Network,
@@ -25,11 +29,12 @@ from ._ffi import (
     QualityLevel,
     RunningMode,
     SessionOptions,
+    SettingError,
     Stage,
     Statistics,
     Thermal,
 )
-from ._frame import Frame
+from ._frame import Frame, FrameOptions, batch
 from ._hologram import Hologram, Purpose
 from ._target import Target
 
@@ -182,6 +187,43 @@ class Session:
         of a video, and `SessionError` if the session is live, paused or closed. Later frames are not affected.
         """
         return Hologram(self._raw.process(*frame._arguments()), self._purpose)
+
+    def process_batch(
+        self,
+        colour: ArrayLike,
+        depth: ArrayLike | None = None,
+        *,
+        timestamps_ns: Sequence[int] | None = None,
+        out: NDArray[numpy.uint8] | None = None,
+        **options: Unpack[FrameOptions],
+    ) -> NDArray[numpy.uint8]:
+        """Returns the levels of several frames of one size, uint8, (N, C, H, W). Processes them one after another, and
+        keeps one hologram at a time.
+
+        Args:
+            colour: uint8, (N, H, W) for grey, (N, H, W, 3) for RGB, (N, H, W, 4) for RGBA or BGRA.
+            depth: (N, h, w), of the types of `Frame`.
+            timestamps_ns: The timestamps, which a video session needs.
+            out: The array to write into and to return, for example one for all batches.
+            options: Other arguments of `Frame`, which are those of all frames.
+
+        Raises the same errors as `process`, `FrameError` if colour and depth have another number of frames, and
+        `SettingError` if `out` does not fit or the session changed its quality level.
+        """
+        colours = batch("colour", colour)
+        depths = [None] * len(colours) if depth is None else batch("depth", depth)
+        times = [0] * len(colours) if timestamps_ns is None else timestamps_ns
+        if not len(colours) == len(depths) == len(times) > 0:
+            counts = f"{len(colours)} colour images, {len(depths)} depth images and {len(times)} timestamps"
+            raise FrameError(f"frames: there are {counts}; the same number of each is right, 1 or more")
+        for i, (image, metres, time) in enumerate(zip(colours, depths, times)):
+            levels = self.process(Frame(image, metres, timestamp_ns=time, **options)).levels
+            out = numpy.empty((len(colours), *levels.shape), numpy.uint8) if out is None else out
+            if out.dtype != numpy.uint8 or out.shape != (len(colours), *levels.shape):
+                raise SettingError(f"out is {out.dtype}, {out.shape}; frame {i} of {len(colours)} has levels of {levels.shape}, uint8")
+            out[i] = levels
+        assert out is not None, "there is a frame"
+        return out
 
     def submit(self, frame: Frame) -> DropReason | None:
         """Submits `frame` to a live stream, which copies it. Never waits for a frame. Returns the reason if the frame
