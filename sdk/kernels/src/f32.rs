@@ -184,8 +184,6 @@ impl F32Chain {
 impl Chain for F32Chain {
     type Element = f32;
     const GROUP: usize = 1;
-    // Half of a core's second-level cache: strips of the full width took a third longer.
-    const CACHE: usize = 1 << 20;
 
     fn layers(&self) -> usize {
         self.layers.len() + 1
@@ -193,6 +191,11 @@ impl Chain for F32Chain {
 
     fn step(&self) -> usize {
         1
+    }
+
+    fn cache(&self) -> usize {
+        // Half of a core's second-level cache: strips of the full width took a third longer.
+        1 << 20
     }
 
     fn side(&self) -> usize {

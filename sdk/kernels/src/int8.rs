@@ -432,9 +432,6 @@ fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
 impl Chain for Int8Chain {
     type Element = u8;
     const GROUP: usize = GROUP;
-    // Each byte takes as long to process as four bytes of f32, so rings may exceed the cache: narrower strips only add
-    // edges, 4 % at 30 layers.
-    const CACHE: usize = 1 << 21;
 
     fn layers(&self) -> usize {
         self.layers.len() + 1
@@ -444,6 +441,16 @@ impl Chain for Int8Chain {
         match self.kernels.layers {
             LayerKernels::Rows(_) => 1,
             LayerKernels::Tiles(_) => winograd::SIDE,
+        }
+    }
+
+    fn cache(&self) -> usize {
+        match self.kernels.layers {
+            // Each byte takes as long to process as four bytes of f32, so rings may exceed the cache: narrower strips
+            // only add edges, 4 % at 30 layers.
+            LayerKernels::Rows(_) => 1 << 21,
+            // Four rows of a layer pass at once, and larger rings are as fast only while nothing else uses the cache.
+            LayerKernels::Tiles(_) => 1 << 20,
         }
     }
 

@@ -32,7 +32,7 @@ pub struct Tiling {
 }
 
 /// Returns a tiling for `chain` on the current pool: up to three bands per thread, so that a slower core gets fewer of
-/// them, if at most a sixteenth is computed twice; and strips whose rings fit in [`Chain::CACHE`].
+/// them, if at most a sixteenth is computed twice; and strips whose rings fit in [`Chain::cache`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let places = Places {
         side: chain.side(),
@@ -51,7 +51,7 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
         .div_ceil(threads * bands_a_thread)
         .max((4 * layers).min(height))
         .max(1);
-    let widest = (C::CACHE / ring_column.max(1)).max(24 * layers).max(4 * BLOCK);
+    let widest = (chain.cache() / ring_column.max(1)).max(24 * layers).max(4 * BLOCK);
     let strip_columns = width.div_ceil(width.div_ceil(widest).max(1)).max(1);
     Tiling {
         band_rows,
@@ -124,12 +124,12 @@ pub(crate) trait Chain: Sync {
     type Element: Copy + Default + Send + Sync;
     /// The channels of a group: the adjacent elements of one pixel.
     const GROUP: usize;
-    /// The bytes that the rings of a strip may occupy.
-    const CACHE: usize;
 
     fn layers(&self) -> usize;
     /// Returns the rows by which the chain advances.
     fn step(&self) -> usize;
+    /// Returns the bytes that the rings of a strip may occupy.
+    fn cache(&self) -> usize;
     /// Returns the pixels along each side of a place: 1, or 2 at half the resolution.
     fn side(&self) -> usize;
     /// Returns the channels of a place of the network's input.
