@@ -93,7 +93,6 @@ def parser():
     p = add("quantize", run_quantize, "Write a network as int8 ONNX. If rounding costs more than 0.1 dB, train it with rounding first.")
     p.add_argument("file", help="checkpoint or float32 .onnx")
     p.add_argument("--network", default="hologram", choices=("hologram", "prefilter"), help="network to take from a stage 2 checkpoint (default %(default)s)")
-    p.add_argument("--weight-bits", type=int, default=8, choices=(7, 8), help="bits of a weight; 7 are faster on processors with AVX2 and without VNNI (default %(default)s)")
     whether = p.add_mutually_exclusive_group()
     whether.add_argument("--always-train", action="store_true", help="train even if rounding costs less")
     whether.add_argument("--never-train", action="store_true", help="do not train even if rounding costs more")
@@ -350,7 +349,7 @@ def go(task, args, workers, resume, folder=None):
 def run_quantize(args):
     subject = (quantized_prefilter if args.network == "prefilter" else quantized_hologram)(args)
     exact = subject.figure(subject.chain)
-    trainable = prepare.prepare(subject.chain, subject.examples, args.weight_bits)
+    trainable = prepare.prepare(subject.chain, subject.examples)
 
     def settled(how):
         """Returns the rounded network and prints its origin and quality."""

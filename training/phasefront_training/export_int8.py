@@ -52,7 +52,7 @@ def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
         conv = quantized.chain.convs[i]
         unit = quantized.parameters_of(parameters)[0]
         scale = quantized.scale(i, parameters)
-        weight = (conv.weight.detach() / scale[:, None, None, None]).round().clamp(-quantized.most, quantized.most)
+        weight = (conv.weight.detach() / scale[:, None, None, None]).round().clamp(-127, 127)
         bias = (conv.bias.detach() / (scale * unit)).round()
         name = f"conv_{i}"
         constant(f"{name}.weight", weight.cpu().numpy().astype(np.int8))

@@ -22,12 +22,12 @@ BALANCES = [2.0**k for k in range(-6, 5)]  # powers of two, which do not round f
 SCENES = 4  # for comparing scales and ranges
 
 
-def prepare(chain, examples, weight_bits=8):
+def prepare(chain, examples):
     """Returns the Quantized network of a Chain and scales the Chain's channels. examples: a list of inputs (C, H,
     W)."""
     equalise(chain, examples)
     balance(chain, examples)
-    return Quantized(chain, share(chain, calibrate(chain, examples), examples), weight_bits)
+    return Quantized(chain, share(chain, calibrate(chain, examples), examples))
 
 
 def in_two_parts(prefilter):

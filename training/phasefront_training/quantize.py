@@ -1,9 +1,9 @@
 """int8 networks: the quantization scheme, calibration, and a Chain that quantizes in its forward pass (for evaluation
 and QAT).
 
-Weights are int8 and symmetric with one scale for each output channel: scale = max|w| / 127, or max|w| / 63 in 7 bits,
-which AVX2 multiplies faster. Biases are int32 with the scale s_input · s_weight[c]. Activations are u8 with one scale
-and zero point for each tensor, from ranges chosen on training scenes (`calibrate`):
+Weights are int8 and symmetric with one scale for each output channel: scale = max|w| / 127. Biases are int32 with the
+scale s_input · s_weight[c]. Activations are u8 with one scale and zero point for each tensor, from ranges chosen on
+training scenes (`calibrate`):
 
 * outputs of a ReLU and sums of two of them: zero point 0, scale = max / 255;
 * the network's input, and the input of the last convolution (features and the network's input, concatenated):
@@ -59,10 +59,9 @@ def quantizer(name, low, high):
     return float(np.float32((high if high > 0 else SILENT) / 255)), 0
 
 
-def weight_scale(weight, bias, input_scale, most):
-    """Returns scales (O,) of a layer's weights (O, I, 3, 3) of at most `most` steps. An empty channel gets a scale that
-    fits its bias."""
-    largest = weight.detach().abs().amax((1, 2, 3)) / most
+def weight_scale(weight, bias, input_scale):
+    """Returns scales (O,) of a layer's weights (O, I, 3, 3). An empty channel gets a scale that fits its bias."""
+    largest = weight.detach().abs().amax((1, 2, 3)) / 127
     return torch.maximum(largest, bias.detach().abs() / (input_scale * 2**30)).clamp(min=1e-12)
 
 
@@ -74,14 +73,13 @@ def _through(exact, rounded):
 class Quantized(nn.Module):
     """A Chain whose forward pass rounds weights and activations like its int8 file.
 
-    ranges: {tensor: (min, max)} for the names of `tensors`. weight_bits: 8 or 7. scales: {layer: (O,)} of layers with
-    fixed weight scales (rounding.py). The scales of other layers follow from their weights.
+    ranges: {tensor: (min, max)} for the names of `tensors`. scales: {layer: (O,)} of layers with fixed weight scales
+    (rounding.py). The scales of other layers follow from their weights.
     """
 
-    def __init__(self, chain, ranges, weight_bits=8):
+    def __init__(self, chain, ranges):
         super().__init__()
         self.chain = chain
-        self.most = 2 ** (weight_bits - 1) - 1
         self.architecture = chain.architecture
         self.ranges = {name: tuple(map(float, ranges[name])) for name in tensors(self.architecture)}
         self.scales = {}
@@ -97,14 +95,14 @@ class Quantized(nn.Module):
         if i in self.scales:
             return self.scales[i]
         conv = self.chain.convs[i]
-        return weight_scale(conv.weight, conv.bias, self.parameters_of(input_name)[0], self.most)
+        return weight_scale(conv.weight, conv.bias, self.parameters_of(input_name)[0])
 
     def layer(self, i, input_name):
         """Returns the rounded (weight, bias) of layer i."""
         conv = self.chain.convs[i]
         scale = self.scale(i, input_name)
         wide = scale[:, None, None, None]
-        weight = _through(conv.weight, torch.round(conv.weight / wide).clamp(-self.most, self.most) * wide)
+        weight = _through(conv.weight, torch.round(conv.weight / wide).clamp(-127, 127) * wide)
         unit = scale * self.parameters_of(input_name)[0]
         return weight, _through(conv.bias, torch.round(conv.bias / unit) * unit)
 

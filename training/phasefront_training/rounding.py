@@ -25,7 +25,7 @@ def round_in_order(quantized, examples):
         name = steps[0][2]
         scale = quantized.scale(i, name)
         weights = torch.cat([conv.weight.flatten(1), conv.bias[:, None]], 1).double()
-        rounded = in_order(weights, scale.double(), quantized.most, _products([h for _, h, _ in steps]))
+        rounded = in_order(weights, scale.double(), _products([h for _, h, _ in steps]))
         conv.weight.copy_(rounded[:, :-1].reshape(conv.weight.shape))
         conv.bias.copy_(rounded[:, -1])
         quantized.scales[i] = scale
@@ -33,8 +33,8 @@ def round_in_order(quantized, examples):
             steps = [walk.send(F.conv2d(h, *quantized.layer(i, name), padding=1)) for walk, (_, h, _) in zip(walks, steps)]
 
 
-def in_order(weights, scale, most, products):
-    """Rounds the first K of the weights (O, K + 1) to at most `most` steps of scale (O,), one after another.
+def in_order(weights, scale, products):
+    """Rounds the first K of the weights (O, K + 1) to steps of scale (O,), one after another.
 
     products: (K + 1, K + 1), the mean products of the inputs of the weights.
     """
@@ -43,7 +43,7 @@ def in_order(weights, scale, most, products):
     factor = torch.linalg.cholesky(torch.linalg.inv(products), upper=True)
     for k in range(weights.shape[1] - 1):
         exact = weights[:, k].clone()
-        weights[:, k] = (exact / scale).round().clamp(-most, most) * scale
+        weights[:, k] = (exact / scale).round().clamp(-127, 127) * scale
         error = (exact - weights[:, k]) / factor[k, k]
         weights[:, k + 1 :] -= error[:, None] * factor[k, k + 1 :]
     return weights
