@@ -481,8 +481,8 @@ impl<C: Chain, R> Frame<'_, C, R> {
         let input = grown(input, chain.inputs() * columns);
         let side = self.places.side;
         let count = right - left;
-        let places = side * side * OUTPUTS * count;
-        let output = grown(output, advance * places);
+        let row_values = side * side * OUTPUTS * count;
+        let output = grown(output, advance * row_values);
         let rows = band.rows();
         let (top, bottom) = ((rows.start / side) as isize, rows.end.div_ceil(side) as isize);
         let (height, depth) = (self.height as isize, layers as isize);
@@ -536,15 +536,15 @@ impl<C: Chain, R> Frame<'_, C, R> {
                 let out = LastRows {
                     valid: valid.clone(),
                     values: &mut output[pixel * OUTPUTS * count..],
-                    row: places,
+                    row: row_values,
                     count,
                 };
                 chain.last_rows(pixel, rings[layers - 1].rows(first - 1), out, left - start, geometry);
             }
             for k in valid {
                 let run = ((first + k as isize) as usize, left, count);
-                self.places
-                    .write(self.rows, run, band, pixels, &mut output[k * places..][..places]);
+                let values = &mut output[k * row_values..][..row_values];
+                self.places.write(self.rows, run, band, pixels, values);
             }
         }
     }
