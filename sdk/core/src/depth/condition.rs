@@ -146,8 +146,7 @@ impl Conditioner {
         }
         let growth = self.place(depth, rgb, scratch);
         self.fill(depth, rgb, growth, scratch);
-        let clean =
-            self.depth == self.out && sharpness::measure_planes(rgb, &scratch.readings, self.depth.1).is_clean();
+        let clean = self.depth == self.out && sharpness::is_clean(rgb, &scratch.readings, self.depth.1);
         if clean {
             scratch.kinds.fill(Kind::Inside);
         } else {
@@ -197,7 +196,7 @@ impl Conditioner {
         }
         if scratch.filled.contains(&true) {
             let (axes, filled) = ((&scratch.x, &scratch.y), &scratch.filled);
-            colour::colours(rgb, axes, fill::REACH, |i| filled[i], &mut scratch.colours);
+            colour::colours(rgb, axes, fill::REACH, (filled, |filled| *filled), &mut scratch.colours);
             fill::fill(&mut scratch.readings, width, &scratch.colours, &mut scratch.fill);
         }
     }
@@ -212,8 +211,8 @@ impl Conditioner {
         edges::find(&scratch.readings, width, &mut scratch.bent, &mut scratch.kinds);
         if contradict::applies(self.crop, self.out) {
             let kinds = &scratch.kinds;
-            let is_edge = |i: usize| kinds[i] != Kind::Inside;
-            colour::colours(rgb, axes, 2 * fill::REACH, is_edge, &mut scratch.colours);
+            let edges = (&kinds[..], Kind::is_at_edge);
+            colour::colours(rgb, axes, 2 * fill::REACH, edges, &mut scratch.colours);
             scratch.before.copy_from_slice(&scratch.readings);
             let known = (&scratch.kinds[..], &scratch.colours[..]);
             contradict::replace(
@@ -230,8 +229,8 @@ impl Conditioner {
                 *kind = Kind::Filled;
             }
         }
-        let kinds = &scratch.kinds;
-        colour::colours(rgb, axes, 1, |i| kinds[i] != Kind::Inside, &mut scratch.colours);
+        let edges = (&scratch.kinds[..], Kind::is_at_edge);
+        colour::colours(rgb, axes, 1, edges, &mut scratch.colours);
     }
 }
 

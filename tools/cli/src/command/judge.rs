@@ -97,7 +97,8 @@ impl Judge {
                 self.margin
             )));
         }
-        let clean = sharpness::measure(&frame).is_clean();
+        let (rgb, depth) = frame.values();
+        let clean = sharpness::is_clean(rgb, depth, width);
         let image = Image::Rgbd(frame);
         let mut request = HologramRequest::of(self.display.clone());
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean, &mut request)?;

@@ -9,6 +9,9 @@ pub(super) struct AxisMap {
     pub(super) offset: Vec<f32>,
     /// The range of display pixels that give each reading its colour: the first, and one past the last.
     pub(super) pixels: Vec<(u32, u32)>,
+    /// Where each pixel lies in the middle of a reading of its own, except for those beyond the readings: the first
+    /// reading in the display, and the pixel that lies in it.
+    pub(super) straight: Option<(usize, usize)>,
 }
 
 impl AxisMap {
@@ -17,6 +20,7 @@ impl AxisMap {
             cell: vec![0; out],
             offset: vec![0.0; out],
             pixels: vec![(0, 0); cells],
+            straight: None,
         }
     }
 
@@ -29,6 +33,9 @@ impl AxisMap {
             *cell = nearest as u32;
             *offset = (centre - nearest).clamp(-0.5, 0.5) as f32;
         }
+        let beyond = (-from).max(0.0);
+        let is_straight = length == out as f64 && from.fract() == 0.0 && beyond < out as f64 && from < cells as f64;
+        self.straight = is_straight.then_some((from.max(0.0) as usize, beyond as usize));
         let mut first = 0;
         for (c, range) in self.pixels.iter_mut().enumerate() {
             let length = self.cell[first..]

@@ -3,6 +3,8 @@
 //! At an edge, the 3×3 readings differ by more than [`EDGE`], and no plane explains the 5×5 readings around one of
 //! them: a steep slope is no edge.
 
+use super::lanes::{LANES, Lanes, any, lanes, strides};
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// The least difference of depth at an edge, as a share of the volume.
@@ -27,60 +29,100 @@ pub(super) enum Kind {
     Mixed,
 }
 
+impl Kind {
+    /// Returns whether the reading lies at an edge.
+    #[inline(always)]
+    pub(super) fn is_at_edge(&self) -> bool {
+        *self != Kind::Inside
+    }
+}
+
 /// Finds the kinds of the readings `depth`, rows of `width` without NaN. `bent` is working memory.
 pub(super) fn find(depth: &[f32], width: usize, bent: &mut [bool], kinds: &mut [Kind]) {
-    bent.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-        find_steep(depth, width, y, row);
-        for (x, bent) in row.iter_mut().enumerate() {
-            *bent = *bent && is_bent(depth, width, y, x);
-        }
-    });
+    (bent.par_chunks_exact_mut(width))
+        .enumerate()
+        .for_each(|(y, row)| wide!(find_bent(depth, width, y, row)));
     let bent = &*bent;
-    let height = depth.len() / width;
     kinds.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-        row.fill(Kind::Inside);
-        for near in y.saturating_sub(1)..(y + 2).min(height) {
-            for (x, _) in bent[near * width..][..width]
-                .iter()
-                .enumerate()
-                .filter(|(_, bent)| **bent)
-            {
-                row[x.saturating_sub(1)..(x + 2).min(width)].fill(Kind::Edge);
-            }
-        }
-        for (x, kind) in row.iter_mut().enumerate().filter(|(_, kind)| **kind == Kind::Edge) {
-            let (least, most) = range(depth, width, y, x);
-            let value = depth[y * width + x];
-            let margin = (MIXED * (most - least)).max(MIXED_BY);
-            if most - least <= EDGE {
-                *kind = Kind::Inside;
-            } else if value - least >= margin && most - value >= margin {
-                *kind = Kind::Mixed;
+        wide!(find_near(bent, width, y, row));
+        for stride in strides(width) {
+            if any(&row[stride.clone()], Kind::is_at_edge) {
+                for (kind, x) in row[stride.clone()]
+                    .iter_mut()
+                    .zip(stride)
+                    .filter(|(kind, _)| kind.is_at_edge())
+                {
+                    *kind = kind_at_edge(depth, width, y, x);
+                }
             }
         }
     });
 }
 
-/// Finds the readings of row `y` whose 3×3 neighbours differ by more than [`EDGE`].
-fn find_steep(depth: &[f32], width: usize, y: usize, steep: &mut [bool]) {
-    let height = depth.len() / width;
-    let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| &depth[y * width..][..width]);
+/// Finds the readings of row `y` whose 3×3 neighbours differ by more than [`EDGE`] and that no plane explains.
+#[inline(always)]
+fn find_bent(depth: &[f32], width: usize, y: usize, bent: &mut [bool]) {
     for x in [0, width - 1] {
         let (least, most) = range(depth, width, y, x);
-        steep[x] = most - least > EDGE;
+        bent[x] = most - least > EDGE;
     }
-    if width < 3 {
-        return;
-    }
-    let around: [&[f32]; 9] = std::array::from_fn(|k| &rows[k / 3][k % 3..][..width - 2]);
-    for (x, steep) in steep[1..width - 1].iter_mut().enumerate() {
-        let (mut least, mut most) = (around[4][x], around[4][x]);
-        for values in around {
-            least = if values[x] < least { values[x] } else { least };
-            most = if values[x] > most { values[x] } else { most };
+    if width > 2 {
+        let around = around(depth, width, y);
+        for (x, bent) in bent[1..width - 1].iter_mut().enumerate() {
+            let (mut least, mut most) = (around[4][x], around[4][x]);
+            for values in around {
+                least = if values[x] < least { values[x] } else { least };
+                most = if values[x] > most { values[x] } else { most };
+            }
+            *bent = most - least > EDGE;
         }
-        *steep = most - least > EDGE;
     }
+    for (i, bent) in bent.chunks_mut(LANES).enumerate() {
+        if any(bent, |steep| *steep) {
+            let are_bent = are_bent(depth, width, y, i * LANES);
+            bent.iter_mut().zip(are_bent).for_each(|(bent, is)| *bent &= is);
+        }
+    }
+}
+
+/// Marks the readings of row `y` with a bent one among the 3×3 around them.
+#[inline(always)]
+fn find_near(bent: &[bool], width: usize, y: usize, kinds: &mut [Kind]) {
+    let height = bent.len() / width;
+    let kind = |is_near: bool| if is_near { Kind::Edge } else { Kind::Inside };
+    for x in [0, width - 1] {
+        let columns = x.saturating_sub(1)..(x + 2).min(width);
+        let mut rows = y.saturating_sub(1)..(y + 2).min(height);
+        kinds[x] = kind(rows.any(|y| bent[y * width..][columns.clone()].contains(&true)));
+    }
+    if width > 2 {
+        let around = around(bent, width, y);
+        for (x, to) in kinds[1..width - 1].iter_mut().enumerate() {
+            *to = kind(around.iter().fold(false, |any, bent| any | bent[x]));
+        }
+    }
+}
+
+/// Returns the kind of the reading (`y`, `x`), which lies near a bent one.
+fn kind_at_edge(depth: &[f32], width: usize, y: usize, x: usize) -> Kind {
+    let (least, most) = range(depth, width, y, x);
+    let value = depth[y * width + x];
+    let margin = (MIXED * (most - least)).max(MIXED_BY);
+    if most - least <= EDGE {
+        Kind::Inside
+    } else if value - least >= margin && most - value >= margin {
+        Kind::Mixed
+    } else {
+        Kind::Edge
+    }
+}
+
+/// Returns the 3×3 neighbours of all `values` of row `y` but the first and the last. Rows beyond the border repeat.
+#[inline(always)]
+fn around<T>(values: &[T], width: usize, y: usize) -> [&[T]; 9] {
+    let last = values.len() / width - 1;
+    let rows = [y.saturating_sub(1), y, (y + 1).min(last)].map(|y| &values[y * width..][..width]);
+    std::array::from_fn(|k| &rows[k / 3][k % 3..][..width - 2])
 }
 
 /// Returns the least and the most of the 3×3 readings around (`y`, `x`).
@@ -96,26 +138,38 @@ fn range(depth: &[f32], width: usize, y: usize, x: usize) -> (f32, f32) {
     (least, most)
 }
 
-/// Returns whether no plane explains the 5×5 readings around (`y`, `x`). Readings beyond the border repeat.
-fn is_bent(depth: &[f32], width: usize, y: usize, x: usize) -> bool {
+/// Returns whether no plane explains the 5×5 readings around each of those of row `y` from `x` on. Readings beyond the
+/// border repeat.
+#[inline(always)]
+fn are_bent(depth: &[f32], width: usize, y: usize, x: usize) -> [bool; LANES] {
     let height = depth.len() / width;
-    let middle = depth[y * width + x];
-    let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
-    let (mut sum, mut squares, mut slope_x, mut slope_y) = (0.0, 0.0, 0.0, 0.0);
+    let row = |dy: usize| &depth[(y + dy).saturating_sub(2).min(height - 1) * width..][..width];
+    let values = |row: &[f32], dx: usize| -> Lanes {
+        match (x + dx).checked_sub(2).and_then(|from| row.get(from..from + LANES)) {
+            Some(values) => lanes(|i| values[i]),
+            None => lanes(|i| row[(x + dx + i).saturating_sub(2).min(width - 1)]),
+        }
+    };
+    let middle = values(row(2), 2);
+    let (mut least, mut most) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let [mut sum, mut squares, mut slope_x, mut slope_y] = [[0.0; LANES]; 4];
     for dy in 0..5 {
-        let row = (y + dy).saturating_sub(2).min(height - 1) * width;
         for dx in 0..5 {
-            let v = depth[row + (x + dx).saturating_sub(2).min(width - 1)] - middle;
-            least = v.min(least);
-            most = v.max(most);
-            sum += v;
-            squares += v * v;
-            slope_x += v * (dx as f32 - 2.0);
-            slope_y += v * (dy as f32 - 2.0);
+            let (values, step_x, step_y) = (values(row(dy), dx), dx as f32 - 2.0, dy as f32 - 2.0);
+            let v: Lanes = lanes(|i| values[i] - middle[i]);
+            least = lanes(|i| v[i].min(least[i]));
+            most = lanes(|i| v[i].max(most[i]));
+            sum = lanes(|i| sum[i] + v[i]);
+            squares = lanes(|i| squares[i] + v[i] * v[i]);
+            slope_x = lanes(|i| slope_x[i] + v[i] * step_x);
+            slope_y = lanes(|i| slope_y[i] + v[i] * step_y);
         }
     }
-    // The variance that remains after the best plane, whose slopes are slope_x/50 and slope_y/50.
-    let variance = squares / 25.0 - (sum / 25.0) * (sum / 25.0) - (slope_x * slope_x + slope_y * slope_y) / 1250.0;
-    let unexplained = UNEXPLAINED * (most - least);
-    variance > unexplained * unexplained
+    std::array::from_fn(|i| {
+        // The variance that remains after the best plane, whose slopes are slope_x/50 and slope_y/50.
+        let slopes = slope_x[i] * slope_x[i] + slope_y[i] * slope_y[i];
+        let variance = squares[i] / 25.0 - (sum[i] / 25.0) * (sum[i] / 25.0) - slopes / 1250.0;
+        let unexplained = UNEXPLAINED * (most[i] - least[i]);
+        variance > unexplained * unexplained
+    })
 }

@@ -2,7 +2,7 @@
 //! to frame. A pixel whose colour stays therefore prefers the surface that it had, and its depth follows slowly. Where
 //! something moves, colours at edges change, and the pixel is decided anew.
 
-use super::lanes::{LANES, Lanes, lanes, load, store};
+use super::lanes::{Lanes, lanes, load, store};
 use rayon::prelude::*;
 
 /// The lead of the surface that the pixel had.
@@ -62,16 +62,16 @@ impl<D: AsRef<[f32]>, C: AsRef<[u8]>> Line<D, C> {
     /// Returns the last depths of the pixels from `x` on, which have these `colours`. They are NaN where there is none
     /// or where the colour has changed.
     #[inline(always)]
-    pub(super) fn held(&self, x: usize, colours: &[Lanes; 3]) -> Lanes {
+    pub(super) fn held<const N: usize>(&self, x: usize, colours: &[Lanes<N>; 3]) -> Lanes<N> {
         let (depth, bytes) = (self.depth.as_ref(), self.colours.as_ref());
         let width = depth.len();
-        let mut apart = [0.0; LANES];
+        let mut apart = [0.0; N];
         for (c, colours) in colours.iter().enumerate() {
-            let earlier = load(&bytes[c * width..][..width], x, 0);
-            let change = lanes(|i| colours[i] - f32::from(earlier[i]) * (1.0 / 255.0));
+            let earlier: [u8; N] = load(&bytes[c * width..][..width], x, 0);
+            let change: Lanes<N> = lanes(|i| colours[i] - f32::from(earlier[i]) * (1.0 / 255.0));
             apart = lanes(|i| apart[i] + change[i] * change[i]);
         }
-        let depth = load(depth, x, f32::NAN);
+        let depth: Lanes<N> = load(depth, x, f32::NAN);
         lanes(|i| if apart[i] <= ALIKE * ALIKE { depth[i] } else { f32::NAN })
     }
 }
@@ -102,7 +102,7 @@ impl Line<&mut [f32], &mut [u8]> {
 /// Returns the lead of a surface of this `depth` for pixels with the depths `held`, of which `nearest` is the distance
 /// to the nearest surface.
 #[inline(always)]
-pub(super) fn leads(depth: f32, held: &Lanes, nearest: &Lanes) -> Lanes {
+pub(super) fn leads<const N: usize>(depth: f32, held: &Lanes<N>, nearest: &Lanes<N>) -> Lanes<N> {
     lanes(|i| {
         let apart = (depth - held[i]).abs();
         let is_nearest = apart <= SAME && apart <= nearest[i];

@@ -4,7 +4,7 @@
 use super::axis::AxisMap;
 use super::edges::Kind;
 use super::history::{self, History};
-use super::lanes::{LANES, Lanes, lanes, load, store};
+use super::lanes::{self, LANES, Lanes, lanes, load, store};
 use super::surfaces::{MOST, Places, Readings, Surface};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
@@ -132,7 +132,7 @@ impl Decider<'_> {
                 let rows = band * BAND..((band + 1) * BAND).min(self.y.pixels.len());
                 wide!(self.interpolate(self.lines(rows.clone()), &mut lines));
                 let first = self.lines(rows.clone()).start;
-                rows.for_each(|row| self.row(row, first, &mut lines, history));
+                rows.for_each(|row| wide!(self.row(row, first, &mut lines, history)));
             });
         }
         let (width, middle) = (self.x.cell.len(), (bands.start + bands.end) / 2);
@@ -176,11 +176,14 @@ impl Decider<'_> {
     /// Interpolates a row of readings at the places of pixels.
     #[inline(always)]
     fn stretch(&self, row: &[f32], to: &mut [f32]) {
-        if self.x.offset.iter().all(|offset| *offset == 0.0) {
-            to.iter_mut()
-                .zip(&self.x.cell)
-                .for_each(|(to, cell)| *to = row[*cell as usize]);
-            return;
+        if let Some((from, left)) = self.x.straight {
+            // Pixels beyond the readings repeat the outermost ones.
+            let row = &row[from..row.len().min(from + to.len() - left)];
+            let (before, to) = to.split_at_mut(left);
+            let (to, after) = to.split_at_mut(row.len());
+            before.fill(row[0]);
+            to.copy_from_slice(row);
+            return after.fill(row[row.len() - 1]);
         }
         for (x, to) in to.iter_mut().enumerate() {
             let (left, right, share) = self.x.beside(x);
@@ -190,6 +193,7 @@ impl Decider<'_> {
     }
 
     /// Decides the pixels at the edges of a row of readings. The `lines` begin with the display's line `first`.
+    #[inline(always)]
     fn row(&self, row: usize, first: usize, lines: &mut Lines<'_>, history: &History) {
         let (h, w) = (self.y.pixels.len(), self.x.pixels.len());
         let inside = self.y.inside(row);
@@ -198,7 +202,11 @@ impl Decider<'_> {
         }
         let rows = [row.saturating_sub(1), row, (row + 1).min(h - 1)];
         let mut surfaces = [Surface::default(); MOST];
-        for column in self.edges(row) {
+        let kinds = &self.readings.kinds[row * w..][..w];
+        let mut next = 0;
+        while let Some(steps) = lanes::first(&kinds[next..], Kind::is_at_edge) {
+            let column = next + steps;
+            next = column + 1;
             let pixels = self.x.inside(column);
             if pixels.is_empty() {
                 continue;
@@ -207,13 +215,18 @@ impl Decider<'_> {
             let around: [usize; 9] = std::array::from_fn(|k| rows[k / 3] * w + columns[k % 3]);
             let count = self.readings.surfaces(&around, &mut surfaces);
             let surfaces = &surfaces[..count];
-            wide!(self.cell(surfaces, (inside.clone(), pixels), first, lines, history));
+            let cell = (inside.clone(), pixels);
+            match cell.1.len() {
+                1 => self.cell::<1>(surfaces, cell, first, lines, history),
+                2..=4 => self.cell::<4>(surfaces, cell, first, lines, history),
+                _ => self.cell::<LANES>(surfaces, cell, first, lines, history),
+            }
         }
     }
 
-    /// Decides the pixels (`rows`, `columns`) of a reading.
+    /// Decides the pixels (`rows`, `columns`) of a reading, `N` at a time.
     #[inline(always)]
-    fn cell(
+    fn cell<const N: usize>(
         &self,
         surfaces: &[Surface],
         (rows, columns): (Range<usize>, Range<usize>),
@@ -224,25 +237,16 @@ impl Decider<'_> {
         let width = self.x.cell.len();
         for y in rows {
             let line = history.line(y, width);
-            for x in columns.clone().step_by(LANES) {
-                let colours = self.colours(y * width + x);
+            for x in columns.clone().step_by(N) {
+                let colours: [Lanes<N>; 3] = self.colours(y * width + x);
                 let places = Places::new(&load(&self.x.offset, x, 0.0), self.y.offset[y]);
                 let [depth, second, lead] = choose(surfaces, &places, &colours, &line.held(x, &colours));
-                let (at, count) = ((y - first) * width + x, LANES.min(columns.end - x));
+                let (at, count) = ((y - first) * width + x, N.min(columns.end - x));
                 store(&depth, &mut lines.depth[at..at + count]);
                 store(&second, &mut lines.second[at..at + count]);
                 store(&lead, &mut lines.lead[at..at + count]);
             }
         }
-    }
-
-    /// Returns the readings of `row` at edges.
-    fn edges(&self, row: usize) -> impl Iterator<Item = usize> {
-        let w = self.x.pixels.len();
-        let kinds = self.readings.kinds[row * w..][..w].iter().enumerate();
-        kinds
-            .filter(|(_, kind)| **kind != Kind::Inside)
-            .map(|(column, _)| column)
     }
 
     /// Returns the first and the number of neighbouring pixels of line `y` at edges, up to [`LANES`].
@@ -259,7 +263,7 @@ impl Decider<'_> {
 
     /// Returns the red, green and blue amplitudes of the pixels from `at` on.
     #[inline(always)]
-    fn colours(&self, at: usize) -> [Lanes; 3] {
+    fn colours<const N: usize>(&self, at: usize) -> [Lanes<N>; 3] {
         let size = self.rgb.len() / 3;
         let (red, others) = self.rgb.split_at(size);
         let (green, blue) = others.split_at(size);
@@ -301,8 +305,9 @@ impl Decider<'_> {
         to: &mut [f32],
     ) {
         for (x, count) in self.edge_pixels(y) {
-            let (first, second, lead) = (load(to, x, 0.0), load(second, x, 0.0), load(lead, x, 0.0));
-            let depth = lanes(|i| if lead[i] == OUTVOTED { second[i] } else { first[i] });
+            let (first, second, lead): (Lanes, Lanes, Lanes) =
+                (load(to, x, 0.0), load(second, x, 0.0), load(lead, x, 0.0));
+            let depth: Lanes = lanes(|i| if lead[i] == OUTVOTED { second[i] } else { first[i] });
             let depth = line.follow((x, count), &self.colours(y * self.x.cell.len() + x), &depth);
             store(&depth, &mut to[x..x + count]);
         }
@@ -313,12 +318,12 @@ impl Decider<'_> {
     #[inline(always)]
     fn votes(&self, first: &[f32], second: &Lanes, at: usize, near: &[f32; SIDE * SIDE]) -> Lanes {
         let width = self.x.cell.len();
-        let (own, colours) = (load(first, at, 0.0), self.colours(at));
+        let (own, colours): (Lanes, [Lanes; 3]) = (load(first, at, 0.0), self.colours(at));
         let (mut sum, mut weights) = ([0.0; LANES], [0.0; LANES]);
         for (k, near) in near.iter().enumerate() {
             let i = at + (k / SIDE) * width + k % SIDE - REACH * width - REACH;
-            let (theirs, depth) = (self.colours(i), load(first, i, 0.0));
-            let weight = lanes(|i| {
+            let (theirs, depth): ([Lanes; 3], Lanes) = (self.colours(i), load(first, i, 0.0));
+            let weight: Lanes = lanes(|i| {
                 let [r, g, b] = [
                     theirs[0][i] - colours[0][i],
                     theirs[1][i] - colours[1][i],
@@ -353,7 +358,7 @@ impl Iterator for EdgePixels<'_> {
     fn next(&mut self) -> Option<(usize, usize)> {
         while self.run.is_empty() {
             let rest = &self.kinds[self.column..];
-            let start = self.column + rest.iter().position(|kind| *kind != Kind::Inside)?;
+            let start = self.column + lanes::first(rest, Kind::is_at_edge)?;
             let length = self.kinds[start..].iter().position(|kind| *kind == Kind::Inside);
             self.column = length.map_or(self.kinds.len(), |length| start + length);
             self.run = self.x.inside_all(start..self.column);
@@ -367,12 +372,17 @@ impl Iterator for EdgePixels<'_> {
 /// Chooses among `surfaces` for pixels with earlier depths `held`, and returns the depth of the first and of the second
 /// surface, and the lead of the first.
 #[inline(always)]
-fn choose(surfaces: &[Surface], places: &Places, colours: &[Lanes; 3], held: &Lanes) -> [Lanes; 3] {
+fn choose<const N: usize>(
+    surfaces: &[Surface],
+    places: &Places<N>,
+    colours: &[Lanes<N>; 3],
+    held: &Lanes<N>,
+) -> [Lanes<N>; 3] {
     if let [surface] = surfaces {
-        return [surface.depth_at(places), [0.0; LANES], [f32::INFINITY; LANES]];
+        return [surface.depth_at(places), [0.0; N], [f32::INFINITY; N]];
     }
-    let mut likelihoods = [[0.0; LANES]; MOST];
-    let (mut most, mut nearest) = ([f32::NEG_INFINITY; LANES], [f32::INFINITY; LANES]);
+    let mut likelihoods = [[0.0; N]; MOST];
+    let (mut most, mut nearest) = ([f32::NEG_INFINITY; N], [f32::INFINITY; N]);
     for (surface, likelihood) in surfaces.iter().zip(&mut likelihoods) {
         *likelihood = surface.likelihood(colours);
         most = lanes(|i| {
@@ -382,22 +392,22 @@ fn choose(surfaces: &[Surface], places: &Places, colours: &[Lanes; 3], held: &La
                 most[i]
             }
         });
-        let apart = lanes(|i| (surface.depth - held[i]).abs());
+        let apart: Lanes<N> = lanes(|i| (surface.depth - held[i]).abs());
         nearest = lanes(|i| if apart[i] < nearest[i] { apart[i] } else { nearest[i] });
     }
-    let (mut first, mut second) = ([f32::NEG_INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
-    let (mut depth, mut depth_of_second) = ([0.0; LANES], [0.0; LANES]);
+    let (mut first, mut second) = ([f32::NEG_INFINITY; N], [f32::NEG_INFINITY; N]);
+    let (mut depth, mut depth_of_second) = ([0.0; N], [0.0; N]);
     for (surface, likelihood) in surfaces.iter().zip(&likelihoods) {
         let covers = places.of(&surface.covers);
         let leads = history::leads(surface.depth, held, &nearest);
         let theirs = surface.depth_at(places);
-        let score = lanes(|i| {
+        let score: Lanes<N> = lanes(|i| {
             let evidence = (likelihood[i] - most[i]).max(-MOST_EVIDENCE);
             PLACE * covers[i] + evidence + leads[i]
         });
         // The former first surface, or this one, may be the second.
-        let lost = lanes(|i| if score[i] > first[i] { first[i] } else { score[i] });
-        let lost_depth = lanes(|i| if score[i] > first[i] { depth[i] } else { theirs[i] });
+        let lost: Lanes<N> = lanes(|i| if score[i] > first[i] { first[i] } else { score[i] });
+        let lost_depth: Lanes<N> = lanes(|i| if score[i] > first[i] { depth[i] } else { theirs[i] });
         depth_of_second = lanes(|i| {
             if score[i] > second[i] {
                 lost_depth[i]

@@ -159,7 +159,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
         rgb.as_slice().expect("standard layout"),
         readings.as_slice().expect("standard layout"),
     );
-    let clean = depth.dim() == (height, width) && sharpness::measure_planes(planes.0, planes.1, width).is_clean();
+    let clean = depth.dim() == (height, width) && sharpness::is_clean(planes.0, planes.1, width);
     if !clean {
         for _ in 0..smooth::PASSES {
             readings = fitted(&fitted(&readings, 0, 1), 1, 0);

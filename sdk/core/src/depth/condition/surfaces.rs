@@ -39,21 +39,12 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    fn new(at: usize, depth: f32, colours: &Moments) -> Self {
-        let mut surface = Surface::default();
-        surface.join(at, depth);
-        surface.moments = *colours;
-        surface
-    }
-
-    /// Returns a surface that covers none of the 3×3 readings so far.
-    fn borrowed(depth: f32, colours: &Moments) -> Self {
-        Surface {
-            depth,
-            count: 1.0,
-            moments: *colours,
-            ..Surface::default()
-        }
+    /// Begins a surface of this depth and these colours, which covers none of the 3×3 readings so far.
+    fn begin(&mut self, depth: f32, colours: &Moments) {
+        self.depth = depth;
+        self.count = 1.0;
+        self.covers = [0.0; 9];
+        self.moments = *colours;
     }
 
     fn join(&mut self, at: usize, depth: f32) {
@@ -62,6 +53,7 @@ impl Surface {
         self.covers[at] += 1.0;
     }
 
+    /// Computes the distribution of the surface's colours.
     fn finish(&mut self) {
         let mean = self.moments.mean();
         let square = mean.iter().map(|v| v * v).sum::<f32>();
@@ -73,7 +65,7 @@ impl Surface {
 
     /// Returns the logarithms of the probabilities of `colours`, plus a constant.
     #[inline(always)]
-    pub(super) fn likelihood(&self, colours: &[Lanes; 3]) -> Lanes {
+    pub(super) fn likelihood<const N: usize>(&self, colours: &[Lanes<N>; 3]) -> Lanes<N> {
         lanes(|i| {
             let [r, g, b] = [
                 colours[0][i] - self.colour[0],
@@ -86,7 +78,7 @@ impl Surface {
 
     /// Returns the depth of the surface at places.
     #[inline(always)]
-    pub(super) fn depth_at(&self, places: &Places) -> Lanes {
+    pub(super) fn depth_at<const N: usize>(&self, places: &Places<N>) -> Lanes<N> {
         let (known, slopes) = (places.of(&self.has), places.of(&self.slopes));
         lanes(|i| {
             let slope = if known[i] > 0.05 { slopes[i] / known[i] } else { 0.0 };
@@ -108,38 +100,41 @@ pub(super) struct Readings<'a> {
 impl Readings<'_> {
     /// Groups the 3×3 readings at the indices `around` and returns the number of surfaces.
     pub(super) fn surfaces(&self, around: &[usize; 9], surfaces: &mut [Surface; MOST]) -> usize {
+        let rounds = around.map(|i| match self.kinds[i] {
+            Kind::Inside | Kind::Edge => 0,
+            Kind::Filled => 1,
+            Kind::Mixed => 2,
+        });
         let mut count = 0;
-        for round in 0..3 {
+        for round in (0..3).filter(|round| rounds.contains(round)) {
             let mixed = round == 2;
-            for at in ORDER {
+            for at in ORDER.into_iter().filter(|at| rounds[*at] == round) {
                 let i = around[at];
-                let of_round = match self.kinds[i] {
-                    Kind::Inside | Kind::Edge => 0,
-                    Kind::Filled => 1,
-                    Kind::Mixed => 2,
-                };
-                if of_round != round {
-                    continue;
-                }
                 let depth = self.depth[i];
-                let apart = |surface: &Surface| (surface.depth - depth).abs();
-                let nearest = (surfaces[..count].iter_mut()).min_by(|a, b| apart(a).total_cmp(&apart(b)));
-                if let Some(nearest) = nearest
-                    && apart(nearest) <= TOLERANCE
-                {
-                    nearest.join(at, depth);
+                let (mut nearest, mut apart) = (0, f32::INFINITY);
+                for (k, surface) in surfaces[..count].iter().enumerate() {
+                    let distance = (surface.depth - depth).abs();
+                    (nearest, apart) = if distance < apart {
+                        (k, distance)
+                    } else {
+                        (nearest, apart)
+                    };
+                }
+                if apart <= TOLERANCE {
+                    surfaces[nearest].join(at, depth);
                     if !mixed {
-                        nearest.moments.add(&self.colours[i]);
+                        surfaces[nearest].moments.add(&self.colours[i]);
                     }
                 } else if mixed && self.share(around[4], (i, at), surfaces, &mut count) {
                 } else if count < MOST {
-                    surfaces[count] = Surface::new(at, depth, &self.colours[i]);
+                    surfaces[count].begin(depth, &self.colours[i]);
+                    surfaces[count].covers[at] = 1.0;
                     count += 1;
                 }
             }
         }
         if count > 1 {
-            for at in ORDER.into_iter().filter(|at| self.kinds[around[*at]] == Kind::Filled) {
+            for at in ORDER.into_iter().filter(|at| rounds[*at] == 1) {
                 let others = (1.0 - FILLED) / (count - 1) as f32;
                 for surface in &mut surfaces[..count] {
                     let own = surface.covers[at] >= 1.0;
@@ -148,7 +143,9 @@ impl Readings<'_> {
             }
         }
         for surface in &mut surfaces[..count] {
-            surface.finish();
+            if count > 1 {
+                surface.finish();
+            }
             surface.has = surface.covers.map(|covers| f32::from(covers >= 1.0));
             surface.slopes = std::array::from_fn(|at| surface.has[at] * (self.depth[around[at]] - surface.depth));
         }
@@ -170,7 +167,7 @@ impl Readings<'_> {
         let Some(end) = self.end_of_ramp(i, surfaces[0].depth < depth) else {
             return false;
         };
-        surfaces[*count] = Surface::borrowed(self.depth[end], &self.colours[end]);
+        surfaces[*count].begin(self.depth[end], &self.colours[end]);
         *count += 1;
         split(&mut surfaces[..*count], at, depth)
     }
@@ -226,18 +223,18 @@ fn split(surfaces: &mut [Surface], at: usize, depth: f32) -> bool {
 }
 
 /// Places among 3×3 readings on one line, for bilinear interpolation.
-pub(super) struct Places {
+pub(super) struct Places<const N: usize> {
     /// The first of the two rows of readings around the line, and their weights.
     row: usize,
     rows: [f32; 2],
     /// The weights of the three columns.
-    columns: [Lanes; 3],
+    columns: [Lanes<N>; 3],
 }
 
-impl Places {
+impl<const N: usize> Places<N> {
     /// Returns the places at the offsets `dx`, `dy` from the middle reading, each −½..=½.
     #[inline(always)]
-    pub(super) fn new(dx: &Lanes, dy: f32) -> Self {
+    pub(super) fn new(dx: &Lanes<N>, dy: f32) -> Self {
         let (row, below) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
         Places {
             row,
@@ -252,7 +249,7 @@ impl Places {
 
     /// Interpolates `values` of the readings.
     #[inline(always)]
-    pub(super) fn of(&self, values: &[f32; 9]) -> Lanes {
+    pub(super) fn of(&self, values: &[f32; 9]) -> Lanes<N> {
         let [above, below] = self.rows;
         let values = &values[3 * self.row..][..6];
         let left = above * values[0] + below * values[3];
