@@ -259,6 +259,54 @@ fn bad_depth_is_named_and_harms_nothing() {
     }
 }
 
+/// Depth that says little of the scene gives a hologram all the same.
+#[test]
+fn unusual_depth_gives_a_hologram() {
+    let scene = Scene::new(H, W, 10);
+    let black = Scene {
+        rgba: [0, 0, 0, 255].repeat(W * H),
+        ..Scene::new(H, W, 10)
+    };
+    let process = |colour: &Scene, metres: &[f32], (width, height): (usize, usize)| {
+        let bytes: Vec<u8> = metres.iter().flat_map(|m| m.to_le_bytes()).collect();
+        let depth = depth(&bytes, DepthFormat::MetresF32, width, height);
+        let frame = CameraFrame::new(1, colour.colour(), depth);
+        image_session().process(&frame).unwrap()
+    };
+    let lies_near = |hologram: &phasefront::Hologram, x: f64| {
+        let near = hologram.target().display.z_of_depth(0.0);
+        (hologram.z_at(x, 0.4) - near).abs() < 1e-4
+    };
+    // One value lies in the middle of the volume, whatever it is.
+    let [two, seven] = [2.0, 7.0].map(|m| process(&scene, &vec![m; W * H], (W, H)));
+    assert_eq!(two.levels(), seven.levels());
+    assert!((two.z_at(0.3, 0.4) - two.target().display.z_of_depth(0.5)).abs() < 1e-4);
+    // What is no distance is a hole.
+    let with = |bad: &[f32]| -> Vec<f32> {
+        let metres = scene.metres.iter().enumerate();
+        metres
+            .map(|(i, m)| if i % 3 == 0 { bad[i / 3 % bad.len()] } else { *m })
+            .collect()
+    };
+    let bad = [f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -1.0, 0.0];
+    let [holes, bad] = [&[f32::NAN][..], &bad].map(|bad| process(&scene, &with(bad), (W, H)));
+    assert_eq!(holes.levels(), bad.levels());
+    assert!((bad.valid_depth() - 2.0 / 3.0).abs() < 1e-3 && lies_near(&bad, 0.3));
+    // Twice the colour's size.
+    let large = Scene::new(2 * H, 2 * W, 20);
+    let large = process(&scene, &large.metres, (2 * W, 2 * H));
+    assert!(lies_near(&large, 0.3) && !lies_near(&large, 0.6));
+    // No colour to find edges in, and none to show.
+    let dark = process(&black, &scene.metres, (W, H));
+    assert!(lies_near(&dark, 0.3) && !lies_near(&dark, 0.6));
+    let mut rgba = vec![255; 4 * W * H];
+    dark.write_preview(0.0, (H, W), Layout::Rgba, &mut rgba, 4 * W).unwrap();
+    assert!(rgba.chunks_exact(4).all(|pixel| pixel[..3].iter().all(|v| *v < 8)));
+    // A shift of 24 pixels, where 6 are searched, is not undone.
+    let apart = process(&scene, &Scene::new(H, W, 34).metres, (W, H));
+    assert!(!lies_near(&apart, 0.2) && lies_near(&apart, 0.62));
+}
+
 #[test]
 fn bad_alignment_is_named_and_harms_nothing() {
     let scene = Scene::new(H, W, 10);

@@ -148,7 +148,7 @@ fn doubt(depth: &Array2<f32>) -> Option<String> {
             100.0 * most
         ));
     }
-    (zeros > MANY && zeros < 1.0).then(|| {
+    (zeros > MANY).then(|| {
         format!(
             "{:.0} % of it is 0, which as normalized depth is the nearest; if that means no reading, --depth-unit says what its numbers are",
             100.0 * zeros

@@ -380,11 +380,13 @@ fn real_captures_are_filled_and_shown() {
 #[test]
 fn depth_of_another_size_is_brought_to_that_of_the_colour() {
     let folder = Folder::new().with_frame();
-    let depth = image::GrayImage::from_pixel(24, 16, image::Luma([128]));
-    depth.save(folder.path("depth.png")).unwrap();
-    let output = folder.run(&with(&["-o", "h.png"]));
-    assert!(output.status.success());
-    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+    for (width, height) in [(24, 16), (96, 64)] {
+        let depth = image::GrayImage::from_pixel(width, height, image::Luma([128]));
+        depth.save(folder.path("depth.png")).unwrap();
+        let output = folder.run(&with(&["-o", "h.png"]));
+        assert!(output.status.success());
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+    }
 }
 
 /// Returns arguments that create a hologram from these files.
@@ -572,6 +574,12 @@ fn depth_that_means_nothing_is_named() {
     folder.succeeds(&hologram("rgb.png", "hole.npy"));
     let metres = [&hologram("rgb.png", "infinite.npy")[..], &["--depth-unit", "m"]].concat();
     folder.succeeds(&metres);
+    // Nothing but 0 may be an empty reading.
+    folder.depth_npy("zero.npy", &Array2::zeros((32, 48)));
+    assert!(told(&hologram("rgb.png", "zero.npy")).contains("100 % of it is 0"));
+    // Black colour has no edges.
+    image::RgbImage::new(48, 32).save(folder.path("black.png")).unwrap();
+    folder.succeeds(&hologram("black.png", "hole.npy"));
 }
 
 #[test]
