@@ -6,7 +6,7 @@
 //! 2. `narrow`: near surfaces that are too wide become narrower.
 //! 3. `fill`: holes take the depth of the surface with their colour.
 //! 4. `smooth`: noise within surfaces is removed; slopes stay.
-//! 5. `edges`: readings at edges are found, and those whose depth is a mixture of two surfaces.
+//! 5. `edges`: readings at edges are found, and those whose depth is a mixture of two surfaces, if the sensor mixes.
 //! 6. `contradict`: readings of a few pixels near edges whose colour is that of another surface take its depth.
 //! 7. `surfaces`: the 3×3 readings around a reading at an edge form surfaces. Each display pixel there takes the
 //!    surface that covers its place and has its colour. All other pixels are interpolated.
@@ -62,6 +62,8 @@ pub struct ConditionScratch {
     before: Vec<f32>,
     /// Whether each reading was a hole or contradicted.
     filled: Vec<bool>,
+    /// Whether readings of the previous frame mixed surfaces.
+    mixed: Option<bool>,
     kinds: Vec<Kind>,
     bent: Vec<bool>,
     colours: Vec<Moments>,
@@ -75,6 +77,7 @@ impl ConditionScratch {
     pub fn reset(&mut self) {
         self.registration.iter_mut().for_each(Registration::reset);
         self.pixels.reset();
+        self.mixed = None;
     }
 }
 
@@ -117,6 +120,7 @@ impl Conditioner {
             readings: vec![0.0; size],
             before: vec![0.0; size],
             filled: vec![false; size],
+            mixed: None,
             kinds: vec![Kind::Inside; size],
             bent: vec![false; size],
             colours: vec![Moments::default(); size],
@@ -208,7 +212,9 @@ impl Conditioner {
         smooth::smooth(&mut scratch.readings, width, &mut scratch.smooth);
         stage.end();
         let _stage = stage!("edges");
-        edges::find(&scratch.readings, width, &mut scratch.bent, &mut scratch.kinds);
+        let mixes = edges::mixes(&scratch.readings, width, scratch.mixed);
+        scratch.mixed = Some(mixes);
+        edges::find(&scratch.readings, width, mixes, &mut scratch.bent, &mut scratch.kinds);
         if contradict::applies(self.crop, self.out) {
             let kinds = &scratch.kinds;
             let edges = (&kinds[..], Kind::is_at_edge);
@@ -222,7 +228,7 @@ impl Conditioner {
                 &mut scratch.readings,
                 &mut scratch.filled,
             );
-            edges::find(&scratch.readings, width, &mut scratch.bent, &mut scratch.kinds);
+            edges::find(&scratch.readings, width, mixes, &mut scratch.bent, &mut scratch.kinds);
         }
         for (kind, filled) in scratch.kinds.iter_mut().zip(&scratch.filled) {
             if *filled && *kind == Kind::Edge {

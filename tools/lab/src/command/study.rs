@@ -61,7 +61,7 @@ enum What {
     Planes,
     /// The plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, compared with exact waves
     Sweep,
-    /// The plane sweep compared with exact waves on smooth slopes, with pictures of them in near focus
+    /// The plane sweep compared with exact waves on smooth slopes, with pictures of them in near and far focus
     Slopes,
     /// The plane sweep compared with exact waves on other displays
     Displays,

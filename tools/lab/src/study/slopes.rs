@@ -43,8 +43,8 @@ pub struct Row {
 pub struct Slopes {
     /// The figures, slope by slope.
     pub rows: Vec<Row>,
-    /// The near views of the slopes without texture, (C, H, W), one slope below the other: the truth, points moved to
-    /// planes, the sweep.
+    /// The views of the slopes, (C, H, W), one slope below the other: near focus, then far focus, each of the truth,
+    /// points moved to planes and the sweep.
     pub picture: Array3<f32>,
 }
 
@@ -73,7 +73,7 @@ pub fn study(size: usize, planes: usize, display: &Display, done: &(dyn Fn() + S
         let frame = frame.for_display(display);
         let truth = views(sm_lbm::hologram(&ldi, display, planes, &|_, _| {})?)?;
         done();
-        let (mut rows, mut near) = (Vec::new(), vec![truth[1].clone()]);
+        let (mut rows, mut seen) = (Vec::new(), vec![truth.clone()]);
         for (method, sweep) in &sweeps {
             let plan = SweepPlan::new(size, size, display, *sweep, 0.0)?;
             let mut field = Array3::zeros((display.colours(), size, size));
@@ -91,13 +91,13 @@ pub fn study(size: usize, planes: usize, display: &Display, done: &(dyn Fn() + S
                 near: alike[1],
                 far: alike[2],
             });
-            near.extend(ours.into_iter().nth(1));
+            seen.push(ours);
         }
-        Ok((rows, (!textured).then_some(near)))
+        let focused = |view: usize| seen[..3].iter().map(move |views| views[view].clone());
+        Ok((rows, beside(Axis(2), focused(1).chain(focused(2)))))
     });
     let of_slopes = of_slopes.collect::<Result<Vec<_>>>()?;
-    let strips = of_slopes.iter().filter_map(|(_, near)| near.as_ref());
-    let picture = beside(Axis(1), strips.map(|near| beside(Axis(2), near[..3].iter().cloned())));
+    let picture = beside(Axis(1), of_slopes.iter().map(|(_, strip)| strip.clone()));
     Ok(Slopes {
         rows: of_slopes.into_iter().flat_map(|(rows, _)| rows).collect(),
         picture,

@@ -2,6 +2,9 @@
 //!
 //! At an edge, the 3×3 readings differ by more than [`EDGE`], and no plane explains the 5×5 readings around one of
 //! them: a steep slope is no edge.
+//!
+//! Some sensors never mix surfaces, and a reading between two others is then a surface of its own. Their edges are
+//! single steps, while an edge of mixed readings rarely lies just between two of them.
 
 use super::lanes::{LANES, Lanes, any, lanes, strides};
 use phasefront_kernels::wide;
@@ -15,6 +18,15 @@ pub(super) const UNEXPLAINED: f32 = 0.09;
 pub(super) const MIXED: f32 = 0.06;
 /// The least difference to them, as a share of the volume.
 pub(super) const MIXED_BY: f32 = 0.015;
+
+/// The least change over three steps from reading to reading that counts as an edge between two surfaces, and the share
+/// of it below which the steps on both sides of a single step remain.
+pub(super) const WHOLE: f32 = 0.1;
+pub(super) const BESIDE: f32 = 0.1;
+/// The share of single steps from which on no reading is mixed, and the distance from it within which a video stays as
+/// it was.
+pub(super) const SINGLE: f32 = 0.4;
+const HYSTERESIS: f32 = 0.05;
 
 /// The kind of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +49,48 @@ impl Kind {
     }
 }
 
-/// Finds the kinds of the readings `depth`, rows of `width` without NaN. `bent` is working memory.
-pub(super) fn find(depth: &[f32], width: usize, bent: &mut [bool], kinds: &mut [Kind]) {
+/// Returns whether readings of `depth`, rows of `width` without NaN, mix surfaces. `did` says it of the previous frame.
+pub(super) fn mixes(depth: &[f32], width: usize, did: Option<bool>) -> bool {
+    let height = depth.len() / width;
+    let of_row = |y: usize| {
+        let below = if y + 3 < height { width } else { 0 };
+        let along_row = wide!(single_steps(&depth[y * width..], 1, width.saturating_sub(3)));
+        let along_columns = wide!(single_steps(&depth[y * width..], width, below));
+        (along_row.0 + along_columns.0, along_row.1 + along_columns.1)
+    };
+    let rows = (0..height).into_par_iter().map(of_row);
+    let (single, all) = rows.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let bound = match did {
+        Some(true) => SINGLE + HYSTERESIS,
+        Some(false) => SINGLE - HYSTERESIS,
+        None => SINGLE,
+    };
+    all == 0 || (single as f32) < bound * all as f32
+}
+
+/// Returns the number of single steps and of all edges among the first `count` of the `values`, of which successive
+/// ones of a line are `step` apart.
+#[inline(always)]
+fn single_steps(values: &[f32], step: usize, count: usize) -> (u32, u32) {
+    if count == 0 {
+        return (0, 0);
+    }
+    let of: [&[f32]; 4] = std::array::from_fn(|k| &values[k * step..][..count]);
+    let (mut single, mut all) = (0, 0);
+    for i in 0..count {
+        let [before, middle, after] = [0, 1, 2].map(|k| (of[k + 1][i] - of[k][i]).abs());
+        let whole = (of[3][i] - of[0][i]).abs();
+        let is_edge = (whole > WHOLE) & (middle >= before) & (middle >= after);
+        let is_single = is_edge & (before < BESIDE * whole) & (after < BESIDE * whole);
+        all += u32::from(is_edge);
+        single += u32::from(is_single);
+    }
+    (single, all)
+}
+
+/// Finds the kinds of the readings `depth`, rows of `width` without NaN. None is mixed unless `mixes`. `bent` is working
+/// memory.
+pub(super) fn find(depth: &[f32], width: usize, mixes: bool, bent: &mut [bool], kinds: &mut [Kind]) {
     (bent.par_chunks_exact_mut(width))
         .enumerate()
         .for_each(|(y, row)| wide!(find_bent(depth, width, y, row)));
@@ -52,7 +104,7 @@ pub(super) fn find(depth: &[f32], width: usize, bent: &mut [bool], kinds: &mut [
                     .zip(stride)
                     .filter(|(kind, _)| kind.is_at_edge())
                 {
-                    *kind = kind_at_edge(depth, width, y, x);
+                    *kind = kind_at_edge(depth, width, (y, x), mixes);
                 }
             }
         }
@@ -104,13 +156,13 @@ fn find_near(bent: &[bool], width: usize, y: usize, kinds: &mut [Kind]) {
 }
 
 /// Returns the kind of the reading (`y`, `x`), which lies near a bent one.
-fn kind_at_edge(depth: &[f32], width: usize, y: usize, x: usize) -> Kind {
+fn kind_at_edge(depth: &[f32], width: usize, (y, x): (usize, usize), mixes: bool) -> Kind {
     let (least, most) = range(depth, width, y, x);
     let value = depth[y * width + x];
     let margin = (MIXED * (most - least)).max(MIXED_BY);
     if most - least <= EDGE {
         Kind::Inside
-    } else if value - least >= margin && most - value >= margin {
+    } else if mixes && value - least >= margin && most - value >= margin {
         Kind::Mixed
     } else {
         Kind::Edge

@@ -1,7 +1,7 @@
 //! The definition of conditioning, which [`super`] describes, without its speed: it computes each reading and each
 //! pixel separately. Tests compare [`super::Conditioner`] with it.
 
-use super::edges::{EDGE, MIXED, MIXED_BY, UNEXPLAINED};
+use super::edges::{BESIDE, EDGE, MIXED, MIXED_BY, SINGLE, UNEXPLAINED, WHOLE};
 use super::{Misfit, contradict, fill, narrow, pixels, register, smooth, surfaces};
 use crate::depth::{fill_nearest, sharpness};
 use crate::frame::Crop;
@@ -165,7 +165,8 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
             readings = fitted(&fitted(&readings, 0, 1), 1, 0);
         }
     }
-    let mut kinds = kinds_of(&readings);
+    let mixes = mixes(&readings);
+    let mut kinds = kinds_of(&readings, mixes);
     if !clean && contradict::applies(crop, (height, width)) {
         let before = readings.clone();
         for (at, value) in readings.indexed_iter_mut().filter(|(at, _)| !kinds[*at].1) {
@@ -175,7 +176,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
                 (*value, filled[at]) = (depth, true);
             }
         }
-        kinds = kinds_of(&readings);
+        kinds = kinds_of(&readings, mixes);
     }
     let is_coarse = contradict::pixels(crop, (height, width)) > 1.0;
     let choices = Array2::from_shape_fn((height, width), |(y, x)| {
@@ -376,8 +377,29 @@ fn fitted(depth: &Array2<f32>, dy: isize, dx: isize) -> Array2<f32> {
     })
 }
 
+/// Returns whether readings mix surfaces: whether few edges are a single step.
+fn mixes(depth: &Array2<f32>) -> bool {
+    let lines = depth.rows().into_iter().chain(depth.columns());
+    let windows: Vec<[f32; 4]> = lines
+        .flat_map(|line| {
+            line.windows(4)
+                .into_iter()
+                .map(|d| [d[0], d[1], d[2], d[3]])
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    let steps = windows.iter().map(|d| [0, 1, 2].map(|k| (d[k + 1] - d[k]).abs()));
+    let edges: Vec<bool> = (windows.iter().map(|d| (d[3] - d[0]).abs()))
+        .zip(steps)
+        .filter(|(whole, steps)| *whole > WHOLE && steps[1] >= steps[0].max(steps[2]))
+        .map(|(whole, steps)| steps[0].max(steps[2]) < BESIDE * whole)
+        .collect();
+    let single = edges.iter().filter(|single| **single).count();
+    edges.is_empty() || (single as f32) < SINGLE * edges.len() as f32
+}
+
 /// Returns whether each reading is at an edge, and whether it is mixed.
-fn kinds_of(depth: &Array2<f32>) -> Array2<(bool, bool)> {
+fn kinds_of(depth: &Array2<f32>, mixes: bool) -> Array2<(bool, bool)> {
     let range = |at: (usize, usize), reach: usize| {
         near(depth.dim(), at, reach).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), (at, _)| {
             (a.min(depth[at]), b.max(depth[at]))
@@ -408,7 +430,7 @@ fn kinds_of(depth: &Array2<f32>) -> Array2<(bool, bool)> {
         let margin = (MIXED * (most - least)).max(MIXED_BY);
         (
             is_edge,
-            is_edge && depth[at] - least >= margin && most - depth[at] >= margin,
+            mixes && is_edge && depth[at] - least >= margin && most - depth[at] >= margin,
         )
     })
 }
