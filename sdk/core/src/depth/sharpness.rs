@@ -25,10 +25,10 @@ const LINES: usize = 16;
 const STRIDE: usize = 32;
 
 /// Returns whether `depth`, rows of `width`, is clean beside `rgb`, (C, H, W): noise of at most 0.15 % of the volume,
-/// and 60 % of its edges sharp.
+/// and at least 60 % of its edges sharp.
 ///
-/// Runs on the current rayon pool. Does not allocate. A frame with both sides under six pixels has no edges, and a frame
-/// narrower than three pixels has no noise.
+/// Runs on the current rayon pool. Does not allocate. A frame with both sides under six pixels has no edges, and a
+/// frame narrower than three pixels has no noise.
 pub fn is_clean(rgb: &[f32], depth: &[f32], width: usize) -> bool {
     noise(depth, width) <= SMOOTH && sharp_edges(rgb, depth, width) >= SHARP_EDGES
 }
@@ -95,8 +95,8 @@ fn edge((rgb, depth): (&[f32], &[f32]), at: usize, step: usize) -> Option<bool> 
 const DIFFERENCE: f32 = 2e-5;
 const DIFFERENCES: usize = 2048;
 
-/// Returns the noise as a share of the volume: the median of |d(x−1) − 2d(x) + d(x+1)| over 0.6745·√6, which is the standard deviation of independent
-/// normal noise.
+/// Returns the noise as a share of the volume: the median of |d(x−1) − 2d(x) + d(x+1)| over 0.6745·√6, which is the
+/// standard deviation of independent normal noise.
 fn noise(depth: &[f32], width: usize) -> f32 {
     let none = || [0u32; DIFFERENCES];
     let counts = depth

@@ -88,8 +88,8 @@ fn single_steps(values: &[f32], step: usize, count: usize) -> (u32, u32) {
     (single, all)
 }
 
-/// Finds the kinds of the readings `depth`, rows of `width` without NaN. None is mixed unless `mixes`. `bent` is working
-/// memory.
+/// Finds the kinds of the readings `depth`, rows of `width` without NaN. Unless `mixes`, none is mixed. `bent` is
+/// working memory.
 pub(super) fn find(depth: &[f32], width: usize, mixes: bool, bent: &mut [bool], kinds: &mut [Kind]) {
     (bent.par_chunks_exact_mut(width))
         .enumerate()
