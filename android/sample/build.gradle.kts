@@ -42,4 +42,5 @@ kotlin { compilerOptions { jvmTarget.set(org.jetbrains.kotlin.gradle.dsl.JvmTarg
 
 dependencies {
     implementation(project(":phasefront"))
+    implementation(libs.arcore)
 }

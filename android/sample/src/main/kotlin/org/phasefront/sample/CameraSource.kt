@@ -22,7 +22,7 @@ import org.phasefront.toDepthImage
 
 /**
  * A source of colour and DEPTH16 from one camera by Camera2. Few phones have this kind of camera; [find] looks for it.
- * On other phones, use the depth images of ARCore with the same calls.
+ * On other phones, [ArCoreSource] gives depth.
  */
 class CameraSource private constructor(
     private val manager: CameraManager,

@@ -141,7 +141,7 @@ class MainActivity : Activity() {
             } catch (refused: PhasefrontException) {
                 return@execute runOnUiThread { say(refused.message.orEmpty()) }
             }
-            val camera = if (hasCamera()) CameraSource.find(this, degrees) else null
+            val camera = if (hasCamera()) CameraSource.find(this, degrees) ?: ArCoreSource.find(this, degrees) else null
             source = (camera ?: SampleSource(assets)).also { it.start(::submit) { message -> runOnUiThread { say(message) } } }
         }
         if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q && thermal != null) {

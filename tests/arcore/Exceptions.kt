@@ -1,0 +1,7 @@
+package com.google.ar.core.exceptions
+
+open class UnavailableException : Exception()
+
+class CameraNotAvailableException : Exception()
+
+class NotYetAvailableException : Exception()
