@@ -104,10 +104,7 @@ async function look() {
 }
 
 // Views are not computed more often than the display shows them.
-const view = newest(async () => {
-  await look();
-  await new Promise(requestAnimationFrame);
-});
+const view = newest(() => Promise.all([look(), new Promise(requestAnimationFrame)]));
 
 let picture, stream;
 async function show() {
