@@ -1,7 +1,7 @@
 //! Layers of the int8 chain in tiles of 4×4 outputs, by the minimal filtering F(4×4, 3×3) of Lavin and Gray, "Fast
 //! Algorithms for Convolutional Neural Networks" (CVPR 2016), with a quarter of the products and the same bits.
 //!
-//! A tile's outputs are `Aᵀ[(G g Gᵀ) ⊙ (Bᵀ d B)]A` of its 6×6 inputs `d` and the weights `g`. The usual `G` has
+//! A tile's outputs are `Aᵀ[(G g Gᵀ) ⊙ (Bᵀ d B)]A` of its 6×6 inputs `d` and the weights `g`. The `G` of the paper has
 //! fractions. Here its rows are scaled to integers so that the 36 transformed weights and inputs fit 16 bits:
 //!
 //! - `Bᵀ d B` of activations 0…255 is within ±68·255 = ±17,340;
