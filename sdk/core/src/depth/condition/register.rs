@@ -42,8 +42,10 @@ const NONE: (usize, usize) = (SHIFTS / 2, 0);
 const INTERVAL: u32 = 4;
 /// The share of the evidence that remains in the next search.
 const MEMORY: f32 = 0.7;
-/// The relative gain in evidence at which a shift replaces the one of the previous frame.
+/// The relative gain in evidence at which the first search shifts at all, and at which a later one replaces the shift
+/// of the previous frames. Each new shift moves all edges of a video.
 pub(super) const GAIN: f32 = 1.02;
+const LATER_GAIN: f32 = 1.1;
 
 /// How depth lies beside colour.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -132,12 +134,14 @@ impl Registration {
         self.sample(rgb);
         self.find_edges();
         self.compare(depth);
+        let is_first = self.evidence[SUMS - 1] == 0.0;
         self.evidence.iter_mut().for_each(|v| *v *= MEMORY);
         for row in &self.rows {
             self.evidence.iter_mut().zip(row).for_each(|(sum, v)| *sum += v);
         }
         let top = self.top();
-        if self.support(top) > GAIN * self.support(self.best) {
+        let gain = if is_first { GAIN } else { LATER_GAIN };
+        if self.support(top) > gain * self.support(self.best) {
             self.best = top;
         }
         let sums = || (0..SHIFTS).map(|shift| self.support((shift, 0)));
