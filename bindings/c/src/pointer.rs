@@ -47,9 +47,11 @@ unsafe fn check_size<T: Extensible>(pointer: *const T, name: &str) -> Result<()>
 /// # Safety
 /// It is NULL, or valid for reads as long as `'a`.
 pub(crate) unsafe fn read_sized<'a, T: Extensible>(pointer: *const T, name: &str) -> Result<&'a T> {
-    // SAFETY: the caller's promise, here and below.
-    unsafe { check_size(pointer, name) }?;
-    unsafe { read(pointer, name) }
+    // SAFETY: the caller's promise.
+    unsafe {
+        check_size(pointer, name)?;
+        read(pointer, name)
+    }
 }
 
 /// Writes the result of `make` to the struct `to`, whose size the caller has set.
@@ -57,9 +59,11 @@ pub(crate) unsafe fn read_sized<'a, T: Extensible>(pointer: *const T, name: &str
 /// # Safety
 /// `to` is NULL, or valid for a write and for a read of its size.
 pub(crate) unsafe fn give_sized<T: Extensible>(to: *mut T, name: &str, make: impl FnOnce() -> Result<T>) -> Result<()> {
-    // SAFETY: the caller's promise, here and below.
-    unsafe { check_size(to, name) }?;
-    unsafe { give(to, name, make) }
+    // SAFETY: the caller's promise.
+    unsafe {
+        check_size(to, name)?;
+        give(to, name, make)
+    }
 }
 
 /// Returns the value that `pointer` points at, to be changed.

@@ -75,11 +75,11 @@ fn single_steps(values: &[f32], step: usize, count: usize) -> (u32, u32) {
     if count == 0 {
         return (0, 0);
     }
-    let of: [&[f32]; 4] = std::array::from_fn(|k| &values[k * step..][..count]);
+    let [a, b, c, d]: [&[f32]; 4] = std::array::from_fn(|k| &values[k * step..][..count]);
     let (mut single, mut all) = (0, 0);
-    for i in 0..count {
-        let [before, middle, after] = [0, 1, 2].map(|k| (of[k + 1][i] - of[k][i]).abs());
-        let whole = (of[3][i] - of[0][i]).abs();
+    for (((a, b), c), d) in a.iter().zip(b).zip(c).zip(d) {
+        let (before, middle, after) = ((b - a).abs(), (c - b).abs(), (d - c).abs());
+        let whole = (d - a).abs();
         let is_edge = (whole > WHOLE) & (middle >= before) & (middle >= after);
         let is_single = is_edge & (before < BESIDE * whole) & (after < BESIDE * whole);
         all += u32::from(is_edge);
