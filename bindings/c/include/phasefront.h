@@ -474,7 +474,8 @@ typedef struct PfCameras {
   double translation_m[3];
 } PfCameras;
 
-// A frame: colour, depth, and their relation. Initialize it with its size and zeros: `PfFrame frame = {sizeof frame};`.
+// A frame: colour, depth, and their relation. Initialize it with its size and zeros:
+// `PfFrame frame = {sizeof frame};`.
 typedef struct PfFrame {
   // The size of this struct, sizeof(PfFrame). Set it before the call.
   size_t size;

@@ -207,7 +207,8 @@ pub struct PfCameras {
     pub translation_m: [f64; 3],
 }
 
-/// A frame: colour, depth, and their relation. Initialize it with its size and zeros: `PfFrame frame = {sizeof frame};`.
+/// A frame: colour, depth, and their relation. Initialize it with its size and zeros:
+/// `PfFrame frame = {sizeof frame};`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfFrame {

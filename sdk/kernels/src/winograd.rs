@@ -8,11 +8,12 @@
 //! - `G g Gᵀ` of weights −128…127 is within ±144·128 = ±18,432.
 //!
 //! A tile then has 576 = 24² times its sums. These are computed modulo 2³², where 9 has an inverse: multiplied by it,
-//! they are 64 times the sums, which a shift divides. So each sum is exact whatever overflowed on the way, as long as it
-//! is below [`LARGEST`].
+//! they are 64 times the sums, which a shift divides. So each sum is exact whatever overflowed on the way, as long as
+//! it is below [`LARGEST`].
 //!
-//! An instruction set computes [`Tiles::TILES`] adjacent tiles at once, one a lane, in any order of lanes. All functions
-//! are inlined into its copy. Closures might not be, and would then lack its instructions, so loops take their place.
+//! An instruction set computes [`Tiles::TILES`] adjacent tiles at once, one a lane, in any order of lanes. All
+//! functions are inlined into its copy. Closures might not be, and would then lack its instructions, so loops take
+//! their place.
 
 use crate::OUTPUTS;
 use crate::int8::{GROUP, Packed, SkipSum, Taps};

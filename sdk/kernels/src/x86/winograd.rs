@@ -1,8 +1,8 @@
 //! Tiles for AVX2, 8 at once.
 //!
 //! A register of pixels holds a row of two tiles. Four registers are transposed as 4×4 blocks of pixels in each 128-bit
-//! lane, so that a column's pixels are adjacent. This orders the tiles differently from their places in the row, and the
-//! same transposition turns the outputs back.
+//! lane, so that a column's pixels are adjacent. This orders the tiles differently from their places in the row, and
+//! the same transposition turns the outputs back.
 #![allow(unsafe_code)]
 
 use crate::int8::{GROUP, Packed, SkipSum};

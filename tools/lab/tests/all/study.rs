@@ -213,6 +213,6 @@ fn slopes_have_no_stripes() {
             assert!(between.psnr > moved.psnr + 3.0, "{rows:?}");
         }
     }
-    // Three panels beside each other, two slopes below each other.
-    assert_eq!(study.picture.dim(), (3, 2 * 96 + 4, 3 * 96 + 8));
+    // Three panels in near focus and three in far focus beside each other, four slopes below each other.
+    assert_eq!(study.picture.dim(), (3, 4 * 96 + 12, 6 * 96 + 20));
 }
