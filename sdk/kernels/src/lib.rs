@@ -37,7 +37,7 @@ mod wide;
         target_arch = "aarch64",
         all(target_arch = "wasm32", target_feature = "simd128")
     )),
-    allow(dead_code)
+    allow(dead_code, unused_macros, unused_imports)
 )]
 mod winograd;
 

@@ -64,6 +64,54 @@ pub(crate) trait Register: Copy + Add<Output = Self> + Sub<Output = Self> {
     fn times_4(self) -> Self;
 }
 
+/// Defines a [`Register`] `$name` of `$register`, which only code for its instruction set makes.
+macro_rules! register {
+    ($name:ident, $register:ty, $zero:expr, $add:ident, $sub:ident, |$value:ident| $times_4:expr) => {
+        #[derive(Clone, Copy)]
+        struct $name($register);
+
+        impl std::ops::Add for $name {
+            type Output = $name;
+
+            #[inline(always)]
+            #[allow(unused_unsafe, reason = "some instruction sets have safe operations")]
+            fn add(self, other: $name) -> $name {
+                // SAFETY: the register exists.
+                $name(unsafe { $add(self.0, other.0) })
+            }
+        }
+
+        impl std::ops::Sub for $name {
+            type Output = $name;
+
+            #[inline(always)]
+            #[allow(unused_unsafe, reason = "some instruction sets have safe operations")]
+            fn sub(self, other: $name) -> $name {
+                // SAFETY: the register exists.
+                $name(unsafe { $sub(self.0, other.0) })
+            }
+        }
+
+        impl $crate::winograd::Register for $name {
+            #[inline(always)]
+            #[allow(unused_unsafe, reason = "some instruction sets have safe operations")]
+            fn zero() -> $name {
+                // SAFETY: only code that is compiled for the instruction set calls it.
+                $name(unsafe { $zero })
+            }
+
+            #[inline(always)]
+            #[allow(unused_unsafe, reason = "some instruction sets have safe operations")]
+            fn times_4(self) -> $name {
+                let $value = self.0;
+                // SAFETY: the register exists.
+                $name(unsafe { $times_4 })
+            }
+        }
+    };
+}
+pub(crate) use register;
+
 /// What tiles take from an instruction set. A value shows that the processor has it.
 pub(crate) trait Tiles: Copy {
     /// The tiles computed at once.

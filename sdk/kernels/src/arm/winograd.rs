@@ -6,9 +6,8 @@
 use crate::arm::neon::{requantised, turned};
 use crate::int8::{self, GROUP, LayerKernels, Packed, SkipSum, quantise_row, rescale_row};
 use crate::wavefront::{Geometry, LastRows, SlotsMut};
-use crate::winograd::{self, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles};
+use crate::winograd::{self, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles, register};
 use std::arch::aarch64::*;
-use std::ops::{Add, Sub};
 
 pub(crate) const INT8: int8::Kernels = int8::Kernels {
     layers: LayerKernels::Tiles(winograd::Kernels {
@@ -34,50 +33,22 @@ fn last_rows(layer: &Packed, rows: &Rows<'_>, out: LastRows<'_>, from: usize, ge
     winograd::last_rows(Neon, layer, rows, out, from, geometry);
 }
 
-/// Defines a register of integers.
-macro_rules! register {
-    ($name:ident, $register:ty, $zero:ident, $add:ident, $sub:ident, $shift:ident) => {
-        #[derive(Clone, Copy)]
-        struct $name($register);
-
-        impl Add for $name {
-            type Output = $name;
-
-            #[inline(always)]
-            fn add(self, other: $name) -> $name {
-                // SAFETY: NEON is available.
-                $name(unsafe { $add(self.0, other.0) })
-            }
-        }
-
-        impl Sub for $name {
-            type Output = $name;
-
-            #[inline(always)]
-            fn sub(self, other: $name) -> $name {
-                // SAFETY: NEON is available.
-                $name(unsafe { $sub(self.0, other.0) })
-            }
-        }
-
-        impl Register for $name {
-            #[inline(always)]
-            fn zero() -> $name {
-                // SAFETY: NEON is available.
-                $name(unsafe { $zero(0) })
-            }
-
-            #[inline(always)]
-            fn times_4(self) -> $name {
-                // SAFETY: NEON is available.
-                $name(unsafe { $shift::<2>(self.0) })
-            }
-        }
-    };
-}
-
-register!(Pairs, int16x8_t, vdupq_n_s16, vaddq_s16, vsubq_s16, vshlq_n_s16);
-register!(Sums, int32x4_t, vdupq_n_s32, vaddq_s32, vsubq_s32, vshlq_n_s32);
+register!(
+    Pairs,
+    int16x8_t,
+    vdupq_n_s16(0),
+    vaddq_s16,
+    vsubq_s16,
+    |v| vshlq_n_s16::<2>(v)
+);
+register!(
+    Sums,
+    int32x4_t,
+    vdupq_n_s32(0),
+    vaddq_s32,
+    vsubq_s32,
+    |v| vshlq_n_s32::<2>(v)
+);
 
 #[derive(Clone, Copy)]
 struct Neon;

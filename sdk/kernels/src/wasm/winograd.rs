@@ -4,9 +4,8 @@
 use super::simd128;
 use crate::int8::{GROUP, Packed, SkipSum};
 use crate::wavefront::{Geometry, LastRows, SlotsMut};
-use crate::winograd::{self, Kernels, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles};
+use crate::winograd::{self, Kernels, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles, register};
 use std::arch::wasm32::*;
-use std::ops::{Add, Sub};
 
 pub(super) const SIMD128: Kernels = Kernels {
     filters: Simd128::FILTERS,
@@ -28,46 +27,8 @@ fn last_rows(layer: &Packed, rows: &Rows<'_>, out: LastRows<'_>, from: usize, ge
     winograd::last_rows(Simd128, layer, rows, out, from, geometry);
 }
 
-/// Defines a vector of integers.
-macro_rules! register {
-    ($name:ident, $add:ident, $sub:ident, $shift:ident) => {
-        #[derive(Clone, Copy)]
-        struct $name(v128);
-
-        impl Add for $name {
-            type Output = $name;
-
-            #[inline(always)]
-            fn add(self, other: $name) -> $name {
-                $name($add(self.0, other.0))
-            }
-        }
-
-        impl Sub for $name {
-            type Output = $name;
-
-            #[inline(always)]
-            fn sub(self, other: $name) -> $name {
-                $name($sub(self.0, other.0))
-            }
-        }
-
-        impl Register for $name {
-            #[inline(always)]
-            fn zero() -> $name {
-                $name(i32x4_splat(0))
-            }
-
-            #[inline(always)]
-            fn times_4(self) -> $name {
-                $name($shift(self.0, 2))
-            }
-        }
-    };
-}
-
-register!(Pairs, i16x8_add, i16x8_sub, i16x8_shl);
-register!(Sums, i32x4_add, i32x4_sub, i32x4_shl);
+register!(Pairs, v128, i32x4_splat(0), i16x8_add, i16x8_sub, |v| i16x8_shl(v, 2));
+register!(Sums, v128, i32x4_splat(0), i32x4_add, i32x4_sub, |v| i32x4_shl(v, 2));
 
 #[derive(Clone, Copy)]
 struct Simd128;

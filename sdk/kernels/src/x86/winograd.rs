@@ -7,10 +7,9 @@
 
 use crate::int8::{GROUP, Packed, SkipSum};
 use crate::wavefront::{Geometry, LastRows, SlotsMut};
-use crate::winograd::{self, Kernels, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles};
+use crate::winograd::{self, Kernels, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles, register};
 use crate::x86::avx2;
 use std::arch::x86_64::*;
-use std::ops::{Add, Sub};
 
 pub(super) const AVX2: Kernels = Kernels {
     filters: Avx2::FILTERS,
@@ -48,48 +47,6 @@ fn last_rows(layer: &Packed, rows: &Rows<'_>, out: LastRows<'_>, from: usize, ge
     unsafe { compiled(layer, rows, out, from, geometry) }
 }
 
-/// Defines a register that only code for its instruction set makes.
-macro_rules! register {
-    ($name:ident, $register:ty, $zero:ident, $add:ident, $sub:ident, $shift:ident) => {
-        #[derive(Clone, Copy)]
-        struct $name($register);
-
-        impl Add for $name {
-            type Output = $name;
-
-            #[inline(always)]
-            fn add(self, other: $name) -> $name {
-                // SAFETY: the register exists.
-                $name(unsafe { $add(self.0, other.0) })
-            }
-        }
-
-        impl Sub for $name {
-            type Output = $name;
-
-            #[inline(always)]
-            fn sub(self, other: $name) -> $name {
-                // SAFETY: the register exists.
-                $name(unsafe { $sub(self.0, other.0) })
-            }
-        }
-
-        impl Register for $name {
-            #[inline(always)]
-            fn zero() -> $name {
-                // SAFETY: only code that is compiled for the instruction set calls it.
-                $name(unsafe { $zero() })
-            }
-
-            #[inline(always)]
-            fn times_4(self) -> $name {
-                // SAFETY: the register exists.
-                $name(unsafe { $shift::<2>(self.0) })
-            }
-        }
-    };
-}
-
 /// Shows that the processor has AVX2.
 #[derive(Clone, Copy)]
 struct Avx2(());
@@ -97,18 +54,18 @@ struct Avx2(());
 register!(
     Avx2Pairs,
     __m256i,
-    _mm256_setzero_si256,
+    _mm256_setzero_si256(),
     _mm256_add_epi16,
     _mm256_sub_epi16,
-    _mm256_slli_epi16
+    |v| _mm256_slli_epi16::<2>(v)
 );
 register!(
     Avx2Sums,
     __m256i,
-    _mm256_setzero_si256,
+    _mm256_setzero_si256(),
     _mm256_add_epi32,
     _mm256_sub_epi32,
-    _mm256_slli_epi32
+    |v| _mm256_slli_epi32::<2>(v)
 );
 
 impl Tiles for Avx2 {
