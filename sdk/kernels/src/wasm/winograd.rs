@@ -4,7 +4,7 @@
 use super::simd128;
 use crate::int8::{GROUP, Packed, SkipSum};
 use crate::wavefront::{Geometry, LastRows, SlotsMut};
-use crate::winograd::{self, Kernels, NINTH, REACH, Register, Rows, SHIFT, SIDE, Tiles, register};
+use crate::winograd::{self, Kernels, NINTH, REACH, Rows, SHIFT, SIDE, Tiles, register};
 use std::arch::wasm32::*;
 
 pub(super) const SIMD128: Kernels = Kernels {
