@@ -3,7 +3,8 @@
 use crate::error::{PhasefrontError, guard};
 use crate::hologram::{OutputSize, RawHologram, RawMemory};
 use crate::target::Target;
-use phasefront::output::ModulatorSpec;
+use phasefront::output::{Layout, Levels, ModulatorInput, ModulatorSpec};
+use phasefront::session::Hologram;
 use std::sync::Arc;
 
 /// A modulator: its display, the phases of its levels, and the images that its input takes. The layers written by hand
@@ -57,11 +58,25 @@ impl RawModulator {
     /// Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for
     /// another number of lasers or bits; with bit planes, also if it has another size.
     pub fn write_output(&self, hologram: Arc<RawHologram>, image: usize, to: RawMemory) -> Result<(), PhasefrontError> {
-        guard(|| {
-            let hologram = &hologram.core;
-            let input = self.core.input(hologram.shape(), hologram.target())?;
-            let (levels, bytes) = (hologram.output_levels(), to.bytes()?);
-            Ok(hologram.on_threads(|| input.write(levels, image, bytes, to.row_stride))?)
+        self.write(&hologram.core, to, |input, levels, bytes| {
+            input.write(levels, image, bytes, to.row_stride)
+        })
+    }
+
+    /// Writes the same image in the pixels of a screen that drives the modulator, `layout` Rgba or Bgra. The red, green
+    /// and blue of a grey image are its level.
+    ///
+    /// # Errors
+    /// Returns an error in the cases of [`Self::write_output`], for another layout, and for images of 16 bits.
+    pub fn write_pixels(
+        &self,
+        hologram: Arc<RawHologram>,
+        image: usize,
+        layout: Layout,
+        to: RawMemory,
+    ) -> Result<(), PhasefrontError> {
+        self.write(&hologram.core, to, |input, levels, bytes| {
+            input.write_pixels(levels, image, layout, bytes, to.row_stride)
         })
     }
 
@@ -93,5 +108,19 @@ impl RawModulator {
     fn new(core: ModulatorSpec) -> Result<Arc<Self>, PhasefrontError> {
         let target = Arc::new(Target { core: core.target()? });
         Ok(Arc::new(RawModulator { core, target }))
+    }
+
+    /// Lets `write` write an image of `hologram` for the input into the bytes of `to`, on the hologram's threads.
+    fn write(
+        &self,
+        hologram: &Hologram,
+        to: RawMemory,
+        write: impl FnOnce(&ModulatorInput, Levels<'_>, &mut [u8]) -> phasefront::Result<()> + Send,
+    ) -> Result<(), PhasefrontError> {
+        guard(|| {
+            let input = self.core.input(hologram.shape(), hologram.target())?;
+            let (levels, bytes) = (hologram.output_levels(), to.bytes()?);
+            Ok(hologram.on_threads(|| write(&input, levels, bytes))?)
+        })
     }
 }

@@ -496,6 +496,11 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawmodulator_target(uint64_t ptr, RustC
 void uniffi_phasefront_ffi_fn_method_rawmodulator_write_output(uint64_t ptr, uint64_t hologram, int32_t image, RustBuffer to, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_WRITE_PIXELS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWMODULATOR_WRITE_PIXELS
+void uniffi_phasefront_ffi_fn_method_rawmodulator_write_pixels(uint64_t ptr, uint64_t hologram, int32_t image, RustBuffer layout, RustBuffer to, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_DEPTHNETWORK
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_DEPTHNETWORK
 uint64_t uniffi_phasefront_ffi_fn_clone_depthnetwork(uint64_t handle, RustCallStatus *_Nonnull out_status
@@ -1179,6 +1184,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_target(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_WRITE_OUTPUT
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_WRITE_OUTPUT
 uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_write_output(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_WRITE_PIXELS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWMODULATOR_WRITE_PIXELS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawmodulator_write_pixels(void
     
 );
 #endif

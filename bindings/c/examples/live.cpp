@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <thread>
+#include <vector>
 
 int main() try {
     constexpr std::uint32_t width = 320, height = 240;

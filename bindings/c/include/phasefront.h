@@ -602,6 +602,14 @@ enum PfStatus pf_modulator_write_output(const struct PfModulator *modulator,
                                         uint32_t number,
                                         struct PfMemory memory);
 
+// Writes the same image in the pixels of a screen that drives the modulator, PF_LAYOUT_RGBA or PF_LAYOUT_BGRA. The
+// red, green and blue of a grey image are its level; images of 16 bits are refused. A pixel has 4 bytes.
+enum PfStatus pf_modulator_write_pixels(const struct PfModulator *modulator,
+                                        const struct PfHologram *hologram,
+                                        uint32_t number,
+                                        uint32_t layout,
+                                        struct PfMemory memory);
+
 // Frees a modulator. Targets that it created are not affected.
 void pf_modulator_free(struct PfModulator *modulator);
 

@@ -14,7 +14,6 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
-#include <vector>
 
 namespace phasefront {
 
@@ -132,26 +131,6 @@ class Planes : public detail::Object<PfPlanes, pf_planes_free> {
     }
 };
 
-// A modulator of the catalogue, or of a file.
-class Modulator : public detail::Object<PfModulator, pf_modulator_free> {
-  public:
-    using Object::Object;
-    // A modulator that the command `phasefront devices` lists, such as "holoeye-pluto".
-    static Modulator named(const std::string &name) {
-        return Modulator(created([&](PfModulator **to) { return pf_modulator_named(name.c_str(), to); }));
-    }
-    // A modulator of the text of its file.
-    static Modulator from_toml(const std::string &toml) {
-        return Modulator(created([&](PfModulator **to) { return pf_modulator_from_toml(toml.c_str(), to); }));
-    }
-    // The target of holograms for the modulator.
-    Target target() const {
-        PfTarget *target = nullptr;
-        check(pf_modulator_target(get(), &target));
-        return Target(target);
-    }
-};
-
 // The levels that a modulator displays, and what it would show.
 class Hologram : public detail::Object<PfHologram, pf_hologram_free> {
   public:
@@ -176,20 +155,19 @@ class Hologram : public detail::Object<PfHologram, pf_hologram_free> {
         check(pf_hologram_levels(get(), colour, &levels.data, &levels.size));
         return levels;
     }
-    // The view of an eye focused at z, width × height pixels of red, green and blue.
-    std::vector<std::uint8_t> preview(double z_mm, std::uint32_t width, std::uint32_t height) const {
-        std::vector<std::uint8_t> bytes(std::size_t{3} * width * height);
-        check(pf_hologram_write_preview(get(), z_mm, width, height, PF_LAYOUT_RGB, {bytes.data(), bytes.size(), 3 * width}));
-        return bytes;
+    // Writes the view of an eye focused at z into memory: width × height pixels in RGB, RGBA or BGRA.
+    void write_preview(double z_mm, std::uint32_t width, std::uint32_t height, PfLayout layout, PfMemory to) const {
+        check(pf_hologram_write_preview(get(), z_mm, width, height, static_cast<std::uint32_t>(layout), to));
     }
-    // Image `number` of those that the modulator's driver takes, rows without gaps.
-    std::vector<std::uint8_t> output(const PfPlacement &placement = {}, std::uint32_t number = 0) const {
+    // The size of the images of a layout for the modulator.
+    PfOutputSize output_size(PfLayout layout) const {
         PfOutputSize size{};
-        check(pf_hologram_output_size(get(), placement.layout, &size));
-        const std::uint32_t stride = size.width * size.pixel_bytes;
-        std::vector<std::uint8_t> bytes(std::size_t{stride} * size.height);
-        check(pf_hologram_write_output(get(), &placement, number, {bytes.data(), bytes.size(), stride}));
-        return bytes;
+        check(pf_hologram_output_size(get(), static_cast<std::uint32_t>(layout), &size));
+        return size;
+    }
+    // Writes image `number` of those that the modulator's driver takes into memory.
+    void write_output(const PfPlacement &placement, PfMemory to, std::uint32_t number = 0) const {
+        check(pf_hologram_write_output(get(), &placement, number, to));
     }
     // The amplitudes of each colour that an eye focused at z sees.
     Planes refocus(double z_mm) const {
@@ -205,6 +183,40 @@ class Hologram : public detail::Object<PfHologram, pf_hologram_free> {
         PfPlanes *planes = nullptr;
         check(create(&planes));
         return planes;
+    }
+};
+
+// A modulator of the catalogue, or of a file.
+class Modulator : public detail::Object<PfModulator, pf_modulator_free> {
+  public:
+    using Object::Object;
+    // A modulator that the command `phasefront devices` lists, such as "holoeye-pluto".
+    static Modulator named(const std::string &name) {
+        return Modulator(created([&](PfModulator **to) { return pf_modulator_named(name.c_str(), to); }));
+    }
+    // A modulator of the text of its file.
+    static Modulator from_toml(const std::string &toml) {
+        return Modulator(created([&](PfModulator **to) { return pf_modulator_from_toml(toml.c_str(), to); }));
+    }
+    // The target of holograms for the modulator.
+    Target target() const {
+        PfTarget *target = nullptr;
+        check(pf_modulator_target(get(), &target));
+        return Target(target);
+    }
+    // The size of the images that its input takes.
+    PfOutputSize output_size() const {
+        PfOutputSize size{};
+        check(pf_modulator_output_size(get(), &size));
+        return size;
+    }
+    // Writes image `number` of those that its input takes of a hologram into memory.
+    void write_output(const Hologram &hologram, PfMemory to, std::uint32_t number = 0) const {
+        check(pf_modulator_write_output(get(), hologram.get(), number, to));
+    }
+    // Writes the same image in the pixels of a screen that drives the modulator, RGBA or BGRA.
+    void write_pixels(const Hologram &hologram, PfLayout layout, PfMemory to, std::uint32_t number = 0) const {
+        check(pf_modulator_write_pixels(get(), hologram.get(), number, static_cast<std::uint32_t>(layout), to));
     }
 };
 

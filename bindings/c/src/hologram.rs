@@ -90,7 +90,7 @@ pub enum PfLayout {
     Grey16 = 5,
 }
 
-const LAYOUTS: [Layout; 6] = [
+pub(crate) const LAYOUTS: [Layout; 6] = [
     Layout::Rgb,
     Layout::Rgba,
     Layout::Bgra,

@@ -31,7 +31,7 @@ pub use hologram::{
 pub use log::{PfLogLevel, PfOnLog, pf_set_log_listener};
 pub use modulator::{
     PfModulator, pf_modulator_free, pf_modulator_from_toml, pf_modulator_named, pf_modulator_output_size,
-    pf_modulator_target, pf_modulator_write_output,
+    pf_modulator_target, pf_modulator_write_output, pf_modulator_write_pixels,
 };
 pub use network::{
     PfColourScale, PfDepthNetwork, PfNetwork, pf_depth_network_free, pf_depth_network_from_bytes, pf_network_built_in,

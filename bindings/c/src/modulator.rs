@@ -1,7 +1,7 @@
 //! Modulators by name or by their TOML file, and the images that their inputs take.
 
-use crate::hologram::{PfHologram, PfMemory, PfOutputSize};
-use crate::pointer::{free, give, object, read, text};
+use crate::hologram::{LAYOUTS, PfHologram, PfMemory, PfOutputSize};
+use crate::pointer::{free, give, object, pick, read, text};
 use crate::status::{PfStatus, call};
 use crate::target::PfTarget;
 use phasefront_ffi::RawModulator;
@@ -69,6 +69,24 @@ pub unsafe extern "C" fn pf_modulator_write_output(
     call(|| unsafe {
         let hologram = read(hologram, "hologram")?.0.clone();
         (read(modulator, "modulator")?.0).write_output(hologram, number as usize, memory.into())
+    })
+}
+
+/// Writes the same image in the pixels of a screen that drives the modulator, PF_LAYOUT_RGBA or PF_LAYOUT_BGRA. The
+/// red, green and blue of a grey image are its level; images of 16 bits are refused. A pixel has 4 bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_modulator_write_pixels(
+    modulator: *const PfModulator,
+    hologram: *const PfHologram,
+    number: u32,
+    layout: u32,
+    memory: PfMemory,
+) -> PfStatus {
+    // SAFETY: the rules of this border.
+    call(|| unsafe {
+        let layout = pick(&LAYOUTS, layout, "layout")?;
+        let hologram = read(hologram, "hologram")?.0.clone();
+        (read(modulator, "modulator")?.0).write_pixels(hologram, number as usize, layout, memory.into())
     })
 }
 

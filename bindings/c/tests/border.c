@@ -188,6 +188,16 @@ static void modulators(void) {
     for (size_t at = 0; at < memory.length; at++) set += memory.data[at] != 0;
     assert(set > memory.length / 10);
     refused(pf_modulator_write_output(modulator, hologram, 1, memory), PF_STATUS_SETTING, "no image 1");
+    PfMemory pixels = {calloc(1920 * 1080, 4), 1920 * 1080 * 4, 1920 * 4};
+    ok(pf_modulator_write_pixels(modulator, hologram, 0, PF_LAYOUT_BGRA, pixels));
+    for (size_t at = 0; at < 1920 * 1080; at++) {
+        for (size_t c = 0; c < 3; c++) assert(pixels.data[4 * at + c] == memory.data[3 * at + 2 - c]);
+        assert(pixels.data[4 * at + 3] == 255);
+    }
+    refused(pf_modulator_write_pixels(modulator, hologram, 0, PF_LAYOUT_BGRA, memory), PF_STATUS_SETTING, "1080 rows");
+    refused(pf_modulator_write_pixels(modulator, hologram, 0, PF_LAYOUT_GREY, pixels), PF_STATUS_SETTING, "Rgba or Bgra");
+    refused(pf_modulator_write_pixels(modulator, hologram, 0, 9, pixels), PF_STATUS_SETTING, "layout is 9");
+    free(pixels.data);
     free(memory.data);
     pf_hologram_free(hologram);
     pf_session_free(session);

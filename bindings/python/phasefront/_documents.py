@@ -115,6 +115,7 @@ DOCUMENTS = {
     'RawModulator.read': 'Reads the levels of a hologram of `height` × `width` pixels back from its images, which follow one another\nwithout gaps. Writes 2 bytes a level, planes of colours one after another without gaps.\n\nErrors: Returns an error for another number of bytes, or for cells that are those of no level.',
     'RawModulator.target': 'Returns the target of holograms for the modulator.',
     'RawModulator.write_output': 'Writes image `image` of those that its input takes of `hologram`.\n\nErrors: Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for\nanother number of lasers or bits; with bit planes, also if it has another size.',
+    'RawModulator.write_pixels': 'Writes the same image in the pixels of a screen that drives the modulator, `layout` Rgba or Bgra. The red, green\nand blue of a grey image are its level.\n\nErrors: Returns an error in the cases of `write_output`, for another layout, and for images of 16 bits.',
     'RawSession': 'A session. All its methods can be called from any thread at any time.',
     'RawSession.__init__': 'Creates a session that runs in `mode`. A live session needs a `listener`.\n\nErrors: Returns an error if the options are invalid or cannot be planned, if a live session has no listener or another\nsession has one, or if threads cannot be started.',
     'RawSession.pause': 'Accepts no frames until `resume`.',

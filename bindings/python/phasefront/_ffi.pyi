@@ -1059,6 +1059,12 @@ class RawModulator:
         Errors: Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for
         another number of lasers or bits; with bit planes, also if it has another size.
         """
+    def write_pixels(self, hologram: RawHologram, image: int, layout: Layout, to: RawMemory) -> None:
+        """Writes the same image in the pixels of a screen that drives the modulator, `layout` Rgba or Bgra. The red, green
+        and blue of a grey image are its level.
+
+        Errors: Returns an error in the cases of `write_output`, for another layout, and for images of 16 bits.
+        """
 
 class RawSession:
     """A session. All its methods can be called from any thread at any time."""

@@ -283,6 +283,11 @@ namespace Phasefront
         public void WriteOutput(Hologram hologram, ImageMemory to, int number = 0) =>
             to.Lend(memory => Native.pf_modulator_write_output(this, hologram, checked((uint)number), memory));
 
+        /// <summary>Writes the same image in the pixels of a screen or texture that drives the modulator, Rgba or Bgra. The
+        /// red, green and blue of a grey image are its level; images of 16 bits are refused.</summary>
+        public void WritePixels(Hologram hologram, ModulatorLayout layout, ImageMemory to, int number = 0) =>
+            to.Lend(memory => Native.pf_modulator_write_pixels(this, hologram, checked((uint)number), (uint)layout, memory));
+
         /// <summary>Frees the modulator.</summary>
         protected override bool ReleaseHandle()
         {

@@ -194,6 +194,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_target(Modulator modulator, out IntPtr target);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_output_size(Modulator modulator, out OutputSize size);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_write_output(Modulator modulator, Hologram hologram, uint number, NativeMemory memory);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_modulator_write_pixels(Modulator modulator, Hologram hologram, uint number, uint layout, NativeMemory memory);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_modulator_free(IntPtr modulator);
     }
 }

@@ -5,6 +5,7 @@ using System.Collections;
 using System.Collections.Generic;
 using System.IO;
 using System.Linq;
+using System.Runtime.InteropServices;
 using System.Threading;
 using System.Web.Script.Serialization;
 using Phasefront;
@@ -32,6 +33,7 @@ internal static class Tests
         Func<string, byte[]> left = name => File.ReadAllBytes(Path.Combine(arguments[2], name));
         Conformance(arguments[0], arguments[1], left("levels.bin"), left("seen.bin"));
         Mistakes();
+        Allocations();
         Live();
         for (var i = 0; i < 4; i++) ClosedByItsListener();
         Console.WriteLine("mistakes are told, live streams end");
@@ -259,6 +261,7 @@ internal static class Tests
                         using (var own = modulator.Target()) Require(own.Size.Width == 960 && own.Size.Height == 540, "a modulator's target");
                         Refused(Status.Setting, "lasers", () => modulator.WriteOutput(hologram, small));
                     }
+                    Pixels(hologram);
                     Refused(Status.Setting, "a shorter distance", () => hologram.Refocus(1e5));
                 }
                 Refused(Status.Timestamp, "2", () => session.Process(frame));
@@ -275,6 +278,20 @@ internal static class Tests
                 }
                 catch (ObjectDisposedException) { }
             }
+        }
+    }
+
+    /// In a screen's pixels, red, green and blue are the level.
+    private static void Pixels(Hologram hologram)
+    {
+        using (var modulator = Modulator.FromToml("width = 48\nheight = 36\npacking = \"grey\""))
+        {
+            var (grey, pixels) = (new byte[48 * 36], new byte[4 * 48 * 36]);
+            modulator.WriteOutput(hologram, new ImageMemory(grey, 48), number: 1);
+            modulator.WritePixels(hologram, ModulatorLayout.Bgra, new ImageMemory(pixels, 4 * 48), number: 1);
+            Require(pixels.SequenceEqual(grey.SelectMany(level => new byte[] { level, level, level, 255 })), "a screen's pixels");
+            var to = new ImageMemory(pixels, 4 * 48);
+            Refused(Status.Setting, "Rgba or Bgra", () => modulator.WritePixels(hologram, ModulatorLayout.Rgb, to));
         }
     }
 
@@ -302,6 +319,89 @@ internal static class Tests
         frame.Cameras = null;
         var normalized = Sample(0).Depth;
         frame.Depth = normalized;
+    }
+
+    // What tests/counting.c counts: the memory of the process, without the virtual machine's own.
+    [DllImport("__Internal")] private static extern ulong allocated_bytes();
+
+    /// Prints the bytes that `call` allocates on the managed heap and elsewhere, and checks that they are fewer than those
+    /// of the smallest image, the levels of one colour. The first calls may grow memory that later ones use again.
+    private static void Count(string what, Action call)
+    {
+        var (managed, native) = (long.MaxValue, ulong.MaxValue);
+        for (var i = 0; i < 8; i++)
+        {
+            var (before, outside) = (GC.GetAllocatedBytesForCurrentThread(), allocated_bytes());
+            call();
+            if (i < 3) continue;
+            managed = Math.Min(managed, GC.GetAllocatedBytesForCurrentThread() - before);
+            native = Math.Min(native, allocated_bytes() - outside);
+        }
+        Console.WriteLine("{0}: {1} bytes managed, {2} elsewhere", what, managed, native);
+        Require(managed < 640 * 480 && native < 640 * 480, what + " allocates no image");
+    }
+
+    private static void Allocations()
+    {
+        const int Width = 640, Height = 480;
+        var (before, outside) = (GC.GetAllocatedBytesForCurrentThread(), allocated_bytes());
+        var pixels = new byte[4 * Width * Height];
+        Marshal.FreeHGlobal(Marshal.AllocHGlobal(pixels.Length));
+        Require(GC.GetAllocatedBytesForCurrentThread() - before >= pixels.Length, "managed allocations are counted");
+        Require(allocated_bytes() - outside >= (ulong)pixels.Length, "other allocations are counted");
+        var colour = Enumerable.Range(0, 4 * Width * Height).Select(i => (byte)(i * 37 % 251)).ToArray();
+        var depth = Enumerable.Range(0, Width * Height).Select(i => (byte)(i / 700)).ToArray();
+        var frame = new CameraFrame
+        {
+            Colour = new ColourImage { Format = ColourFormat.Rgba, Width = Width, Height = Height, Planes = new[] { new ImagePlane(colour, 4 * Width, 4) } },
+            Depth = new DepthImage { Format = DepthFormat.NormalizedU8, Width = Width, Height = Height, Plane = new ImagePlane(depth, Width, 1) },
+        };
+        using (var modulator = Modulator.FromToml("width = 640\nheight = 480"))
+        using (var target = modulator.Target())
+        using (var options = SessionOptions.For(target, HologramMethod.Sweep))
+        using (var session = HologramSession.Open(options, RunningMode.Video))
+        {
+            Func<Hologram> process = () =>
+            {
+                frame.TimestampNs += 33000000;
+                return session.Process(frame);
+            };
+            Count("Process", () => process().Dispose());
+            using (var hologram = process())
+            {
+                var (rgba, rgb) = (new ImageMemory(pixels, 4 * Width), new ImageMemory(pixels, 3 * Width));
+                Count("WriteOutput of grey", () => hologram.WriteOutput(ModulatorLayout.Grey, new ImageMemory(pixels, Width), number: 2));
+                Count("WriteOutput", () => hologram.WriteOutput(ModulatorLayout.Rgba, rgba));
+                Count("WritePreview", () => hologram.WritePreview(0, Width, Height, ModulatorLayout.Rgba, rgba));
+                Count("WriteOutput of a modulator", () => modulator.WriteOutput(hologram, rgb));
+                Count("WritePixels of a modulator", () => modulator.WritePixels(hologram, ModulatorLayout.Rgba, rgba));
+            }
+            var made = new Counted();
+            using (var live = HologramSession.Open(options, RunningMode.Live, made))
+                Count("Submit, until it is a hologram", () =>
+                {
+                    frame.TimestampNs += 33000000;
+                    live.Submit(frame);
+                    made.One.Wait();
+                });
+        }
+    }
+
+    private sealed class Counted : ISessionListener
+    {
+        public readonly SemaphoreSlim One = new SemaphoreSlim(0);
+
+        public void OnProcessed(Hologram hologram)
+        {
+            hologram.Dispose();
+            One.Release();
+        }
+
+        public void OnDropped(ulong timestampNs, DropReason reason) { }
+
+        public void OnFailed(ulong timestampNs, string message) => Console.Error.WriteLine(message);
+
+        public void OnQualityChanged(ulong timestampNs, QualityChange change) { }
     }
 
     private sealed class Heard : ISessionListener

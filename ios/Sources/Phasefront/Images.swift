@@ -23,17 +23,34 @@
             to buffer: CVPixelBuffer, flipX: Bool = false, flipY: Bool = false, shiftX: Int = 0, shiftY: Int = 0
         ) throws {
             try withPixels(of: buffer) { layout, memory, rowStride in
-                let (width, height) = (CVPixelBufferGetWidth(buffer), CVPixelBufferGetHeight(buffer))
-                let size = outputSize(layout)
-                guard (width, height) == (size.width, size.height) else {
-                    throw PhasefrontError.setting(
-                        message: "a buffer of \(width)×\(height); the modulator's \(size.width)×\(size.height) are needed")
-                }
+                try check(buffer, has: outputSize(layout))
                 let placement = Placement(
                     layout: layout, flipX: flipX, flipY: flipY, shiftX: Int32(clamping: shiftX),
                     shiftY: Int32(clamping: shiftY))
                 try writeOutput(placement, to: memory, rowStride: rowStride)
             }
+        }
+    }
+
+    extension Modulator {
+        /// Writes image `index` of the images that the modulator takes of `hologram` into `buffer`, 32BGRA or 32RGBA of
+        /// the size ``outputSize``, in place, for a screen that drives the modulator.
+        ///
+        /// - Throws: ``PhasefrontError/setting(message:)`` for any other pixel format or size, if the hologram does not fit
+        ///   the modulator, and for a modulator whose images have 16 bits.
+        public func writePixels(_ hologram: Hologram, image index: Int = 0, to buffer: CVPixelBuffer) throws {
+            try withPixels(of: buffer) { layout, memory, rowStride in
+                try check(buffer, has: outputSize)
+                try writePixels(hologram, image: index, layout: layout, to: memory, rowStride: rowStride)
+            }
+        }
+    }
+
+    private func check(_ buffer: CVPixelBuffer, has size: OutputSize) throws {
+        let (width, height) = (CVPixelBufferGetWidth(buffer), CVPixelBufferGetHeight(buffer))
+        guard (width, height) == (size.width, size.height) else {
+            throw PhasefrontError.setting(
+                message: "a buffer of \(width)×\(height); the modulator's \(size.width)×\(size.height) are needed")
         }
     }
 

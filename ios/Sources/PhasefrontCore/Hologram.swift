@@ -121,6 +121,20 @@ public final class Modulator: Sendable {
         let memory = RawMemory(memory, rowStride: rowStride ?? outputSize.rowBytes)
         try raw.writeOutput(hologram: hologram.raw, image: index, to: memory)
     }
+
+    /// Writes the same image in the pixels of a screen that drives the modulator, in `layout` RGBA or BGRA, into
+    /// `memory`. The red, green and blue of a grey image are its level. Rows are `rowStride` bytes apart, by default
+    /// without gaps.
+    ///
+    /// - Throws: ``PhasefrontError/setting(message:)`` in the cases of ``writeOutput(_:image:to:rowStride:)``, for another
+    ///   layout, and for a modulator whose images have 16 bits.
+    public func writePixels(
+        _ hologram: Hologram, image index: Int = 0, layout: ModulatorLayout = .rgba,
+        to memory: UnsafeMutableRawBufferPointer, rowStride: Int? = nil
+    ) throws {
+        let memory = RawMemory(memory, rowStride: rowStride ?? 4 * outputSize.width)
+        try raw.writePixels(hologram: hologram.raw, image: index, layout: layout, to: memory)
+    }
 }
 
 extension OutputSize {

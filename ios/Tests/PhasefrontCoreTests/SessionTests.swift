@@ -146,6 +146,13 @@ final class SessionTests: XCTestCase {
             assertRefused("lasers") { try other.writeOutput(hologram, to: memory) }
         }
         XCTAssertEqual(green[0], levels[64 * 48 + 63])
+        // In a screen's pixels, red, green and blue are the level.
+        var pixels = [UInt8](repeating: 0, count: 4 * 64 * 48)
+        try pixels.withUnsafeMutableBytes { memory in
+            try modulator.writePixels(hologram, image: 1, layout: .bgra, to: memory)
+            assertRefused("Rgba or Bgra") { try modulator.writePixels(hologram, layout: .rgb, to: memory) }
+        }
+        XCTAssertEqual(pixels, green.flatMap { [$0, $0, $0, 255] })
     }
 
     func testALiveStreamAnswersEveryFrameOnItsOwnThread() throws {

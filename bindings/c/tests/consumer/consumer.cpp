@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstring>
+#include <vector>
 
 using namespace phasefront;
 
@@ -38,10 +39,15 @@ void image(const Target &target, const Images &images) {
     expect(info.width == width && info.height == height, "a hologram of another size");
     const Hologram::Levels red = hologram.levels(0);
     expect(red.size == width * height, "a plane of another size");
-    const std::vector<std::uint8_t> output = hologram.output();
-    expect(output.size() == 3 * red.size, "an output of another size");
+    const PfOutputSize size = hologram.output_size(PF_LAYOUT_RGB);
+    expect(size.width == width && size.height == height && size.pixel_bytes == 3, "an output of another size");
+    std::vector<std::uint8_t> output(3 * red.size);
+    PfPlacement placement{};
+    hologram.write_output(placement, {output.data(), output.size(), 3 * width});
     for (std::size_t i = 0; i < red.size; i++) expect(output[3 * i] == red.data[i], "an output of other levels");
-    expect(hologram.preview(0, 32, 24).size() == 32 * 24 * 3, "a preview of another size");
+    std::vector<std::uint8_t> view(4 * 32 * 24);
+    hologram.write_preview(0, 32, 24, PF_LAYOUT_RGBA, {view.data(), view.size(), 4 * 32});
+    expect(view[3] == 255, "a preview without alpha");
     expect(hologram.refocus(0).info().numbers == 1 && hologram.field().info().numbers == 2, "planes of other numbers");
 }
 
@@ -85,6 +91,20 @@ void live(const Target &target, const Images &images) {
     expect(heard == 5, "a frame of which nothing was heard");
 }
 
+// A grey modulator that a screen drives: each pixel has the level three times.
+void screen(const Images &images) {
+    const Modulator modulator = Modulator::from_toml("width = 64\nheight = 48\nwavelengths_nm = [532]\npacking = \"grey\"");
+    const Session session(Options(modulator.target(), PF_METHOD_SWEEP, nullptr));
+    const Hologram hologram = session.process(images.frame(1));
+    const PfOutputSize size = modulator.output_size();
+    expect(size.width == width && size.height == height && size.pixel_bytes == 1, "an input of another size");
+    std::vector<std::uint8_t> grey(width * height), pixels(4 * grey.size());
+    modulator.write_output(hologram, {grey.data(), grey.size(), width});
+    modulator.write_pixels(hologram, PF_LAYOUT_BGRA, {pixels.data(), pixels.size(), 4 * width});
+    for (std::size_t i = 0; i < pixels.size(); i++) expect(pixels[i] == (i % 4 < 3 ? grey[i / 4] : 255), "pixels of other levels");
+    expect(Modulator::named("holoeye-pluto").target().get() != nullptr, "a modulator without a target");
+}
+
 } // namespace
 
 int main() try {
@@ -93,7 +113,7 @@ int main() try {
     image(target, images);
     errors(target);
     live(target, images);
-    expect(Modulator::named("holoeye-pluto").target().get() != nullptr, "a modulator without a target");
+    screen(images);
     return 0;
 } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());

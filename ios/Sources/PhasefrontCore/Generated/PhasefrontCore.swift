@@ -1756,6 +1756,15 @@ public protocol RawModulatorProtocol: AnyObject, Sendable {
      */
     func writeOutput(hologram: RawHologram, image: Int, to: RawMemory) throws 
     
+    /**
+     * Writes the same image in the pixels of a screen that drives the modulator, `layout` Rgba or Bgra. The red, green
+     * and blue of a grey image are its level.
+     *
+     * # Errors
+     * Returns an error in the cases of [`Self::write_output`], for another layout, and for images of 16 bits.
+     */
+    func writePixels(hologram: RawHologram, image: Int, layout: ModulatorLayout, to: RawMemory) throws 
+    
 }
 /**
  * A modulator: its display, the phases of its levels, and the images that its input takes. The layers written by hand
@@ -1903,6 +1912,25 @@ open func writeOutput(hologram: RawHologram, image: Int, to: RawMemory)throws   
             self.uniffiCloneHandle(),
         FfiConverterTypeRawHologram_lower(hologram),
         FfiConverterTypeInt_lower(image),
+        FfiConverterTypeRawMemory_lower(to),uniffiCallStatus
+    )
+}
+}
+    
+    /**
+     * Writes the same image in the pixels of a screen that drives the modulator, `layout` Rgba or Bgra. The red, green
+     * and blue of a grey image are its level.
+     *
+     * # Errors
+     * Returns an error in the cases of [`Self::write_output`], for another layout, and for images of 16 bits.
+     */
+open func writePixels(hologram: RawHologram, image: Int, layout: ModulatorLayout, to: RawMemory)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawmodulator_write_pixels(
+            self.uniffiCloneHandle(),
+        FfiConverterTypeRawHologram_lower(hologram),
+        FfiConverterTypeInt_lower(image),
+        FfiConverterTypeModulatorLayout_lower(layout),
         FfiConverterTypeRawMemory_lower(to),uniffiCallStatus
     )
 }
@@ -8439,6 +8467,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawmodulator_write_output() != 11040) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawmodulator_write_pixels() != 59267) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_hologramnetwork_info() != 60467) {

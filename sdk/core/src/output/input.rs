@@ -1,10 +1,11 @@
 //! The images that a modulator's input takes of a hologram, and back.
 
 use super::modulator::{ModulatorSpec, Packing};
-use super::{BitPlanes, Output, Placement};
+use super::{BitPlanes, Layout, Output, Placement, check_rows, rows};
 use crate::display::levels::Levels;
 use crate::display::target::Target;
 use crate::runtime::error::{Error, Result};
+use rayon::prelude::*;
 
 /// The size and the number of the images that a modulator's input takes of a hologram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,6 +129,55 @@ impl ModulatorInput {
         }
     }
 
+    /// Writes image `image`, as [`Self::write`] does, in the pixels of a screen that drives the modulator: Rgba or Bgra
+    /// with alpha 255. The red, green and blue of a grey image are its level. Allocates nothing.
+    ///
+    /// # Errors
+    /// Returns an error in the cases of [`Self::write`], for another layout, and for images of 16 bits, which a pixel
+    /// does not hold.
+    pub fn write_pixels(
+        &self,
+        levels: Levels<'_>,
+        image: usize,
+        layout: Layout,
+        bytes: &mut [u8],
+        row_stride: usize,
+    ) -> Result<()> {
+        let OutputSize {
+            height,
+            width,
+            pixel_bytes,
+            ..
+        } = self.size;
+        if !matches!(layout, Layout::Rgba | Layout::Bgra) {
+            return Err(Error::Setting(format!(
+                "pixels in {layout:?}; a screen's are Rgba or Bgra"
+            )));
+        }
+        if !matches!(pixel_bytes, 1 | 3) {
+            return Err(Error::Setting(
+                "the modulator takes 16 bits of grey, which a screen's pixels do not hold; write the image without a layout".into(),
+            ));
+        }
+        check_rows(bytes.len(), row_stride, (height, 4 * width))?;
+        self.write(levels, image, bytes, row_stride)?;
+        rows(bytes, row_stride, (height, 4 * width))?.for_each(|row| {
+            // The image's pixels are narrower, so from the end of a row on none is overwritten before it is read.
+            for x in (0..width).rev() {
+                let first = x * pixel_bytes;
+                let [red, green, blue] = match pixel_bytes {
+                    1 => [row[first]; 3],
+                    _ => [row[first], row[first + 1], row[first + 2]],
+                };
+                row[4 * x..4 * x + 4].copy_from_slice(&match layout {
+                    Layout::Bgra => [blue, green, red, 255],
+                    _ => [red, green, blue, 255],
+                });
+            }
+        });
+        Ok(())
+    }
+
     /// Reads `levels`, (C, H, W), back from all images, which follow one another in `bytes` without gaps.
     ///
     /// # Errors
@@ -199,5 +249,73 @@ mod tests {
             let target = spec.target().unwrap();
             assert!(spec.input((shape.0 + 1, shape.1), &target).is_err());
         }
+    }
+
+    /// Compares with the image that the input takes, for bit planes, a split level and grey, with gaps between rows.
+    #[test]
+    fn pixels_have_the_bytes_of_the_image() {
+        for (toml, bytes) in [
+            (
+                "bits = 4\npacking = { memory = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12], layout = [[2, 3], [0, 1]] }",
+                3,
+            ),
+            (
+                "bits = 10\nwavelengths_nm = [532]\npacking = { red = [9, 8, 7], green = [6, 5, 4], blue = [3, 2, 1, 0] }",
+                3,
+            ),
+            ("bits = 8\npacking = \"grey\"", 1),
+            ("bits = 8\nwavelengths_nm = [532]\npacking = \"grey\"\nflip_x = true", 1),
+            ("bits = 8\npacking = \"rgb\"", 3),
+        ] {
+            let spec = ModulatorSpec::from_toml(&format!("width = 7\nheight = 5\n{toml}")).unwrap();
+            let (size, colours) = (spec.output_size(), spec.display.colours());
+            assert_eq!(size.pixel_bytes, bytes, "{toml}");
+            let input = spec.input((5, 7), &spec.target().unwrap()).unwrap();
+            let words: Vec<u16> = (0..colours * 35)
+                .map(|i| (i * 37 % (1 << spec.display.bits())) as u16)
+                .collect();
+            let narrow: Vec<u8> = words.iter().map(|word| *word as u8).collect();
+            let levels = match spec.display.bits() {
+                0..=8 => Levels::Bytes(&narrow),
+                _ => Levels::Words(&words),
+            };
+            let (row, stride) = (size.width * bytes, size.width * 4 + 3);
+            let last = size.images - 1;
+            let mut plain = vec![0; size.height * row];
+            input.write(levels, last, &mut plain, row).unwrap();
+            for (layout, order) in [(Layout::Rgba, [0, 1, 2]), (Layout::Bgra, [2, 1, 0])] {
+                let mut pixels = vec![9; size.height * stride];
+                input.write_pixels(levels, last, layout, &mut pixels, stride).unwrap();
+                for (y, row) in plain.chunks_exact(row).enumerate() {
+                    for (x, pixel) in row.chunks_exact(bytes).enumerate() {
+                        let got = &pixels[y * stride + 4 * x..][..4];
+                        let want = order.map(|c| pixel[c % bytes]);
+                        assert_eq!((&got[..3], got[3]), (&want[..], 255), "{toml}: {layout:?}, {x}, {y}");
+                    }
+                    assert_eq!(
+                        pixels[y * stride + 4 * size.width..][..3],
+                        [9; 3],
+                        "{toml}: between rows"
+                    );
+                }
+                let mut small = vec![9; size.height * row + 1];
+                assert!(
+                    input
+                        .write_pixels(levels, last, layout, &mut small, 4 * size.width)
+                        .is_err()
+                );
+                assert!(small.iter().all(|byte| *byte == 9), "nothing was written");
+                assert!(
+                    input
+                        .write_pixels(levels, size.images, layout, &mut pixels, stride)
+                        .is_err()
+                );
+            }
+            assert!(input.write_pixels(levels, 0, Layout::Rgb, &mut plain, row).is_err());
+        }
+        let spec = ModulatorSpec::from_toml("width = 4\nheight = 4\nbits = 10").unwrap();
+        let input = spec.input((4, 4), &spec.target().unwrap()).unwrap();
+        let refused = input.write_pixels(Levels::Words(&[0; 48]), 0, Layout::Rgba, &mut [0; 64], 16);
+        assert!(refused.unwrap_err().to_string().contains("16 bits of grey"));
     }
 }

@@ -26,6 +26,21 @@ public class Modulator private constructor(private val raw: RawModulator) : Auto
         rowStride: Int = outputSize.width * outputSize.pixelBytes,
     ): Unit = to.lend(rowStride) { memory -> hologram.open { raw.writeOutput(it, index, memory) } }
 
+    /**
+     * Writes the same image in the pixels of a screen that drives the modulator, in [layout] RGBA or BGRA, into [to], as
+     * [writeOutput] does. The red, green and blue of a grey image are its level.
+     *
+     * @throws PhasefrontException.Setting in the cases of [writeOutput], for another layout, and for a modulator whose
+     * images have 16 bits.
+     */
+    public fun writePixels(
+        hologram: Hologram,
+        to: ByteBuffer,
+        index: Int = 0,
+        layout: ModulatorLayout = ModulatorLayout.RGBA,
+        rowStride: Int = 4 * outputSize.width,
+    ): Unit = to.lend(rowStride) { memory -> hologram.open { raw.writePixels(it, index, layout, memory) } }
+
     /** Frees the memory. Closing twice does nothing. */
     override fun close() {
         target.destroy()

@@ -79,10 +79,7 @@ public fun Hologram.writeOutput(
     shiftX: Int = 0,
     shiftY: Int = 0,
 ) {
-    val size = outputSize(ModulatorLayout.RGBA)
-    if (to.width != size.width || to.height != size.height) {
-        throw PhasefrontException.Setting("a bitmap of ${to.width}×${to.height}; the modulator's ${size.width}×${size.height} are needed")
-    }
+    to.check(outputSize(ModulatorLayout.RGBA))
     to.fill { writeOutput(Placement(ModulatorLayout.RGBA, flipX, flipY, shiftX, shiftY), it) }
 }
 
@@ -93,9 +90,40 @@ public fun Hologram.writeOutput(
  * @throws PhasefrontException.Setting for another image.
  */
 public fun Hologram.writeOutput(to: Image) {
-    val plane = to.planes.singleOrNull()?.takeIf { it.pixelStride == 4 }
-        ?: throw PhasefrontException.Setting("an image of Android's format ${to.format}; RGBA_8888 is needed")
+    val plane = to.pixels()
     writeOutput(Placement(ModulatorLayout.RGBA), plane.buffer, rowStride = plane.rowStride)
+}
+
+/**
+ * Writes image [index] of the images that the modulator takes of [hologram] into [to], a mutable bitmap of the
+ * configuration ARGB_8888 and of the size [Modulator.outputSize], for a screen that drives the modulator. Create it with
+ * `density = Bitmap.DENSITY_NONE`, so that views do not scale it.
+ *
+ * @throws PhasefrontException.Setting for another bitmap, if the hologram does not fit the modulator, and for a modulator
+ * whose images have 16 bits.
+ */
+public fun Modulator.writePixels(hologram: Hologram, to: Bitmap, index: Int = 0) {
+    to.check(outputSize)
+    to.fill { writePixels(hologram, it, index) }
+}
+
+/**
+ * Writes the same image into an image of an `ImageWriter` of RGBA_8888, in place.
+ *
+ * @throws PhasefrontException.Setting for another image, and as [writePixels] does.
+ */
+public fun Modulator.writePixels(hologram: Hologram, to: Image, index: Int = 0) {
+    val plane = to.pixels()
+    writePixels(hologram, plane.buffer, index, rowStride = plane.rowStride)
+}
+
+private fun Image.pixels(): Image.Plane = planes.singleOrNull()?.takeIf { it.pixelStride == 4 }
+    ?: throw PhasefrontException.Setting("an image of Android's format $format; RGBA_8888 is needed")
+
+private fun Bitmap.check(size: OutputSize) {
+    if (width != size.width || height != size.height) {
+        throw PhasefrontException.Setting("a bitmap of $width×$height; the modulator's ${size.width}×${size.height} are needed")
+    }
 }
 
 /** The memory of each thread's bitmaps. */

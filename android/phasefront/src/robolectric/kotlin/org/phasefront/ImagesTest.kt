@@ -151,6 +151,29 @@ class ImagesTest {
     }
 
     @Test
+    fun aModulatorsImageFillsABitmapAndAWritersImage() {
+        Modulator.fromToml("width = 64\nheight = 48\nwavelengths_nm = [532]\npacking = \"grey\"").use { modulator ->
+            val options = sessionOptions(modulator.target, HologramMethod.Sweep)
+            val frame = CameraFrame(0, colour().toColourImage(), depth(HardwareBuffer.D_16).toDepthImage())
+            HologramSession(options, RunningMode.IMAGE).use { it.processBlocking(frame) }.use { hologram ->
+                val grey = ByteBuffer.allocateDirect(64 * 48).also { modulator.writeOutput(hologram, it) }
+                val bitmap = Bitmap.createBitmap(64, 48, Bitmap.Config.ARGB_8888)
+                modulator.writePixels(hologram, bitmap)
+                val pixels = ByteBuffer.allocateDirect(48 * 300)
+                modulator.writePixels(hologram, CameraImage(1, 64, 48, CameraImage.Bytes(pixels, 300, 4)))
+                for ((x, y) in listOf(0 to 0, 63 to 0, 17 to 31, 63 to 47)) {
+                    val level = grey.get(64 * y + x).toInt() and 0xff
+                    assertEquals(255 shl 24 or level * 0x10101, bitmap.getPixel(x, y), "($x, $y)")
+                    assertEquals(listOf(level, level, level, 255), List(4) { pixels.get(y * 300 + 4 * x + it).toInt() and 0xff })
+                }
+                val other = Bitmap.createBitmap(64, 47, Bitmap.Config.ARGB_8888)
+                val refused = assertFailsWith<PhasefrontException.Setting> { modulator.writePixels(hologram, other) }
+                assertContains(refused.message.orEmpty(), "64×48")
+            }
+        }
+    }
+
+    @Test
     fun aCameraTurnsUpright() {
         assertEquals(Orientation(Rotation.CLOCKWISE90, false), sensorOrientation(90, 0, isFront = false))
         assertEquals(Orientation(Rotation.UPRIGHT, false), sensorOrientation(90, 90, isFront = false))

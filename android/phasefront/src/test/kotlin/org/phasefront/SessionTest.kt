@@ -162,6 +162,12 @@ class SessionTest {
                 Modulator.named("ti-plm-p47").use { other ->
                     assertRefused<PhasefrontException.Setting>("lasers") { other.writeOutput(hologram, green) }
                 }
+                // In a screen's pixels, red, green and blue are the level.
+                val pixels = direct(4 * 64 * 48).also { modulator.writePixels(hologram, it, index = 1, layout = ModulatorLayout.BGRA) }
+                for (at in 0 until 64 * 48) assertEquals(List(3) { green[at] } + (-1).toByte(), List(4) { pixels[4 * at + it] })
+                assertRefused<PhasefrontException.Setting>("Rgba or Bgra") {
+                    modulator.writePixels(hologram, pixels, layout = ModulatorLayout.RGB)
+                }
             }
         }
     }
