@@ -41,3 +41,11 @@ build_library() {
     cargo build --release --quiet --workspace || exit 1
     cargo test --release --quiet --workspace --test conformance >/dev/null || exit 1
 }
+
+# Builds tests/counting.c for LD_PRELOAD and sets `counter` to its path.
+build_counter() {
+    need cc || install gcc libc6-dev || cannot 'cc is missing, and apt-get to install it'
+    counter="$cache/counting.so"
+    cc -std=c11 -O1 -Wall -Wextra -Werror -pedantic -fno-builtin -shared -fPIC tests/counting.c -o "$counter.$$" &&
+        mv "$counter.$$" "$counter" || cannot 'tests/counting.c could not be built'
+}

@@ -12,6 +12,9 @@ static ALLOCATOR: Counting = Counting;
 /// The number of allocations so far.
 pub(crate) static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
+/// The number of bytes allocated so far, freed ones too.
+pub(crate) static ALLOCATED: AtomicUsize = AtomicUsize::new(0);
+
 /// The number of currently allocated bytes.
 pub(crate) static HELD: AtomicUsize = AtomicUsize::new(0);
 
@@ -19,6 +22,7 @@ pub(crate) static HELD: AtomicUsize = AtomicUsize::new(0);
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATED.fetch_add(layout.size(), Ordering::Relaxed);
         HELD.fetch_add(layout.size(), Ordering::Relaxed);
         // SAFETY: the caller upholds the same contract.
         unsafe { System.alloc(layout) }
