@@ -42,8 +42,8 @@ const NONE: (usize, usize) = (SHIFTS / 2, 0);
 const INTERVAL: u32 = 4;
 /// The share of the evidence that remains in the next search.
 const MEMORY: f32 = 0.7;
-/// The relative gain in evidence at which the first search shifts at all, and at which a later one replaces the shift
-/// of the previous frames. Each new shift moves all edges of a video.
+/// The relative gain in evidence at which the first search shifts at all, and at which a later one replaces what was
+/// found, or not found, in previous frames. Each new shift moves all edges of a video.
 pub(super) const GAIN: f32 = 1.02;
 const LATER_GAIN: f32 = 1.1;
 
@@ -141,15 +141,9 @@ impl Registration {
         }
         let top = self.top();
         let gain = if is_first { GAIN } else { LATER_GAIN };
-        if self.support(top) > gain * self.support(self.best) {
+        // What was found stays while later evidence is weak: it adds up in a video whose picture stands.
+        if self.support(top) > gain * self.support(self.best) && self.is_distinct(top) {
             self.best = top;
-        }
-        let sums = || (0..SHIFTS).map(|shift| self.support((shift, 0)));
-        let mean = sums().sum::<f32>() / SHIFTS as f32;
-        let variance = sums().map(|v| (v - mean) * (v - mean)).sum::<f32>() / SHIFTS as f32;
-        let weak = self.evidence[SUMS - 1] < LEAST_EDGES;
-        if weak || self.support(self.best) - mean < DISTINCT * variance.sqrt() {
-            return Misfit::default();
         }
         let (shift, growth) = self.best;
         let steps = |i: usize| (i as f64 - REACH as f64) / self.samples as f64;
@@ -157,6 +151,14 @@ impl Registration {
             shift: (steps(shift / SIDE), steps(shift % SIDE)),
             growth,
         }
+    }
+
+    /// Returns whether there is enough evidence, and for `found` much more than for shifts in general.
+    fn is_distinct(&self, found: (usize, usize)) -> bool {
+        let sums = || (0..SHIFTS).map(|shift| self.support((shift, 0)));
+        let mean = sums().sum::<f32>() / SHIFTS as f32;
+        let variance = sums().map(|v| (v - mean) * (v - mean)).sum::<f32>() / SHIFTS as f32;
+        self.evidence[SUMS - 1] >= LEAST_EDGES && self.support(found) - mean >= DISTINCT * variance.sqrt()
     }
 
     /// Returns the evidence for a shift and a growth.
