@@ -8,10 +8,16 @@ import subprocess
 from pathlib import Path
 
 
-class Browser:
-    """Chromium, controlled through the pipe of its DevTools protocol: JSON messages, each ended by a zero byte."""
+# WebGPU with its canvases on SwiftShader, Chromium's driver in software.
+GPU = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--use-gl=angle", "--use-angle=swiftshader",
+       "--enable-unsafe-swiftshader", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--ignore-gpu-blocklist"]
 
-    def __init__(self, chromium, profile, *flags):
+
+class Browser:
+    """Chromium, controlled through the pipe of its DevTools protocol: JSON messages, each ended by a zero byte. It has
+    WebGPU if `gpu` says so."""
+
+    def __init__(self, chromium, profile, *flags, gpu=False):
         theirs_in, self.out = os.pipe()
         self.read, theirs_out = os.pipe()
         # The protocol's pipes are file descriptors 3 and 4.
@@ -20,7 +26,7 @@ class Browser:
             os.dup2(a, 3)
             os.dup2(b, 4)
 
-        command = [chromium, "--headless", "--remote-debugging-pipe", "--disable-gpu", "--hide-scrollbars",
+        command = [chromium, "--headless", "--remote-debugging-pipe", "--hide-scrollbars", *(GPU if gpu else ["--disable-gpu"]),
                    "--disable-background-networking", "--no-first-run", f"--user-data-dir={profile}", *flags, "about:blank"]
         if os.geteuid() == 0:
             command.insert(1, "--no-sandbox")

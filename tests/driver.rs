@@ -9,3 +9,16 @@ pub(crate) fn opened<T, E: Display>(result: Result<T, E>) -> T {
         panic!("{why}: the tests need a GPU with its driver, or a driver in software: apt-get install mesa-vulkan-drivers libvulkan1")
     })
 }
+
+/// Returns a part of the name of the software driver that the tests open: SwiftShader if Vulkan's loader has it alone
+/// (`VK_DRIVER_FILES`), else Mesa's llvmpipe.
+#[allow(dead_code)] // Some tests take any GPU.
+pub(crate) fn software() -> String {
+    let files = std::env::var("VK_DRIVER_FILES").unwrap_or_default();
+    let name = if files.contains("swiftshader") {
+        "SwiftShader"
+    } else {
+        "llvmpipe"
+    };
+    name.into()
+}

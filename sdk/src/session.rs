@@ -132,13 +132,14 @@ impl ImageSession {
         Answering::new(options).await.map(ImageSession)
     }
 
-    /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time.
+    /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time. With
+    /// `stay`, its levels stay on the GPU, if there is one: see [`Hologram::on_gpu`].
     ///
     /// # Errors
     /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
     #[cfg(target_arch = "wasm32")]
-    pub async fn process_async(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
-        self.0.process_async(frame, false).await
+    pub async fn process_async(&self, frame: &CameraFrame<'_>, stay: bool) -> Result<Hologram> {
+        self.0.process_async(frame, false, stay).await
     }
 
     /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
@@ -170,13 +171,13 @@ impl VideoSession {
         Answering::new(options).await.map(VideoSession)
     }
 
-    /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time.
+    /// Makes the hologram of `frame` as [`Self::process`] does, in a browser, as [`ImageSession::process_async`] does.
     ///
     /// # Errors
     /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
     #[cfg(target_arch = "wasm32")]
-    pub async fn process_async(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
-        self.0.process_async(frame, true).await
+    pub async fn process_async(&self, frame: &CameraFrame<'_>, stay: bool) -> Result<Hologram> {
+        self.0.process_async(frame, true, stay).await
     }
 
     /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
@@ -301,8 +302,11 @@ impl Answering {
     }
 
     #[cfg(target_arch = "wasm32")]
-    async fn process_async(&self, frame: &CameraFrame<'_>, video: bool) -> Result<Hologram> {
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only levels on a GPU stay there.
+    async fn process_async(&self, frame: &CameraFrame<'_>, video: bool, stay: bool) -> Result<Hologram> {
         let work = async |stages: &mut Stages| {
+            #[cfg(feature = "gpu")]
+            stages.stay_on_gpu(stay);
             let fresh = self.admit(frame, video)?;
             if fresh {
                 stages.forget();

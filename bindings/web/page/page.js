@@ -41,28 +41,34 @@ function newest(fulfil) {
 
 const zOf = (focus) => (0.5 - focus / STEPS) * DEPTH_MM;
 
-function draw(id, image) {
-  const { width, height } = image;
-  const canvas = at(id).querySelector("canvas");
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+let session, planned, hologram, said;
+
+// Draws to the canvas of the page that the session's worker has, or else to a new one.
+const canvases = {};
+async function draw(id, { width, height }, onto) {
+  const canvas = (canvases[id] ??= Object.assign(document.createElement("canvas"), { width, height }));
+  await onto(canvas);
+  if (canvas.isConnected || canvases[id] !== canvas) return;
   // Keep the controls in sight.
   canvas.style.maxWidth = `calc(72vh * ${width / height})`;
-  canvas.getContext("2d").putImageData(image, 0, 0);
+  at(id).querySelector("canvas").replaceWith(canvas);
 }
 
-let session, planned, hologram, said;
+// A driver in software is taken only by its name: `?adapter=swiftshader`.
+const adapter = new URLSearchParams(location.search).get("adapter") ?? undefined;
 
 // The session of these options. A new one is made if they change.
 async function sessionOf({ method, localSteps, width, height, video, backend }) {
   const wanted = JSON.stringify([method, localSteps, width, height, video, backend]);
   if (wanted === planned) return;
   session?.close();
-  session = planned = hologram = undefined;
+  session = planned = hologram = canvases.shown = canvases.phases = undefined;
   const options = {
     target: { width, height },
     method: method === "sweep" ? { kind: "sweep" } : { kind: "trained", network: method },
     localSteps,
     backend,
+    adapter,
   };
   session = await WorkerSession.open(options, video ? "video" : "image");
   await session.warmUp();
@@ -87,18 +93,16 @@ async function look() {
   at("z").textContent = `${zMm < 0 ? "−" : "+"}${Math.abs(zMm).toFixed(2)} mm`;
   const { width, height, times } = mine.info;
   const start = performance.now();
-  let seen;
   try {
-    seen = await mine.preview(zMm, width, height);
+    await draw("shown", { width, height }, (canvas) => mine.drawPreview(zMm, canvas, { width, height }));
   } catch (error) {
     // A newer hologram has replaced it, and is looked at next.
     if (mine !== hologram) return;
     throw error;
   }
-  draw("shown", seen);
   at("times").textContent =
     `${width}×${height} in ${said.ms.toFixed(0)} ms: method ${times.methodMs.toFixed(0)}, ` +
-    `encoding ${times.encodeMs.toFixed(0)}, depth and colour ${(times.depthMs + times.colourMs).toFixed(0)}; ` +
+    `propagation ${times.propagateMs.toFixed(0)}, encoding ${times.encodeMs.toFixed(0)}, depth and colour ${(times.depthMs + times.colourMs).toFixed(0)}; ` +
     `this view ${(performance.now() - start).toFixed(0)} ms; ` +
     `in the last second ${said.rate} holograms, ${rate(viewTimes)} views`;
 }
@@ -118,12 +122,17 @@ async function show() {
   if (at("white").checked) depth.data = depth.data.map((value) => 255 - value);
   const start = performance.now();
   const frame = new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestamp: start * 1000 });
-  const made = await session.process(frame, { transfer: [colour.data.buffer] });
+  const made = await session.process(frame, { transfer: [colour.data.buffer], onGpu: true });
   said = { ms: performance.now() - start, rate: rate(frameTimes) };
   hologram?.close();
   hologram = made;
-  const size = await made.outputSize("rgba");
-  draw("phases", new ImageData(await made.output({ layout: "rgba" }), size.width));
+  try {
+    await draw("phases", { width, height }, (canvas) => made.drawLevels(canvas));
+  } catch (error) {
+    // The GPU was lost, and the CPU needs canvases of its own: the next frame has a new session.
+    planned = undefined;
+    throw error;
+  }
   const { backend: name, backendWhy } = await session.statistics();
   at("computed").textContent = backend === "webgpu" ? `${name}: ${backendWhy}` : name;
   state.frames++;
@@ -283,18 +292,19 @@ for (const id of ["method", "width", "localSteps", "backend"]) {
     refresh();
   });
 }
-at("shown")
-  .querySelector("canvas")
-  .addEventListener("click", async (event) => {
-    const box = event.currentTarget.getBoundingClientRect();
-    const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
-    const zMm = await hologram.zAt(x, y);
-    stop();
-    focus(Math.round((0.5 - zMm / DEPTH_MM) * STEPS));
-  });
+at("shown").addEventListener("click", async ({ target, clientX, clientY }) => {
+  if (target.localName !== "canvas") return;
+  const box = target.getBoundingClientRect();
+  const zMm = await hologram.zAt((clientX - box.left) / box.width, (clientY - box.top) / box.height);
+  stop();
+  focus(Math.round((0.5 - zMm / DEPTH_MM) * STEPS));
+});
 at("save").addEventListener("click", async () => {
-  const canvas = at("phases").querySelector("canvas");
-  const blob = await new Promise((done) => canvas.toBlob(done, "image/png"));
+  // The worker has the canvas of the page, so the pixels of a copy are saved.
+  const shown = at("phases").querySelector("canvas");
+  const copy = new OffscreenCanvas(shown.width, shown.height);
+  copy.getContext("2d").drawImage(shown, 0, 0);
+  const blob = await copy.convertToBlob({ type: "image/png" });
   const link = Object.assign(document.createElement("a"), {
     href: URL.createObjectURL(blob),
     download: "hologram.png",

@@ -1,9 +1,15 @@
 //! Results, which leave the module as copies, images into the memory of the page.
 
+#[cfg(not(target_feature = "atomics"))]
+use crate::error::error;
 use crate::error::{Answer, object, of_core, setting};
 use js_sys::{Array, Float32Array, Object, Uint8Array};
+#[cfg(not(target_feature = "atomics"))]
+use phasefront::output::Levels;
 use phasefront::output::{Layout, Output, OutputSize, Placement};
 use phasefront::session::{FrameTimes, Hologram};
+#[cfg(not(target_feature = "atomics"))]
+use phasefront_gpu::{GpuError, GpuView, paint};
 use std::cell::RefCell;
 use std::time::Duration;
 use wasm_bindgen::prelude::*;
@@ -49,9 +55,69 @@ impl RawHologram {
         ])
     }
 
+    /// Checks whether the levels stayed on the GPU.
+    #[wasm_bindgen(js_name = onGpu)]
+    pub fn on_gpu(&self) -> bool {
+        #[cfg(not(target_feature = "atomics"))]
+        return self.core.on_gpu().is_some();
+        #[cfg(target_feature = "atomics")]
+        false
+    }
+
+    /// Draws the modulator's image, whose levels stayed on the GPU, to a canvas.
+    ///
+    /// # Errors
+    /// Rejects with an error of kind `setting` if the canvas has another context, and of kind `session` if the GPU was
+    /// lost.
+    #[cfg(not(target_feature = "atomics"))]
+    #[wasm_bindgen(js_name = paintLevels)]
+    pub async fn paint_levels(&self, canvas: JsValue) -> Answer<()> {
+        let levels = self.core.on_gpu().ok_or_else(elsewhere)?;
+        let (target, shape) = (self.core.target(), self.core.shape());
+        let size = target.modulator();
+        let around = if shape == size {
+            None
+        } else {
+            let plan = Output::new(target, shape, Placement::centred(Layout::Rgba)).map_err(of_core)?;
+            let mut around = vec![0; 4 * size.0 * size.1];
+            let dark = vec![0; self.core.colours() * shape.0 * shape.1];
+            (plan.write(Levels::Bytes(&dark), 0, &mut around, plan.row_bytes())).map_err(of_core)?;
+            Some(around)
+        };
+        let painted = paint(levels.texture(), size, around.as_deref(), &canvas).await;
+        painted.map_err(of_gpu)
+    }
+
+    /// Draws the view of an eye focused at `z_mm` to a canvas, from levels that stayed on the GPU.
+    ///
+    /// # Errors
+    /// Rejects in the cases of [`Self::write_preview`] and [`Self::paint_levels`].
+    #[cfg(not(target_feature = "atomics"))]
+    #[wasm_bindgen(js_name = paintPreview)]
+    pub async fn paint_preview(&self, z_mm: f64, width: u32, height: u32, canvas: JsValue) -> Answer<()> {
+        let levels = self.core.on_gpu().ok_or_else(elsewhere)?;
+        let screen = (height as usize, width as usize);
+        let draw = async |view: &GpuView| paint(view.texture(), screen, None, &canvas).await;
+        let drawn = self.core.view_on_gpu(levels, z_mm / 1e3, screen, draw).await;
+        drawn.map_err(of_gpu)
+    }
+
+    /// Returns the hologram if its levels are in the module's memory.
+    fn here(&self) -> Answer<&Hologram> {
+        if self.on_gpu() {
+            return Err(setting(
+                "the levels stayed on the GPU; draw them, or process the frame without onGpu",
+            ));
+        }
+        Ok(&self.core)
+    }
+
     /// Returns the modulator levels, (C, H, W).
-    pub fn levels(&self) -> Uint8Array {
-        Uint8Array::from(self.core.levels())
+    ///
+    /// # Errors
+    /// Throws an error of kind `setting` if they stayed on the GPU.
+    pub fn levels(&self) -> Answer<Uint8Array> {
+        Ok(Uint8Array::from(self.here()?.levels()))
     }
 
     /// Returns the z in mm of the scene point at (`x`, `y`) of the picture, each from 0 to 1.
@@ -75,10 +141,11 @@ impl RawHologram {
         to: &Uint8Array,
         row_stride: u32,
     ) -> Answer<()> {
+        let core = self.here()?;
         let (layout, screen) = (layout(name)?, (height as usize, width as usize));
         let row = layout.pixel_bytes() * screen.1;
         copied(to, row_stride, (screen.0, row), |bytes| {
-            self.core.write_preview(z_mm / 1e3, screen, layout, bytes, row)
+            core.write_preview(z_mm / 1e3, screen, layout, bytes, row)
         })
     }
 
@@ -87,7 +154,7 @@ impl RawHologram {
     /// # Errors
     /// Throws an error of kind `setting` if z is too far away.
     pub fn refocus(&self, z_mm: f64) -> Answer<Float32Array> {
-        let amplitudes = self.core.refocus(z_mm / 1e3).map_err(of_core)?;
+        let amplitudes = self.here()?.refocus(z_mm / 1e3).map_err(of_core)?;
         Ok(Float32Array::from(&amplitudes[..]))
     }
 
@@ -97,7 +164,7 @@ impl RawHologram {
     /// # Errors
     /// Throws an error of kind `setting` if z is too far away.
     pub fn field(&self, z_mm: f64) -> Answer<Float32Array> {
-        let field = self.core.field(z_mm / 1e3).map_err(of_core)?;
+        let field = self.here()?.field(z_mm / 1e3).map_err(of_core)?;
         let parts: Vec<f32> = field.iter().flat_map(|value| [value.re, value.im]).collect();
         Ok(Float32Array::from(&parts[..]))
     }
@@ -134,6 +201,7 @@ impl RawHologram {
         to: &Uint8Array,
         row_stride: u32,
     ) -> Answer<()> {
+        let core = self.here()?;
         let (&[flip_x, flip_y], &[shift_x, shift_y]) = (flips, shift) else {
             return Err(setting("a placement has two flips and two shifts"));
         };
@@ -144,10 +212,24 @@ impl RawHologram {
             shift_y,
             ..Placement::centred(layout(name)?)
         };
-        let plan = Output::new(self.core.target(), self.core.shape(), placement).map_err(of_core)?;
+        let plan = Output::new(core.target(), core.shape(), placement).map_err(of_core)?;
         copied(to, row_stride, (plan.shape().0, plan.row_bytes()), |bytes| {
-            plan.write(self.core.output_levels(), image as usize, bytes, plan.row_bytes())
+            plan.write(core.output_levels(), image as usize, bytes, plan.row_bytes())
         })
+    }
+}
+
+#[cfg(not(target_feature = "atomics"))]
+fn elsewhere() -> JsValue {
+    setting("the levels are not on the GPU; write them into an image")
+}
+
+#[cfg(not(target_feature = "atomics"))]
+fn of_gpu(why: GpuError) -> JsValue {
+    match why {
+        GpuError::Core(why) => of_core(why),
+        GpuError::Lost(_) => error("session", &why.to_string()),
+        _ => setting(&why.to_string()),
     }
 }
 

@@ -71,16 +71,17 @@ impl RawSession {
         Ok(RawSession { core })
     }
 
-    /// Returns the hologram of a frame, and waits for the browser's GPU if it computes the frame.
+    /// Returns the hologram of a frame, and waits for the browser's GPU if it computes the frame. With `stay`, the levels
+    /// then stay on the GPU.
     ///
     /// # Errors
     /// Rejects in the cases of [`RawSession::process`], and while another frame is computed.
     #[wasm_bindgen(js_name = processAsync)]
-    pub async fn process_async(&self, frame: &RawFrame) -> Answer<RawHologram> {
+    pub async fn process_async(&self, frame: &RawFrame, stay: bool) -> Answer<RawHologram> {
         let frame = frame.frame()?;
         let made = match &self.core {
-            Core::Image(session) => session.process_async(&frame).await,
-            Core::Video(session) => session.process_async(&frame).await,
+            Core::Image(session) => session.process_async(&frame, stay).await,
+            Core::Video(session) => session.process_async(&frame, stay).await,
         };
         let core = made.map_err(of_core)?;
         Ok(RawHologram { core })

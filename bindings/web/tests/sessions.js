@@ -154,6 +154,16 @@ export async function run() {
   return "sessions in workers refuse, abort and end as they should";
 }
 
+/** Waits until no byte that the page shows on `canvas` is farther than `most` from that of `image`. */
+async function shows(canvas, { width, height, data }, most) {
+  const copy = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
+  const check = () => {
+    copy.drawImage(canvas, 0, 0);
+    return copy.getImageData(0, 0, width, height).data.every((byte, i) => Math.abs(byte - data[i]) <= most);
+  };
+  await until(check, "a canvas shows what the worker drew");
+}
+
 /** Compares the levels of WebGPU in a worker with those of the page. */
 export async function onWebgpu() {
   const { Session, load } = await import("/phasefront/phasefront.js");
@@ -171,6 +181,29 @@ export async function onWebgpu() {
   using here = await Session.open(options);
   using same = await here.processAsync(frame());
   equal(await hologram.levels(), same.levels, "levels on WebGPU");
+
+  // What the worker draws stays on the GPU, and the page shows it a moment later.
+  const kept = await session.process(frame(), { onGpu: true });
+  const { width, height } = kept.info;
+  const [levels, view] = [0, 1].map(() => document.body.appendChild(document.createElement("canvas")));
+  const images = [0, 1].map(() => new ImageData(width, height));
+  same.writeOutput({ layout: "rgba" }, images[0].data);
+  same.writePreview(0.5, images[1]);
+  await kept.drawLevels(levels);
+  await shows(levels, images[0], 0);
+  await kept.drawPreview(0.5, view, { width, height });
+  await shows(view, images[1], 1);
+  same.writePreview(-0.5, images[1]);
+  await kept.drawPreview(-0.5, view, { width, height });
+  await shows(view, images[1], 1);
+  await refused("setting", "stayed on the GPU", kept.levels());
+  const taken = document.createElement("canvas");
+  taken.getContext("2d");
+  await refused("setting", "a new canvas", kept.drawLevels(taken));
   session.close();
-  return [`a worker makes the same levels on ${backend}`];
+  const other = await WorkerSession.open({ ...options, backend: "cpu" });
+  const again = await other.process(frame(), { onGpu: true });
+  await refused("setting", "a new canvas", again.drawLevels(levels));
+  other.close();
+  return [`a worker makes the same levels on ${backend}, and draws them and views`];
 }

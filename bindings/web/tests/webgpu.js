@@ -110,7 +110,12 @@ export async function run() {
     if (!gpu.backend.includes(ADAPTER)) throw new Error(`${name}: ${gpu.backend}: ${gpu.backendWhy}`);
     const far = apart(gpu.all, cpu.all);
     const scale = Math.abs(gpu.info.scale / cpu.info.scale - 1);
-    lines.push(`${name}: ${far.toFixed(6)} apart, ${bound} allowed; ${gpu.backend}; ${gpu.info.times.totalMs.toFixed(0)} ms`);
+    const { methodMs, propagateMs, encodeMs, totalMs } = gpu.info.times;
+    const stages = [methodMs, propagateMs, encodeMs].map((ms) => ms.toFixed(1)).join(", ");
+    lines.push(`${name}: ${far.toFixed(6)} apart, ${bound} allowed; ${gpu.backend}; ${stages} ms`);
+    // This adapter has time stamps. A sweep propagates by itself.
+    const timed = methodMs > 0 && encodeMs > 0 && (propagateMs > 0 || !name.includes("pair"));
+    if (!timed || methodMs + propagateMs + encodeMs > totalMs + 1e-6) throw new Error(`${lines.at(-1)} of ${totalMs}`);
     if (!(far < bound && scale < bound)) throw new Error(`${lines.at(-1)}; scales ${scale}`);
   }
   return lines;
@@ -130,6 +135,97 @@ async function fallsBack(options, why) {
   if (!same || !said.startsWith("cpu") || !said.includes(why) || said.includes("\n"))
     throw new Error(`${why}: ${same} ${said}`);
   return said;
+}
+
+/** Returns the bytes that a canvas shows. */
+function shown(canvas) {
+  const { width, height } = canvas;
+  const copy = new OffscreenCanvas(width, height).getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  return copy.getImageData(0, 0, width, height).data;
+}
+
+/** Throws unless no byte of `canvas` is farther than `most` from that of `image`. */
+function same(what, canvas, { width, height, data }, most = 0) {
+  if (canvas.width !== width || canvas.height !== height) throw new Error(`${what}: ${canvas.width}×${canvas.height}`);
+  const far = shown(canvas).reduce((far, byte, i) => Math.max(far, Math.abs(byte - data[i])), 0);
+  if (far > most) throw new Error(`${what}: ${far} apart`);
+  return `${what}: ${far} of 255 apart`;
+}
+
+/** Returns the image that a hologram writes for its modulator. */
+function outputOf(hologram) {
+  const { width, height } = hologram.outputSize("rgba");
+  const image = new ImageData(width, height);
+  hologram.writeOutput({ layout: "rgba" }, image.data);
+  return image;
+}
+
+async function kindOf(call) {
+  const error = await (async () => call())().catch((error) => error);
+  return `${error?.kind}: ${error?.message}`;
+}
+
+/** Compares what holograms draw to canvases on the GPU and on the CPU with what they write into images. */
+export async function canvases() {
+  await load();
+  const lines = [];
+  const target = { width: 61, height: 47, ...SHALLOW, offsetMm: 1 };
+  const level = { method: { kind: "sweep" }, width: 40, height: 30 };
+  for (const options of [
+    { ...SWEEP, target, backend: "cpu" },
+    { ...SWEEP, target },
+    { ...SWEEP, target, qualityLevels: [level] },
+  ]) {
+    const session = await Session.open(options);
+    const read = await session.processAsync(frame(61, 47));
+    const kept = await session.processAsync(frame(61, 47), { onGpu: true });
+    // What the document shows cannot be read any more after it was shown.
+    const element = document.createElement("canvas");
+    const [offscreen, eye] = [new OffscreenCanvas(5, 7), new OffscreenCanvas(31, 23)];
+    const backend = session.statistics.backend || "cpu";
+    for (const canvas of [element, offscreen, element]) {
+      await kept.drawLevels(canvas);
+      lines.push(same(`levels of ${backend}`, canvas, outputOf(read)));
+      // A page may change the size of its canvas.
+      canvas.width = 9;
+    }
+    for (const zMm of [-0.7, 1, 0.7]) {
+      await kept.drawPreview(zMm, eye);
+      const view = new ImageData(31, 23);
+      read.writePreview(zMm, view);
+      lines.push(same(`view at ${zMm} mm of ${backend}`, eye, view, 1));
+    }
+    const large = new ImageData(100, 80);
+    read.writePreview(0, large);
+    await kept.drawPreview(0, eye, large);
+    lines.push(same(`large view of ${backend}`, eye, large, 1));
+    if (Math.abs(kept.zAt(0.5, 0.5) - read.zAt(0.5, 0.5)) > 1e-9) throw new Error("zAt");
+
+    const [flat, other] = [new OffscreenCanvas(8, 8), options.backend === "cpu" ? "webgpu" : "2d"];
+    flat.getContext(other);
+    const refused = [
+      await kindOf(() => kept.drawLevels(flat)),
+      await kindOf(() => kept.drawPreview(0, flat)),
+      await kindOf(() => kept.drawPreview(0, new OffscreenCanvas(0, 8))),
+      await kindOf(() => kept.drawPreview(1e9, eye)),
+    ];
+    if (options.backend !== "cpu")
+      for (const call of [() => kept.levels, () => kept.refocus(0), () => kept.field(), () => outputOf(kept)])
+        refused.push(await kindOf(call));
+    for (const why of refused)
+      if (!why.startsWith("setting: ") || why.includes("\n")) throw new Error(`not refused: ${why}`);
+    lines.push(...refused);
+    // Closing waits for what is being drawn.
+    const drawn = kept.drawLevels(element);
+    kept.close();
+    await drawn;
+    lines.push(await kindOf(() => kept.drawLevels(element)));
+    if (!lines.at(-1).startsWith("session: ")) throw new Error(lines.at(-1));
+    read.close();
+    session.close();
+  }
+  return lines;
 }
 
 /** Tests adapters that are missing, in software, too small and lost, and the misuse of sessions. */

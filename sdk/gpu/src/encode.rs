@@ -12,9 +12,9 @@ mod shared;
 
 pub(super) use mean_phase::MeanPhase;
 
+use super::Result;
 use super::brightness::Smoother;
 use super::device::Device;
-use super::{GpuError, Result};
 use crate::method::chain::ChainOptions;
 use double_phase::DoublePhase;
 use filter::Filter;
@@ -36,32 +36,10 @@ pub(super) struct LevelsBuffers {
 }
 
 impl LevelsBuffers {
-    pub(super) fn new(device: &Device, (height, width): (usize, usize)) -> Result<Self> {
-        let most = device.limits().max_texture_dimension_2d as usize;
-        if height.max(width) > most {
-            return Err(GpuError::Refused(format!(
-                "a picture of {width}×{height} is too large for {}, which takes {most} a side",
-                device.name()
-            )));
-        }
+    pub(super) fn new(device: &Device, size: (usize, usize)) -> Result<Self> {
         Ok(LevelsBuffers {
-            levels: device.buffer("levels", 4 * height * width)?,
-            texture: device.inner.create_texture(&wgpu::TextureDescriptor {
-                label: Some("levels"),
-                size: wgpu::Extent3d {
-                    width: width as u32,
-                    height: height as u32,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba8Unorm,
-                usage: wgpu::TextureUsages::STORAGE_BINDING
-                    | wgpu::TextureUsages::TEXTURE_BINDING
-                    | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            }),
+            levels: device.buffer("levels", 4 * size.0 * size.1)?,
+            texture: device.picture("levels", size, wgpu::TextureUsages::STORAGE_BINDING)?,
         })
     }
 }

@@ -44,6 +44,7 @@ pub(super) struct Planes<'a> {
 /// A convolution of three planes, ready to run.
 pub(super) struct Convolution {
     steps: [Dispatch; 3],
+    filter: wgpu::Buffer,
 }
 
 /// The operations of one of the three dispatches.
@@ -108,7 +109,16 @@ impl Convolution {
             )?,
             shared.step("rows back", back, &row_roots, (spectra(), frame()), height)?,
         ];
-        Ok(Convolution { steps })
+        Ok(Convolution {
+            steps,
+            filter: table.buffer,
+        })
+    }
+
+    /// Replaces the filter by another with as many factors, which holds from the next submission on.
+    pub(super) fn set_filter(&self, device: &Device, factors: &[&[Complex32]]) {
+        let table = factors.concat();
+        device.write(&self.filter, 0, bytemuck::cast_slice(&table));
     }
 
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {

@@ -16,6 +16,8 @@
 //! | `pipeline` | runs all stages, with three frames in flight |
 //! | `probe` | compares a small frame with the CPU's |
 //! | `renderer` | reopens a lost device |
+//! | `view` | renders what an eye sees of levels on the GPU |
+//! | `canvas` | draws to the canvases of a browser's page |
 //! | `watch` | abandons calls into drivers that do not return |
 //! | `blocking` | blocks on the futures of a native GPU |
 //!
@@ -49,6 +51,8 @@
 #[cfg(not(target_arch = "wasm32"))]
 mod blocking;
 mod brightness;
+#[cfg(target_arch = "wasm32")]
+mod canvas;
 mod device;
 mod encode;
 mod fft;
@@ -58,10 +62,13 @@ mod numbers;
 mod pipeline;
 mod probe;
 mod renderer;
+mod view;
 mod watch;
 
 #[cfg(not(target_arch = "wasm32"))]
 pub use blocking::probe;
+#[cfg(target_arch = "wasm32")]
+pub use canvas::paint;
 #[cfg(not(target_arch = "wasm32"))]
 pub use device::peak::Peak;
 pub use device::{Device, DeviceOptions};
@@ -69,9 +76,10 @@ pub use input::{Colour, ColourData, Depth, DepthData, Frame};
 pub use method::chain::{ChainOptions, Fusion, GpuNetworkPlan};
 pub use numbers::Float;
 pub use phasefront_core::encode::brightness::Past;
-pub use pipeline::{Deliver, FLIGHTS, GpuPipeline, GpuReport, Job, Ticket};
+pub use pipeline::{Deliver, FLIGHTS, GpuLevels, GpuPipeline, GpuReport, Job, Ticket};
 pub use probe::probe_async;
 pub use renderer::{InFlight, Renderer};
+pub use view::GpuView;
 
 /// The reason why the GPU cannot be used.
 #[derive(Debug, Clone, thiserror::Error)]

@@ -95,6 +95,29 @@ pub struct GpuReport {
     pub times: Option<FrameTimes>,
 }
 
+/// The levels of a frame that stay on the GPU.
+pub struct GpuLevels {
+    pub(crate) device: Arc<Device>,
+    /// (H, W).
+    pub(crate) shape: (usize, usize),
+    /// 8-bit RGBA, with the levels of red, green and blue.
+    pub(crate) texture: wgpu::Texture,
+}
+
+impl GpuLevels {
+    /// Returns the device and the texture, 8-bit RGBA with the levels of red, green and blue.
+    pub fn texture(&self) -> (&Arc<Device>, &wgpu::Texture) {
+        (&self.device, &self.texture)
+    }
+}
+
+impl Drop for GpuLevels {
+    fn drop(&mut self) {
+        // A browser frees the memory of textures late.
+        self.texture.destroy();
+    }
+}
+
 /// A plan for one [`Job`] on one device. Creating the plan creates all buffers and programs.
 pub struct GpuPipeline {
     device: Arc<Device>,
@@ -337,6 +360,26 @@ impl GpuPipeline {
     /// blue and 255.
     pub fn levels(&self, ticket: &Ticket) -> &wgpu::Buffer {
         &self.buffers[ticket.slot].levels
+    }
+
+    /// Copies a frame's levels to a texture that stays valid after the frame is finished.
+    ///
+    /// # Errors
+    /// Returns [`GpuError::OutOfMemory`] or [`GpuError::Lost`].
+    pub async fn keep_async(&self, ticket: &Ticket) -> Result<GpuLevels> {
+        let (device, from) = (&self.device, self.texture(ticket));
+        let copy = || {
+            let texture = device.picture("a frame's levels", self.size, wgpu::TextureUsages::COPY_DST)?;
+            let mut encoder = device.inner.create_command_encoder(&Default::default());
+            encoder.copy_texture_to_texture(from.as_image_copy(), texture.as_image_copy(), from.size());
+            device.queue.submit([encoder.finish()]);
+            Ok(texture)
+        };
+        Ok(GpuLevels {
+            texture: device.guarded_async(copy).await?,
+            device: device.clone(),
+            shape: self.size,
+        })
     }
 
     /// Waits for a frame and copies its levels, (3, H, W).

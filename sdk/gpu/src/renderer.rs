@@ -3,7 +3,7 @@
 
 use super::device::{Device, DeviceOptions};
 use super::input::{Colour, Depth, Frame};
-use super::pipeline::{Deliver, GpuPipeline, GpuReport, Job, Ticket};
+use super::pipeline::{Deliver, GpuLevels, GpuPipeline, GpuReport, Job, Ticket};
 use super::probe::probe_async;
 use super::watch::watched;
 use super::{GpuError, Result};
@@ -117,13 +117,13 @@ impl Renderer {
     /// # Errors
     /// Returns an error if the frame's byte lengths differ from the plan, or, after a loss, the errors of
     /// [`Renderer::new`].
-    pub async fn submit(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<InFlight> {
+    pub async fn submit(&mut self, past: Option<Past>, frame: &Frame<'_>, deliver: Deliver) -> Result<InFlight> {
         loop {
             let pipeline = match &mut self.pipeline {
                 Some(pipeline) => pipeline,
                 None => self.open(None).await?,
             };
-            match pipeline.submit_async(past, frame, Deliver::Levels).await {
+            match pipeline.submit_async(past, frame, deliver).await {
                 Ok(ticket) => {
                     let epoch = self.epoch;
                     return Ok(InFlight { epoch, ticket });
@@ -141,20 +141,37 @@ impl Renderer {
     /// # Panics
     /// Panics if `levels` does not have 3·H·W values.
     pub async fn collect(&mut self, frame: InFlight, levels: &mut [u8]) -> Result<GpuReport> {
-        let pipeline = self.pipeline.as_mut().filter(|_| frame.epoch == self.epoch);
-        let Some(pipeline) = pipeline else {
-            return Err(GpuError::Lost("with the device that it was on".into()));
+        let made = self.flown_on(&frame)?.collect_async(frame.ticket, levels).await;
+        self.noted(made)
+    }
+
+    /// Waits for a frame that was submitted as [`Deliver::Shown`] and copies its levels on the GPU.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Renderer::collect`].
+    pub async fn keep(&mut self, frame: InFlight) -> Result<(GpuReport, GpuLevels)> {
+        let pipeline = self.flown_on(&frame)?;
+        let kept = async {
+            let levels = pipeline.keep_async(&frame.ticket).await?;
+            Ok((pipeline.finish_async(frame.ticket).await?, levels))
         };
-        match pipeline.collect_async(frame.ticket, levels).await {
-            Ok(report) => {
-                self.losses = 0;
-                Ok(report)
-            }
-            Err(why) => {
-                self.note(why.clone())?;
-                Err(why)
-            }
+        let kept = kept.await;
+        self.noted(kept)
+    }
+
+    /// Returns the plan that a frame was submitted to.
+    fn flown_on(&mut self, frame: &InFlight) -> Result<&mut GpuPipeline> {
+        let pipeline = self.pipeline.as_deref_mut().filter(|_| frame.epoch == self.epoch);
+        pipeline.ok_or_else(|| GpuError::Lost("with the device that it was on".into()))
+    }
+
+    /// Records whether the device answered.
+    fn noted<T>(&mut self, answer: Result<T>) -> Result<T> {
+        match &answer {
+            Ok(_) => self.losses = 0,
+            Err(why) => self.note(why.clone())?,
         }
+        answer
     }
 
     /// Records a loss, after which the next frame opens another device. Returns any other error.
@@ -238,12 +255,12 @@ mod tests {
         let frame = frame();
         let bytes = Frame::of(&frame);
         let mut before = vec![0; 3 * SIZE.0 * SIZE.1];
-        let first = block_on(renderer.submit(None, &bytes)).unwrap();
+        let first = block_on(renderer.submit(None, &bytes, Deliver::Levels)).unwrap();
         block_on(renderer.collect(first, &mut before)).unwrap();
 
         let flying = [
-            block_on(renderer.submit(None, &bytes)).unwrap(),
-            block_on(renderer.submit(None, &bytes)).unwrap(),
+            block_on(renderer.submit(None, &bytes, Deliver::Levels)).unwrap(),
+            block_on(renderer.submit(None, &bytes, Deliver::Levels)).unwrap(),
         ];
         lose(&renderer);
         let mut levels = vec![0; before.len()];
@@ -251,14 +268,14 @@ mod tests {
             let lost = block_on(renderer.collect(frame, &mut levels)).unwrap_err();
             assert!(matches!(lost, GpuError::Lost(_)), "{lost}");
         }
-        let next = block_on(renderer.submit(None, &bytes)).unwrap();
+        let next = block_on(renderer.submit(None, &bytes, Deliver::Levels)).unwrap();
         block_on(renderer.collect(next, &mut levels)).unwrap();
         assert_eq!(levels, before);
         assert!(matches!(renderer.reason(), Some(GpuError::Lost(_))));
 
         // The device is lost with nothing in flight: the next frame notices and succeeds on a new device.
         lose(&renderer);
-        let next = block_on(renderer.submit(None, &bytes)).unwrap();
+        let next = block_on(renderer.submit(None, &bytes, Deliver::Levels)).unwrap();
         block_on(renderer.collect(next, &mut levels)).unwrap();
         assert_eq!(levels, before);
     }
@@ -280,7 +297,7 @@ mod tests {
         renderer.reason = Some(GpuError::Lost("pulled out".into()));
         renderer.release();
         let frame = frame();
-        let refused = block_on(renderer.submit(None, &Frame::of(&frame))).unwrap_err();
+        let refused = block_on(renderer.submit(None, &Frame::of(&frame), Deliver::Levels)).unwrap_err();
         assert!(
             (refused.to_string()).contains("in a row: the GPU was lost: pulled out"),
             "{refused}"

@@ -1,4 +1,4 @@
-//! Compares GPU stages with their CPU counterparts on any device, including Mesa's software driver.
+//! Compares GPU stages with their CPU counterparts on any device, including software drivers.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../../tests/driver.rs"]
@@ -14,6 +14,7 @@ use num_complex::Complex32;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
 use phasefront_core::display::response::Response;
+use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::encode::brightness::Brightness;
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::frame::RgbdFrame;
@@ -23,18 +24,22 @@ use phasefront_core::method::network::Network;
 use phasefront_core::method::network::{Isa, reference};
 use phasefront_core::method::sweep::Sweep;
 use phasefront_core::optics::zernike::Aberration;
+use phasefront_core::output::Layout;
+use phasefront_core::view::preview::Preview;
 use phasefront_gpu::{
     self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Float, Frame, Fusion,
-    GpuNetworkPlan, GpuPipeline, Job,
+    GpuLevels, GpuNetworkPlan, GpuPipeline, GpuView, Job,
 };
+use pollster::block_on;
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 /// Returns the device of all tests.
 fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Result<Arc<Device>, phasefront_gpu::GpuError>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
         let software = DeviceOptions {
-            name: Some("llvmpipe".into()),
+            name: Some(driver::software()),
             ..Default::default()
         };
         let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software));
@@ -830,4 +835,225 @@ fn a_device_is_tried_out_before_it_is_used() {
         let job = planned((1080, 1920), method, &display, encoding, scale);
         phasefront_gpu::probe(&device, &job).unwrap();
     }
+}
+
+/// Returns jobs that need every program between them, with the largest mean distance of phases.
+fn small_jobs((h, w): (usize, usize)) -> Vec<(Job, f32)> {
+    let of = |model: Model| Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+    let network = |model| Method::Network(of(model));
+    let seeded = Model {
+        inputs: 10,
+        input: "seeded",
+        ..Model::new(5, 8)
+    };
+    let prefilter = Model {
+        inputs: 12,
+        input: "split-blurred-field",
+        ..Model::int8(3, 8)
+    };
+    let halved = Model::int8(3, 8).halved();
+    let display = Display::from_toml("volume_depth_mm = 1").unwrap();
+    let sweep = Method::Sweep(Sweep::for_display(&display));
+    let maximal = Brightness::FrameMax;
+    let job = |method, offset_m, encoding, brightness| {
+        let display = display.clone().with_offset_m(offset_m).unwrap();
+        let mut job = planned((h, w), method, &display, encoding, brightness);
+        job.chain.float = Float::F32;
+        job
+    };
+    let mut corrected = job(network(Model::new(5, 8)), 2e-3, Encoding::BAND_LIMIT, maximal);
+    let beam = Array3::from_shape_fn((3, 2, 2), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
+    corrected.target.illumination = Some(Illumination::new(beam.view()).unwrap());
+    corrected.target.response = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));
+    corrected.encoder.local_steps = 1;
+    corrected.chain.fusion = Fusion::Pairs;
+    let mut midpoint = job(Method::Seeded(of(seeded)), 0.0, Encoding::DoublePhase, maximal);
+    midpoint.encoder.midpoint_steps = 1;
+    midpoint.chain.fusion = Fusion::Pairs;
+    let mut half = job(network(Model::new(5, 8)), 0.0, Encoding::ANTI_ALIAS, maximal);
+    half.chain.float = Float::F16;
+    vec![
+        (
+            job(network(Model::int8(3, 8)), 0.0, Encoding::ANTI_ALIAS, maximal),
+            0.002,
+        ),
+        (corrected, 0.002),
+        (half, 0.05),
+        (job(sweep, 1e-3, Encoding::ANTI_ALIAS, Brightness::Smoothed), 0.002),
+        (midpoint, 0.002),
+        // One 8-bit step of a pre-filter outweighs rounding.
+        (job(network(halved), 0.0, Encoding::Deep(of(prefilter)), maximal), 0.02),
+    ]
+}
+
+/// Runs every program on a small frame of odd sides, for drivers that are too slow for all tests: `tests/swiftshader` runs
+/// it on a second driver. `--nocapture` prints what the drivers' table in docs/reliability.md has.
+#[test]
+fn every_program_agrees_with_the_cpu_on_a_small_frame() {
+    let device = device();
+    let limits = device.wgpu().0.limits();
+    println!(
+        "{device:?}: {} bytes of workgroup memory, {} threads a workgroup, {} storage buffers, {} MB a binding, f16 {}",
+        limits.max_compute_workgroup_storage_size,
+        limits.max_compute_invocations_per_workgroup,
+        limits.max_storage_buffers_per_shader_stage,
+        limits.max_storage_buffer_binding_size >> 20,
+        device.has_half(),
+    );
+    let (h, w) = (13, 37);
+    let frame = rgbd(h, w);
+    for (job, tolerance) in small_jobs((h, w)) {
+        if job.chain.float == Float::F16 && !device.has_half() {
+            skip::or_fail("16-bit floats", format!("{device:?} has none"));
+            continue;
+        }
+        let (expected, expected_scale) = on_cpu(&job, &frame);
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.target.response);
+        let other = levels.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        let what = plan.describe();
+        println!("{what}: {apart:.6} apart, {other} of {} levels", levels.len());
+        assert!(apart < tolerance, "{what}: {apart}");
+        let scales = (report.scale - expected_scale).abs() / expected_scale;
+        assert!(scales < tolerance, "{what}: {report:?} {expected_scale}");
+        assert!(
+            report
+                .times
+                .is_none_or(|times| times.method > Duration::ZERO && times.encode > Duration::ZERO)
+        );
+    }
+}
+
+#[test]
+fn every_program_agrees_with_the_cpu_on_a_camera_image() {
+    let device = device();
+    let ((h, w), sensor) = ((13, 37), (29, 21));
+    let orientation = Orientation {
+        rotation: Rotation::Clockwise90,
+        mirrored: true,
+    };
+    let camera = Sensor::all(sensor).remove(3);
+    let depth = rgbd(h, w);
+    let frame = Frame {
+        colour: ColourData::Camera(camera.image(sensor)),
+        ..Frame::of(&depth)
+    };
+    let (mut job, tolerance) = small_jobs((h, w)).swap_remove(3);
+    let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
+    job.colour = Colour::Camera {
+        format: camera.format,
+        height: sensor.0,
+        width: sensor.1,
+        orientation,
+    };
+    let mut levels = vec![0; 3 * h * w];
+    let mut plan = GpuPipeline::new(&device, &job).unwrap();
+    plan.process(&frame, &mut levels).unwrap();
+    let apart = apart(&levels, &expected, &job.target.response);
+    println!("{}: {apart:.6} apart", plan.describe());
+    assert!(apart < tolerance, "{apart}");
+}
+
+/// Reads a texture of 8-bit RGBA back.
+fn pixels((device, texture): (&Arc<Device>, &wgpu::Texture)) -> Vec<u8> {
+    let (device, queue) = device.wgpu();
+    let (height, row) = (texture.height(), (4 * texture.width()).next_multiple_of(256));
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(height * row),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let layout = wgpu::TexelCopyBufferLayout {
+        bytes_per_row: Some(row),
+        ..Default::default()
+    };
+    let to = wgpu::TexelCopyBufferInfo {
+        buffer: &buffer,
+        layout,
+    };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), to, texture.size());
+    queue.submit([encoder.finish()]);
+    buffer.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let bytes = buffer.get_mapped_range(..).unwrap();
+    let rows = bytes.chunks_exact(row as usize);
+    rows.flat_map(|bytes| &bytes[..4 * texture.width() as usize])
+        .copied()
+        .collect()
+}
+
+/// Makes a hologram whose levels are read back and kept on the GPU. Returns both and the scale.
+fn kept(job: &Job) -> (Vec<u8>, GpuLevels, f32) {
+    let (h, w) = job.shape;
+    let mut plan = GpuPipeline::new(&device(), job).unwrap();
+    let frame = rgbd(h, w);
+    let mut levels = vec![0; 3 * h * w];
+    let scale = plan.process(&Frame::of(&frame), &mut levels).unwrap().scale;
+    let ticket = plan.submit(&Frame::of(&frame), Deliver::Shown).unwrap();
+    let kept = block_on(plan.keep_async(&ticket)).unwrap();
+    plan.finish(ticket).unwrap();
+    (levels, kept, scale)
+}
+
+#[test]
+fn views_of_levels_on_the_gpu_are_those_of_the_cpu() {
+    let beam = Array3::from_shape_fn((3, 2, 3), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
+    let lit = Illumination::new(beam.view()).unwrap();
+    let lut = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));
+    for (shape, screen, response, illumination) in [
+        ((29, 47), (29, 47), Response::Linear { bits: 8 }, None),
+        ((64, 90), (21, 29), lut, Some(lit)),
+        ((9, 5), (70, 81), Response::Linear { bits: 5 }, None),
+    ] {
+        let display = Display::from_toml("offset_mm = 3.0\nvolume_depth_mm = 1").unwrap();
+        let display = display.with_size(shape.0, shape.1).unwrap();
+        let method = Method::Sweep(Sweep::for_display(&display));
+        let mut job = planned(shape, method, &display, Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        (job.target.response, job.target.illumination) = (response, illumination);
+        let (levels, on_gpu, scale) = kept(&job);
+        let area = shape.0 * shape.1;
+        let words = pixels(on_gpu.texture());
+        let same = |(i, pixel): (usize, &[u8])| (0..3).all(|c| pixel[c] == levels[c * area + i]) && pixel[3] == 255;
+        assert!(words.chunks_exact(4).enumerate().all(same));
+        let mut view = None;
+        // One plan draws views at every z: the modulator's, one beside it, and one again.
+        for z_m in [-2e-3, 3e-3, 2.9e-3, -2e-3] {
+            let preview = Preview::new(shape, &job.target, z_m, screen).unwrap();
+            let view = view.get_or_insert_with(|| block_on(GpuView::new(&on_gpu, &preview)).unwrap());
+            assert!(view.fits(&on_gpu, &preview));
+            block_on(view.draw(&on_gpu, &preview, scale)).unwrap();
+            let drawn = pixels(view.texture());
+            let mut expected = vec![0; 4 * screen.0 * screen.1];
+            let image = (Layout::Rgba, &mut expected[..], 4 * screen.1);
+            preview.look(&levels, scale, image, &mut preview.scratch()).unwrap();
+            let most = drawn.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
+            println!("a view of {shape:?} at {z_m} m: {most:?} of 255 apart");
+            assert!(most <= Some(1), "{shape:?} {screen:?} {z_m}: {most:?}");
+        }
+    }
+}
+
+#[test]
+fn views_that_a_gpu_cannot_have_are_refused() {
+    let (h, w) = (12, 16);
+    let display = Display::from_toml("volume_depth_mm = 1")
+        .unwrap()
+        .with_size(h, w)
+        .unwrap();
+    let method = Method::Sweep(Sweep::for_display(&display));
+    let mut job = planned((h, w), method, &display, Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    // Two by two nodes for each colour.
+    let table = PerPixel::new(h, w, 16, 1, &[0.0, 255.0].repeat(12), &[6.2; 12]).unwrap();
+    job.target.response = Response::PerPixel(Arc::new(table));
+    let (_, on_gpu, _) = kept(&job);
+    let preview = Preview::new((h, w), &job.target, 0.0, (6, 8)).unwrap();
+    let refused = block_on(GpuView::new(&on_gpu, &preview)).err().unwrap().to_string();
+    assert!(
+        refused.contains("respond differently") && !refused.contains('\n'),
+        "{refused}"
+    );
 }

@@ -31,6 +31,12 @@ pub(super) struct GpuState {
     device: Option<std::sync::Arc<phasefront_gpu::Device>>,
     #[cfg(feature = "gpu")]
     refusal: Option<String>,
+    /// Whether the levels of the next frame stay on the GPU, if it computes them.
+    #[cfg(feature = "gpu")]
+    pub(super) stay: bool,
+    /// The levels of the last frame, if they stayed on the GPU.
+    #[cfg(feature = "gpu")]
+    pub(super) kept: Option<Box<phasefront_gpu::GpuLevels>>,
 }
 
 /// The inputs for planning a quality level.
@@ -150,13 +156,16 @@ impl Engine {
                     unreachable!("a GPU refuses a display of more than 8 bits");
                 };
                 let before = gpu.openings();
-                let made = gpu.process(input, brightness, bytes).await;
+                let made = gpu.process(input, brightness, bytes, context.gpu.stay).await;
                 if gpu.openings() != before {
                     context.gpu.device = gpu.device().cloned();
                     self.report_is_new = true;
                 }
                 match made {
-                    Ok(made) => return Ok(made),
+                    Ok((report, kept)) => {
+                        context.gpu.kept = kept.map(Box::new);
+                        return Ok(report);
+                    }
                     Err(Failure::Frame(why)) => return Err(why),
                     Err(Failure::Gpu(why)) => self.fall_back(context, &why)?,
                 }

@@ -15,6 +15,8 @@ use phasefront_core::runtime::error::{Error, Result};
 use phasefront_core::runtime::stage::stage;
 use phasefront_core::view::preview::{Preview, PreviewScratch};
 use phasefront_core::view::refocus::seen_field;
+#[cfg(feature = "gpu")]
+use phasefront_gpu::{GpuError, GpuLevels, GpuView};
 use std::sync::{Arc, Mutex, Weak};
 
 /// The number of buffers that a session keeps for future results. Further buffers are freed.
@@ -69,6 +71,8 @@ pub(super) struct Viewer {
     /// The session's threads, on which views are computed.
     pool: Arc<Threads>,
     plan: Mutex<Option<ViewPlan>>,
+    #[cfg(feature = "gpu")]
+    gpu_plan: Mutex<Option<GpuView>>,
 }
 
 struct ViewPlan {
@@ -85,6 +89,8 @@ impl Viewer {
             target,
             pool,
             plan: Mutex::new(None),
+            #[cfg(feature = "gpu")]
+            gpu_plan: Mutex::new(None),
         }
     }
 }
@@ -105,6 +111,9 @@ pub struct Hologram {
     pub(super) valid_depth: f32,
     pub(super) quality_level: usize,
     pub(super) viewer: Arc<Viewer>,
+    /// The levels, if they stayed on the GPU. `levels` is then arbitrary.
+    #[cfg(feature = "gpu")]
+    pub(super) on_gpu: Option<Box<GpuLevels>>,
 }
 
 impl std::fmt::Debug for Hologram {
@@ -182,6 +191,8 @@ impl Hologram {
                 valid_depth: 0.0,
                 quality_level: 0,
                 viewer: Arc::new(Viewer::new(target.clone(), pool.clone())),
+                #[cfg(feature = "gpu")]
+                on_gpu: None,
             })
         })
     }
@@ -335,6 +346,41 @@ impl Hologram {
             let _stage = stage!("preview");
             preview.look(self.levels(), self.scale, (layout, bytes, row_stride), scratch)
         })
+    }
+
+    /// Returns the levels on the GPU if they stayed there, which only a browser's session lets them. The functions that
+    /// read levels then return arbitrary values.
+    #[cfg(feature = "gpu")]
+    #[doc(hidden)]
+    pub fn on_gpu(&self) -> Option<&GpuLevels> {
+        self.on_gpu.as_deref()
+    }
+
+    /// Renders what [`Self::write_preview`] writes on the GPU that has `levels`, those of [`Self::on_gpu`], and passes
+    /// the view to `take`. The plan is kept for other z of the same size.
+    ///
+    /// # Errors
+    /// Returns an error in the cases of [`Self::write_preview`], and if the GPU cannot have the view or was lost.
+    #[cfg(feature = "gpu")]
+    #[doc(hidden)]
+    pub async fn view_on_gpu(
+        &self,
+        levels: &GpuLevels,
+        z_m: f64,
+        screen: (usize, usize),
+        take: impl AsyncFnOnce(&GpuView) -> std::result::Result<(), GpuError>,
+    ) -> std::result::Result<(), GpuError> {
+        let preview = Preview::new(self.shape, &self.viewer.target, z_m, screen)?;
+        // No lock is held while the GPU is awaited.
+        let kept = lock(&self.viewer.gpu_plan).take();
+        let mut view = match kept.filter(|view| view.fits(levels, &preview)) {
+            Some(view) => view,
+            None => GpuView::new(levels, &preview).await?,
+        };
+        view.draw(levels, &preview, self.scale).await?;
+        take(&view).await?;
+        *lock(&self.viewer.gpu_plan) = Some(view);
+        Ok(())
     }
 
     /// Returns the field that the levels produce behind the aperture, through the optics, at `z_m`, (C, H, W); z = 0 is

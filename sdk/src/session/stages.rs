@@ -201,6 +201,12 @@ impl Stages {
         std::mem::take(&mut engine.report_is_new).then(|| engine.report())
     }
 
+    /// Sets whether the levels of the next frame stay on the GPU, if it computes them.
+    #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
+    pub(super) fn stay_on_gpu(&mut self, stay: bool) {
+        self.gpu.stay = stay;
+    }
+
     #[cfg(feature = "gpu")]
     pub(super) fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
         self.gpu.device()
@@ -409,6 +415,8 @@ impl Stages {
             valid_depth: report.valid,
             quality_level: level_control.quality_level(),
             viewer: self.viewer.clone(),
+            #[cfg(feature = "gpu")]
+            on_gpu: self.gpu.kept.take(),
         })
     }
 }

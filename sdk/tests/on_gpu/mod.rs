@@ -1,4 +1,4 @@
-//! Helpers for sessions on any available GPU, including Mesa's software driver.
+//! Helpers for sessions on any available GPU, including a software driver.
 
 #[path = "../../../tests/driver.rs"]
 mod driver;
@@ -13,7 +13,7 @@ pub(crate) fn on_gpu(options: SessionOptions) -> SessionOptions {
         let device = DeviceOptions { name, programs: None };
         Device::open(&device).map(|_| device)
     };
-    let device = driver::opened(open(None).or_else(|_| open(Some("llvmpipe".into()))));
+    let device = driver::opened(open(None).or_else(|_| open(Some(driver::software()))));
     let mut options = options;
     options.backend = Backend::Gpu;
     options.gpu.device = device;

@@ -45,11 +45,12 @@ export async function guardAsync<T>(call: () => Promise<T>): Promise<T> {
       if (said === state) reject(said);
     };
   });
-  addEventListener("error", panicked);
+  // Node has no such events.
+  globalThis.addEventListener?.("error", panicked);
   try {
     return await Promise.race([guard(call).catch((error: unknown) => Promise.reject(ofModule(error))), panic]);
   } finally {
-    removeEventListener("error", panicked);
+    globalThis.removeEventListener?.("error", panicked);
   }
 }
 

@@ -1,5 +1,6 @@
 /// <reference lib="esnext.disposable" preserve="true" />
-import { PhasefrontError, bytesOf, guard, release, whole } from "./error.js";
+import { putPixels, type Canvas, type Size } from "./canvas.js";
+import { PhasefrontError, bytesOf, guard, guardAsync, release, whole } from "./error.js";
 import type { RawHologram } from "./raw/phasefront_web.js";
 
 /** The time of each stage of a frame. */
@@ -86,6 +87,8 @@ export class Hologram {
   /** The metadata. */
   readonly info: HologramInfo;
   #raw: RawHologram | undefined;
+  /** The drawings on the GPU, after which the memory can be freed. */
+  #drawing: Promise<unknown> | undefined;
 
   private constructor(raw: RawHologram) {
     this.#raw = raw;
@@ -97,7 +100,11 @@ export class Hologram {
     return new Hologram(raw);
   }
 
-  /** Returns a copy of the modulator levels, (C, H, W): red, green and blue, or those of the only laser. */
+  /**
+   * Returns a copy of the modulator levels, (C, H, W): red, green and blue, or those of the only laser.
+   *
+   * @throws PhasefrontError `setting`: the levels stayed on the GPU.
+   */
   get levels(): Uint8Array {
     return this.call((raw) => raw.levels());
   }
@@ -167,10 +174,40 @@ export class Hologram {
     this.call((raw) => raw.writeOutput(layout, flips, Int32Array.of(shiftX, shiftY), index, bytes, stride));
   }
 
-  /** Frees the memory now. Closing twice does nothing. */
+  /**
+   * Draws the modulator's image to a canvas, which takes its size. If the levels stayed on the GPU, they go to the canvas
+   * without a copy to the CPU. The GPU and the CPU cannot draw to the same canvas.
+   *
+   * @throws PhasefrontError `setting`: the canvas has another context. `session`: the GPU was lost.
+   */
+  async drawLevels(canvas: Canvas): Promise<void> {
+    if (this.call((raw) => raw.onGpu())) return this.#draw((raw) => raw.paintLevels(canvas));
+    putPixels(canvas, this.outputSize("rgba"), ({ data }) => this.writeOutput({ layout: "rgba" }, data));
+  }
+
+  /**
+   * Draws the view of an eye focused at `zMm` to a canvas, in `size` or that of the canvas, as {@link drawLevels} does.
+   *
+   * @throws PhasefrontError in the cases of {@link writePreview} and {@link drawLevels}.
+   */
+  async drawPreview(zMm: number, canvas: Canvas, size: Size = canvas): Promise<void> {
+    const [w, h] = [whole("the width of a preview", size.width), whole("the height of a preview", size.height)];
+    if (this.call((raw) => raw.onGpu())) return this.#draw((raw) => raw.paintPreview(zMm, w, h, canvas));
+    putPixels(canvas, size, (image) => this.writePreview(zMm, image));
+  }
+
+  #draw(call: (raw: RawHologram) => Promise<void>): Promise<void> {
+    const drawn = this.call((raw) => guardAsync(() => call(raw)));
+    this.#drawing = Promise.allSettled([this.#drawing, drawn]);
+    return drawn;
+  }
+
+  /** Frees the memory, after what is being drawn. Closing twice does nothing. */
   close(): void {
-    release(this.#raw);
+    const raw = this.#raw;
     this.#raw = undefined;
+    if (this.#drawing) void this.#drawing.then(() => release(raw));
+    else release(raw);
   }
 
   /** Does as {@link close} does, where a `using` declaration goes out of scope. */

@@ -19,6 +19,7 @@ import { PhasefrontError, guard, ready } from "./error.js";
 import init, { version as rawVersion } from "./raw/phasefront_web.js";
 import { start, threadsToStart } from "./threads.js";
 
+export type { Canvas, Size } from "./canvas.js";
 export { PhasefrontError, type ErrorKind } from "./error.js";
 export {
   Frame,
@@ -52,6 +53,7 @@ export {
   type Brightness,
   type Encoding,
   type Method,
+  type ProcessAsyncOptions,
   type Quality,
   type RunningMode,
   type QualityLevel,

@@ -1,4 +1,5 @@
 // The worker of a `WorkerSession`: its session, and the holograms that the page has not closed.
+import type { Size } from "./canvas.js";
 import { PhasefrontError, whole, type ErrorKind } from "./error.js";
 import { Frame } from "./frame.js";
 import { Hologram, type HologramInfo, type Layout, type OutputSize, type Placement } from "./hologram.js";
@@ -6,7 +7,7 @@ import { Modulator } from "./modulator.js";
 import { Network } from "./network.js";
 import { load } from "./phasefront.js";
 import { Session, type Encoding, type Method, type Quality, type RunningMode, type SessionOptions } from "./session.js";
-import type { Statistics } from "./session.js";
+import type { ProcessAsyncOptions, Statistics } from "./session.js";
 import { Target, displayFromToml, type Display } from "./target.js";
 import type { NetworkSource, TargetSource, WorkerSessionOptions } from "./worker.js";
 
@@ -17,8 +18,15 @@ export interface Reply {
   readonly error?: { readonly kind?: ErrorKind; readonly message: string; readonly error?: unknown };
 }
 
+/** A canvas that the page shows, by a number. It is moved to the worker with the first drawing. */
+export interface PageCanvas {
+  readonly canvas: number;
+  readonly moved?: OffscreenCanvas;
+}
+
 let session: Session | undefined;
 const holograms = new Map<number, Hologram>();
+const canvases = new Map<number, OffscreenCanvas>();
 let last = 0;
 
 function opened(): Session {
@@ -30,6 +38,11 @@ function hologram(id: number): Hologram {
   const found = holograms.get(id);
   if (!found) throw new PhasefrontError("session", "the hologram is closed; take what is needed of it before");
   return found;
+}
+
+function canvasOf({ canvas, moved }: PageCanvas): OffscreenCanvas {
+  if (moved) canvases.set(canvas, moved);
+  return canvases.get(canvas) as OffscreenCanvas;
 }
 
 function network(source: NetworkSource): Network {
@@ -75,9 +88,12 @@ const calls = {
     session = await Session.open(sessionOptions(options), mode);
   },
 
-  async process({ colour, depth, options }: Frame): Promise<{ hologram: number; info: HologramInfo }> {
+  async process(
+    { colour, depth, options }: Frame,
+    { onGpu }: ProcessAsyncOptions,
+  ): Promise<{ hologram: number; info: HologramInfo }> {
     try {
-      const made = await opened().processAsync(new Frame(colour, depth, options));
+      const made = await opened().processAsync(new Frame(colour, depth, options), { onGpu });
       holograms.set(++last, made);
       return { hologram: last, info: made.info };
     } finally {
@@ -109,6 +125,11 @@ const calls = {
     const data = new Uint8ClampedArray(width * height * pixelBytes);
     hologram(id).writeOutput(placement, data, { image });
     return data;
+  },
+
+  drawLevels: (id: number, to: PageCanvas): Promise<void> => hologram(id).drawLevels(canvasOf(to)),
+  drawPreview(id: number, zMm: number, to: PageCanvas, size: Size): Promise<void> {
+    return hologram(id).drawPreview(zMm, canvasOf(to), size);
   },
 
   free(id: number): void {

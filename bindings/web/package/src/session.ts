@@ -93,6 +93,15 @@ export interface SessionOptions<N = Network, T = Target | Display> {
   readonly adapter?: string;
 }
 
+/** The options of {@link Session.processAsync}. */
+export interface ProcessAsyncOptions {
+  /**
+   * Lets the levels stay on the GPU, if it computes the frame. They are then drawn to canvases, and the functions that
+   * read them throw. The CPU does the same without it.
+   */
+  readonly onGpu?: boolean;
+}
+
 /** The statistics of a session. Rates and times are means over the last 30 holograms. */
 export interface Statistics {
   readonly submitted: number;
@@ -211,12 +220,12 @@ export class Session {
    *
    * @throws PhasefrontError in the cases of {@link process}.
    */
-  processAsync(frame: Frame): Promise<Hologram> {
+  processAsync(frame: Frame, { onGpu = false }: ProcessAsyncOptions = {}): Promise<Hologram> {
     const compute = async () => {
       const session = this.#open();
       const raw = await rawFrameAsync(frame);
       try {
-        return Hologram.of(await guardAsync(() => session.processAsync(raw)));
+        return Hologram.of(await guardAsync(() => session.processAsync(raw, onGpu)));
       } finally {
         release(raw);
       }

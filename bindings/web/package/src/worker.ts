@@ -13,13 +13,15 @@
  */
 
 /// <reference lib="esnext.disposable" preserve="true" />
+import type { Canvas, Size } from "./canvas.js";
 import { PhasefrontError } from "./error.js";
 import type { Frame } from "./frame.js";
 import type { HologramInfo, Layout, OutputSize, Placement } from "./hologram.js";
-import type { Calls, Reply } from "./session-worker.js";
-import type { Quality, RunningMode, SessionOptions, Statistics } from "./session.js";
+import type { Calls, PageCanvas, Reply } from "./session-worker.js";
+import type { ProcessAsyncOptions, Quality, RunningMode, SessionOptions, Statistics } from "./session.js";
 import type { Display } from "./target.js";
 
+export type { Canvas, Size } from "./canvas.js";
 export { PhasefrontError, type ErrorKind } from "./error.js";
 export {
   Frame,
@@ -79,7 +81,7 @@ export interface WorkerSettings {
 }
 
 /** The options of {@link WorkerSession.process}. */
-export interface ProcessOptions {
+export interface ProcessOptions extends ProcessAsyncOptions {
   /**
    * Aborts the frame: the promise rejects with the signal's reason. A frame that waits is not computed; one that is being
    * computed ends, and its hologram is freed.
@@ -103,6 +105,9 @@ export class WorkerSession {
   #last = 0;
   #turn: Promise<unknown> = Promise.resolve();
   #ended: unknown;
+  /** The canvases that were moved to the worker. */
+  readonly #canvases = new WeakMap<Canvas, number>();
+  #lastCanvas = 0;
   /** Frees holograms that the page has forgotten. */
   readonly #forgotten = new FinalizationRegistry<number>((hologram) => this.#free(hologram));
 
@@ -161,11 +166,11 @@ export class WorkerSession {
    * `session`: the session is closed. The frames that follow are not affected. The reason of `signal`, if it aborts.
    */
   process(frame: Frame, options: ProcessOptions = {}): Promise<WorkerHologram> {
-    const { signal, transfer } = options;
+    const { signal, transfer, onGpu } = options;
     const { colour, depth, options: said } = frame;
     const made = this.#turn.then(async () => {
       signal?.throwIfAborted();
-      const { hologram, info } = await this.#ask("process", [{ colour, depth, options: said }], transfer);
+      const { hologram, info } = await this.#ask("process", [{ colour, depth, options: said }, { onGpu }], transfer);
       if (!signal?.aborted) return this.#hologram(hologram, info);
       this.#free(hologram);
       throw signal.reason;
@@ -177,7 +182,8 @@ export class WorkerSession {
   #hologram(id: number, info: HologramInfo): WorkerHologram {
     const hologram = WorkerHologram.of(
       info,
-      (call, said) => this.#ask(call, [id, ...said] as never),
+      (call, said, transfer) => this.#ask(call, [id, ...said] as never, transfer),
+      (canvas) => this.#canvas(canvas),
       () => {
         this.#forgotten.unregister(hologram);
         this.#free(id);
@@ -185,6 +191,15 @@ export class WorkerSession {
     );
     this.#forgotten.register(hologram, id, hologram);
     return hologram;
+  }
+
+  /** Returns the canvas as the worker knows it, and what is to be moved to the worker. */
+  #canvas(canvas: Canvas): [PageCanvas, Transferable[]] {
+    const known = this.#canvases.get(canvas);
+    if (known !== undefined) return [{ canvas: known }, []];
+    const moved = offscreen(canvas);
+    this.#canvases.set(canvas, ++this.#lastCanvas);
+    return [{ canvas: this.#lastCanvas, moved }, [moved]];
   }
 
   /** Runs an empty frame through the stages, so that the first real frame is as fast as the others. */
@@ -248,6 +263,15 @@ export class WorkerSession {
   }
 }
 
+function offscreen(canvas: Canvas): OffscreenCanvas {
+  if (canvas instanceof OffscreenCanvas) return canvas;
+  try {
+    return canvas.transferControlToOffscreen();
+  } catch {
+    throw new PhasefrontError("setting", "the canvas has a context or belongs to another session; give a new canvas");
+  }
+}
+
 /** Returns the result of `made`, or throws the reason of `signal` as soon as it aborts. */
 async function until<T>(signal: AbortSignal | undefined, made: Promise<T>): Promise<T> {
   if (!signal) return made;
@@ -265,10 +289,13 @@ async function until<T>(signal: AbortSignal | undefined, made: Promise<T>): Prom
 }
 
 /** The calls whose first argument is a hologram. */
-type Ask = <K extends "levels" | "zAt" | "preview" | "refocus" | "field" | "outputSize" | "output">(
+type Ask = <K extends Exclude<keyof Calls, "open" | "process" | "warmUp" | "reset" | "setQuality" | "statistics" | "free">>(
   call: K,
   said: Parameters<Calls[K]> extends [number, ...infer Rest] ? Rest : never,
+  transfer?: Transferable[],
 ) => Promise<Awaited<ReturnType<Calls[K]>>>;
+
+type Known = (canvas: Canvas) => [PageCanvas, Transferable[]];
 
 /**
  * The hologram of one frame, in its session's worker. It uses memory until it is closed, garbage-collected, or its session
@@ -279,17 +306,19 @@ export class WorkerHologram {
   /** The metadata. */
   readonly info: HologramInfo;
   readonly #ask: Ask;
+  readonly #canvas: Known;
   #close: (() => void) | undefined;
 
-  private constructor(info: HologramInfo, ask: Ask, close: () => void) {
+  private constructor(info: HologramInfo, ask: Ask, canvas: Known, close: () => void) {
     this.info = info;
     this.#ask = ask;
+    this.#canvas = canvas;
     this.#close = close;
   }
 
   /** @internal */
-  static of(info: HologramInfo, ask: Ask, close: () => void): WorkerHologram {
-    return new WorkerHologram(info, ask, close);
+  static of(info: HologramInfo, ask: Ask, canvas: Known, close: () => void): WorkerHologram {
+    return new WorkerHologram(info, ask, canvas, close);
   }
 
   /** Returns the modulator levels, (C, H, W): red, green and blue, or those of the only laser. */
@@ -349,6 +378,27 @@ export class WorkerHologram {
    */
   output(placement: Placement = {}, image = 0): Promise<Uint8ClampedArray<ArrayBuffer>> {
     return this.#ask("output", [placement, image]);
+  }
+
+  /**
+   * Draws the modulator's image to a canvas, which the first drawing moves to the worker and which takes the image's size.
+   * If the levels stayed on the GPU, they go to the canvas without a copy to the CPU.
+   *
+   * @throws PhasefrontError `setting`: the canvas has a context or belongs to another session.
+   */
+  async drawLevels(canvas: Canvas): Promise<void> {
+    const [to, moved] = this.#canvas(canvas);
+    await this.#ask("drawLevels", [to], moved);
+  }
+
+  /**
+   * Draws the view of an eye focused at `zMm` to a canvas, in `size` or that of the canvas, as {@link drawLevels} does.
+   *
+   * @throws PhasefrontError in the cases of {@link preview} and {@link drawLevels}.
+   */
+  async drawPreview(zMm: number, canvas: Canvas, { width, height }: Size = canvas): Promise<void> {
+    const [to, moved] = this.#canvas(canvas);
+    await this.#ask("drawPreview", [zMm, to, { width, height }], moved);
   }
 
   /** Frees the memory. Closing twice does nothing. */

@@ -110,6 +110,42 @@ impl Preview {
         self.screen
     }
 
+    /// Returns the shape (H, W) of the field after averaging, (h, w).
+    pub fn small(&self) -> (usize, usize) {
+        self.small
+    }
+
+    /// Returns the plan that propagates each colour of the small field, or `None` if the hologram is already at z.
+    pub fn propagators(&self) -> Option<&[Propagator]> {
+        self.propagators.as_deref()
+    }
+
+    /// Returns the samples of the small field, along x and y, that each pixel of the image is the mean of.
+    pub fn axes(&self) -> [&Axis; 2] {
+        [&self.x, &self.y]
+    }
+
+    /// Returns the light of each level, exp(iφ), or `None` if it depends on the pixel.
+    pub fn lights(&self) -> Option<[Complex32; 256]> {
+        match &self.response {
+            Response::PerPixel(_) => None,
+            alike if self.panel.is_none() => Some(std::array::from_fn(|l| Complex32::cis(alike.phase(l as u8, 0)))),
+            _ => None,
+        }
+    }
+
+    /// Returns the weights of the sums of the light of `factor` × `factor` pixels, (C, h, w): their mean over the gain
+    /// of the light that falls on them.
+    pub fn weights(&self) -> Vec<f32> {
+        let (height, width) = self.small;
+        let mut weights =
+            vec![Complex32::from(1.0 / (self.factor * self.factor) as f32); self.colours * height * width];
+        for (row, weights) in weights.chunks_exact_mut(width).enumerate() {
+            self.divide_by_light(row / height, row % height, weights);
+        }
+        weights.iter().map(|weight| weight.re).collect()
+    }
+
     /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> PreviewScratch {
         let size = self.small.0 * self.small.1;

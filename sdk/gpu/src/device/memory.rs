@@ -42,6 +42,36 @@ impl Device {
         }))
     }
 
+    /// Creates a texture of 8-bit RGBA and (H, W) for copies, for programs that read it, and for `usage`.
+    pub(crate) fn picture(
+        &self,
+        what: &str,
+        (height, width): (usize, usize),
+        usage: wgpu::TextureUsages,
+    ) -> Result<wgpu::Texture> {
+        let most = self.limits.max_texture_dimension_2d as usize;
+        if height.max(width) > most {
+            return Err(GpuError::Refused(format!(
+                "a picture of {width}×{height} is too large for {}, which takes {most} a side",
+                self.name()
+            )));
+        }
+        Ok(self.inner.create_texture(&wgpu::TextureDescriptor {
+            label: Some(what),
+            size: wgpu::Extent3d {
+                width: width as u32,
+                height: height as u32,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8Unorm,
+            usage: usage | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        }))
+    }
+
     /// Creates a buffer that the CPU can read.
     pub(crate) fn readable(&self, what: &str, bytes: usize) -> wgpu::Buffer {
         self.inner.create_buffer(&wgpu::BufferDescriptor {

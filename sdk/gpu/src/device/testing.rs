@@ -24,7 +24,7 @@ pub(crate) fn device() -> Arc<Device> {
 
 pub(crate) fn software() -> DeviceOptions {
     DeviceOptions {
-        name: Some("llvmpipe".into()),
+        name: Some(driver::software()),
         programs: None,
     }
 }

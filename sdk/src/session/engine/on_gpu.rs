@@ -9,7 +9,8 @@ use phasefront_core::pipeline::{FrameReport, FrameTimes};
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
 use phasefront_gpu::{
-    ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError, InFlight, Job, Renderer,
+    ChainOptions, Colour, ColourData, Deliver, Depth, Device, DeviceOptions, Frame, GpuError, GpuLevels, GpuReport,
+    InFlight, Job, Renderer,
 };
 use std::sync::Arc;
 
@@ -98,19 +99,33 @@ impl OnGpu {
         self.0.release();
     }
 
-    /// Computes the levels of a frame. If the frame comes from a camera, reads the camera's colour directly.
+    /// Computes the levels of a frame. If the frame comes from a camera, reads the camera's colour directly. The levels
+    /// are copied to `levels`, or returned if `stay` says that they stay on the GPU.
     pub(in crate::session) async fn process(
         &mut self,
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
-    ) -> Result<FrameReport, Failure> {
+        stay: bool,
+    ) -> Result<(FrameReport, Option<GpuLevels>), Failure> {
         let stage = stage!("gpu");
-        let frame = self.submit(input, brightness).await?;
-        self.collect(frame, stage, brightness, levels).await
+        let deliver = if stay { Deliver::Shown } else { Deliver::Levels };
+        let frame = self.submit(input, brightness, deliver).await?;
+        let made = match deliver {
+            Deliver::Levels => self.0.collect(frame, levels).await.map(|report| (report, None)),
+            Deliver::Shown => self.0.keep(frame).await.map(|(report, kept)| (report, Some(kept))),
+        };
+        let (report, kept) = made.map_err(Failure::of_flight)?;
+        brightness.set_scale(report.scale);
+        Ok((frame_report(report, stage), kept))
     }
 
-    async fn submit(&mut self, input: &FrameInput<'_>, brightness: &BrightnessTracker) -> Result<InFlight, Failure> {
+    async fn submit(
+        &mut self,
+        input: &FrameInput<'_>,
+        brightness: &BrightnessTracker,
+        deliver: Deliver,
+    ) -> Result<InFlight, Failure> {
         let planar = Frame::of(input.rgbd);
         let (colour, frame) = match input.camera {
             None => (Colour::Planar, planar),
@@ -131,32 +146,31 @@ impl OnGpu {
         };
         self.0.expect(colour, Depth::F32).await?;
         let past = brightness.past(input.elapsed);
-        Ok(self.0.submit(past, &frame).await?)
+        Ok(self.0.submit(past, &frame, deliver).await?)
     }
+}
 
-    async fn collect(
-        &mut self,
-        frame: InFlight,
-        stage: Stage,
-        brightness: &mut BrightnessTracker,
-        levels: &mut [u8],
-    ) -> Result<FrameReport, Failure> {
-        let report = self.0.collect(frame, levels).await.map_err(|why| match why {
+impl Failure {
+    /// Returns what became of a frame in flight.
+    fn of_flight(why: GpuError) -> Self {
+        match why {
             GpuError::Core(why) => Failure::Frame(why),
             why => Failure::Frame(Error::Lost(format!("{why}, and this frame with it"))),
-        })?;
-        brightness.set_scale(report.scale);
-        let times = report.times.unwrap_or_default();
-        Ok(FrameReport {
-            scale: report.scale,
-            times: FrameTimes {
-                // Includes the transfers to and from the GPU, and all stages if there are no time stamps.
-                method: stage.end().saturating_sub(times.propagate + times.encode),
-                propagate: times.propagate,
-                encode: times.encode,
-                ..FrameTimes::default()
-            },
-        })
+        }
+    }
+}
+
+fn frame_report(report: GpuReport, stage: Stage) -> FrameReport {
+    let times = report.times.unwrap_or_default();
+    FrameReport {
+        scale: report.scale,
+        times: FrameTimes {
+            // Includes the transfers to and from the GPU, and all stages if there are no time stamps.
+            method: stage.end().saturating_sub(times.propagate + times.encode),
+            propagate: times.propagate,
+            encode: times.encode,
+            ..FrameTimes::default()
+        },
     }
 }
 
@@ -167,7 +181,7 @@ mod driver;
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::driver::opened;
+    use super::driver::{opened, software};
     use super::*;
     use crate::session::threads::block_on;
     use ndarray::{Array2, Array3};
@@ -184,7 +198,7 @@ mod tests {
         let method = Method::Network(Arc::new(network.unwrap()));
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
         let mut options = SessionOptions::new(display, method);
-        options.gpu.device.name = Some("llvmpipe".into());
+        options.gpu.device.name = Some(software());
         let mut gpu = opened(block_on(OnGpu::new(&options, &options.quality_levels[0], None)));
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
         let frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
@@ -195,23 +209,23 @@ mod tests {
             rgbd: &frame,
             elapsed: None,
         };
-        let made = block_on(gpu.process(&input, &mut brightness, &mut first));
-        let scale = made.unwrap().scale;
+        let made = block_on(gpu.process(&input, &mut brightness, &mut first, false));
+        let scale = made.unwrap().0.scale;
         input.elapsed = Some(Duration::from_millis(33));
-        let flying = block_on(gpu.submit(&input, &brightness)).unwrap();
+        let flying = block_on(gpu.submit(&input, &brightness, Deliver::Levels)).unwrap();
         let before = gpu.openings();
         gpu.device().unwrap().wgpu().0.destroy();
         let mut levels = vec![0; first.len()];
-        let lost = block_on(gpu.collect(flying, stage!("gpu"), &mut brightness, &mut levels));
+        let lost = block_on(gpu.0.collect(flying, &mut levels)).map_err(Failure::of_flight);
         assert!(
             matches!(&lost, Err(Failure::Frame(Error::Lost(why))) if !why.contains('\n')),
             "{:?}",
             lost.err()
         );
         assert_eq!(gpu.report().name, "no GPU at this moment");
-        let made = block_on(gpu.process(&input, &mut brightness, &mut levels));
+        let made = block_on(gpu.process(&input, &mut brightness, &mut levels, false));
         // The scene is the same, so its scale and levels are too.
-        assert!((made.unwrap().scale - scale).abs() < 1e-6);
+        assert!((made.unwrap().0.scale - scale).abs() < 1e-6);
         assert_eq!(levels, first);
         assert_eq!(gpu.openings(), before + 1);
         assert!(gpu.report().why.contains("opened again"));
