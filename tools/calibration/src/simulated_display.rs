@@ -6,9 +6,12 @@
 //! shot noise, read noise and a limited number of bits. A seed gives the same results on every machine, except for the
 //! last bits of floating-point arithmetic.
 
+mod faults;
+
 use crate::camera::homography::Homography;
 use crate::camera::photograph::Photograph;
 use crate::curves::curve;
+use faults::{Faults, PARTS};
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex32;
 use phasefront::Display;
@@ -69,6 +72,7 @@ pub struct SimulatedDisplay {
     beam: [f64; 3],
     aberration: Aberration,
     camera: Camera,
+    faults: Option<Faults>,
 }
 
 impl SimulatedDisplay {
@@ -134,12 +138,20 @@ impl SimulatedDisplay {
             beam,
             aberration: Aberration::none(display.colours()),
             camera,
+            faults: None,
         })
     }
 
     /// Adds the aberration that `correction` *corrects*.
     pub fn with_aberration(mut self, correction: Aberration) -> Self {
         self.aberration = correction;
+        self
+    }
+
+    /// Adds faults whose form no calibration knows: crosstalk between pixels, gaps between them, a ghost, a speckled
+    /// aperture, and a laser that drifts from photograph to photograph.
+    pub fn with_faults(mut self) -> Self {
+        self.faults = Some(Faults::new(self.seed));
         self
     }
 
@@ -245,40 +257,26 @@ impl SimulatedDisplay {
         let more = (self.aberration.reach_m(pitch) / pitch).ceil() as usize + 8;
         let padded = asm::padded_shape(height + more, width + more, pitch, wavelength, distance, Padding::Reach)?;
         let (ph, pw) = padded;
-        let mut plane: Vec<Complex32> = vec![Complex32::ZERO; height * width];
-        let rows = plane.par_chunks_exact_mut(width).enumerate();
-        rows.for_each(|(y, row)| {
-            for (x, value) in row.iter_mut().enumerate() {
-                let amplitude = self.laser(colour, y as f64, x as f64);
-                let phase = self.phase(colour, y, x, levels[(y, x)].into());
-                *value = Complex32::from_polar(amplitude as f32, phase as f32);
-            }
-        });
         let transfer = Transfer::corrected(padded, pitch, wavelength, distance, |mu, nu| {
             -self.aberration.phase(colour, mu, nu, pitch)
         });
-        let fft = Fft2::new(height, width, ph, pw);
-        let mut scratch = fft.scratch();
-        fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
-        let bin = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
-        fft.spectrum(
-            &scratch.rows,
-            &mut scratch.columns,
-            |kx, column, _| {
-                transfer.apply(kx, column);
-                let fx = bin(kx, pw);
-                for (ky, value) in column.iter_mut().enumerate() {
-                    if !aperture::passes(fx, bin(ky, ph), self.display.aperture_radius()) {
-                        *value = Complex32::ZERO;
-                    }
+        let signed = |k: usize, n: usize| if 2 * k < n { k as f64 } else { k as f64 - n as f64 } / n as f64;
+        let spectrum = self.spectrum(levels, colour, padded, |kx, column| {
+            transfer.apply(kx, column);
+            let fx = signed(kx, pw);
+            for (ky, value) in column.iter_mut().enumerate() {
+                let fy = signed(ky, ph);
+                match &self.faults {
+                    _ if !aperture::passes(fx, fy, self.display.aperture_radius()) => *value = Complex32::ZERO,
+                    Some(faults) => *value *= faults.aperture(fx, fy),
+                    None => (),
                 }
-            },
-            &mut scratch.work,
-        );
+            }
+        });
         // Zero padding of the spectrum to twice the samples gives band-limited interpolation.
         let wide = |k: usize, n: usize| if 2 * k < n { k } else { k + n };
         let mut columns = vec![Complex32::ZERO; 4 * ph * pw];
-        for (kx, column) in scratch.columns.chunks_exact(ph).enumerate() {
+        for (kx, column) in spectrum.chunks_exact(ph).enumerate() {
             let to = &mut columns[wide(kx, pw) * 2 * ph..][..2 * ph];
             for (ky, value) in column.iter().enumerate() {
                 to[wide(ky, ph)] = *value;
@@ -293,6 +291,55 @@ impl SimulatedDisplay {
         }))
     }
 
+    /// Returns the spectrum of the field at the modulator on a padded plane of (H', W') = `padded`, (W', H'). Each column
+    /// is passed to `filter` with its index.
+    fn spectrum(
+        &self,
+        levels: ArrayView2<'_, u8>,
+        colour: usize,
+        (ph, pw): (usize, usize),
+        filter: impl Fn(usize, &mut [Complex32]) + Sync,
+    ) -> Vec<Complex32> {
+        let (height, width) = levels.dim();
+        let phase = |y: usize, x: usize| self.phase(colour, y, x, levels[(y, x)].into());
+        let light = |y: usize, x: usize| self.laser(colour, y as f64, x as f64);
+        let Some(faults) = &self.faults else {
+            let mut plane = vec![Complex32::ZERO; height * width];
+            plane.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+                for (x, value) in row.iter_mut().enumerate() {
+                    *value = Complex32::from_polar(light(y, x) as f32, phase(y, x) as f32);
+                }
+            });
+            let fft = Fft2::new(height, width, ph, pw);
+            let mut scratch = fft.scratch();
+            fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
+            let then = |kx: usize, column: &mut [Complex32], _: &mut [Complex32]| filter(kx, column);
+            fft.spectrum(&scratch.rows, &mut scratch.columns, then, &mut scratch.work);
+            return scratch.columns;
+        };
+        let plane = faults.field((height, width), phase, light);
+        let fft = Fft2::new(height * PARTS, width * PARTS, ph * PARTS, pw * PARTS);
+        let mut scratch = fft.scratch();
+        fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
+        fft.spectrum(&scratch.rows, &mut scratch.columns, |_, _, _| (), &mut scratch.work);
+        // The aperture passes the frequencies of whole pixels alone. Their phase is taken at the middle of a pixel.
+        let of = |k: usize, n: usize| if 2 * k < n { k } else { k + (PARTS - 1) * n };
+        let middle = |k: usize, n: usize| {
+            let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
+            PI * k / n as f64 * (PARTS - 1) as f64 / PARTS as f64
+        };
+        let mut columns = vec![Complex32::ZERO; ph * pw];
+        columns.par_chunks_exact_mut(ph).enumerate().for_each(|(kx, column)| {
+            let fine = &scratch.columns[of(kx, pw) * ph * PARTS..][..ph * PARTS];
+            for (ky, value) in column.iter_mut().enumerate() {
+                let turn = Complex32::from_polar(1.0, (middle(kx, pw) + middle(ky, ph)) as f32);
+                *value = fine[of(ky, ph)] * turn / (PARTS * PARTS) as f32;
+            }
+            filter(kx, column);
+        });
+        columns
+    }
+
     /// Takes a photograph of `levels`, (H, W), lit in one colour, with the camera focused at `z_m`. `shot` seeds the
     /// noise of the photograph.
     ///
@@ -300,6 +347,7 @@ impl SimulatedDisplay {
     /// Returns the errors of [`Self::intensity`].
     pub fn photograph(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64, shot: u64) -> Result<Photograph> {
         let fine = self.intensity(levels, colour, z_m)?;
+        let power = self.faults.as_ref().map_or(1.0, |faults| faults.power(shot));
         let (rows, columns) = fine.dim();
         let at = |y: isize, x: isize| match (y, x) {
             (0.., 0..) if (y as usize) < rows && (x as usize) < columns => f64::from(fine[(y as usize, x as usize)]),
@@ -312,7 +360,7 @@ impl SimulatedDisplay {
             let (x0, y0) = (x0 as isize, y0 as isize);
             let top = at(y0, x0) * (1.0 - fx) + at(y0, x0 + 1) * fx;
             let bottom = at(y0 + 1, x0) * (1.0 - fx) + at(y0 + 1, x0 + 1) * fx;
-            top * (1.0 - fy) + bottom * fy
+            power * (top * (1.0 - fy) + bottom * fy)
         })
     }
 
@@ -437,6 +485,25 @@ mod tests {
                 assert!((a - b).abs() < 0.03, "{y} {x}: {a} {b}");
             }
         }
+    }
+
+    /// Without the faults' own part, a display with faults shows almost what one without shows.
+    #[test]
+    fn faults_change_the_light_but_not_its_place() {
+        let (plain, faulty) = (small(), small().with_faults());
+        let levels = Array2::from_shape_fn((40, 48), |(y, x)| if (12..28).contains(&y) && x > 20 { 90 } else { 0 });
+        let levels = Array2::from_shape_fn((40, 48), |(y, x)| if (x + y) % 2 == 0 { levels[(y, x)] } else { 0 });
+        for z_m in [0.0, 1e-3] {
+            let [a, b] = [&plain, &faulty].map(|of| of.intensity(levels.view(), 1, z_m).unwrap());
+            let (mean_a, mean_b) = (a.mean().unwrap(), b.mean().unwrap());
+            let together = (&a - mean_a) * (&b - mean_b);
+            let alike =
+                together.sum() / ((&a - mean_a).mapv(|v| v * v).sum() * (&b - mean_b).mapv(|v| v * v).sum()).sqrt();
+            assert!((0.8..0.995).contains(&alike), "{alike}");
+        }
+        let [one, other] = [3, 14].map(|shot| faulty.photograph(levels.view(), 1, 0.0, shot).unwrap());
+        let sum = |photo: &Photograph| photo.values.iter().map(|v| f64::from(*v)).sum::<f64>();
+        assert!((sum(&one) / sum(&other) - 1.0).abs() > 0.01);
     }
 
     #[test]
