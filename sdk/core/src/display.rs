@@ -4,6 +4,7 @@
 
 pub mod illumination;
 pub mod levels;
+pub mod model;
 pub mod panel;
 pub mod registration;
 pub mod response;

@@ -11,6 +11,7 @@ mod encoder;
 mod encoding;
 pub mod local;
 pub mod midpoint;
+pub mod modelled;
 mod start;
 
 use crate::encode::brightness::Brightness;

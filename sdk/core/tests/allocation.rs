@@ -15,6 +15,7 @@ use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
 use phasefront_core::display::levels::{Levels, LevelsMut};
+use phasefront_core::display::model::{self, ColourModel};
 use phasefront_core::display::panel::Flatness;
 use phasefront_core::display::panel::Panel;
 use phasefront_core::display::registration::Registration;
@@ -22,7 +23,7 @@ use phasefront_core::display::response::Response;
 use phasefront_core::display::response::per_pixel;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::display::target::Target;
-use phasefront_core::encode::Encoding;
+use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::frame::RgbdFrame;
 use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
 use phasefront_core::frame::{ColourPlan, Crop};
@@ -112,6 +113,7 @@ fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
         response: Response::PerPixel(table.into()),
         illumination: Some(laser),
         correction: Some(correction),
+        model: None,
     }
 }
 
@@ -121,8 +123,23 @@ fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
     let (h, w) = frame.shape();
     let frame = frame.clone().for_display(&display);
     let mut levels = vec![0; h * w];
-    for method in [Method::Sweep(Sweep::for_display(&display)), Method::trained(seeded)] {
-        let plan = Pipeline::new((h, w), method.clone(), &(&display).into(), &Encoding::ANTI_ALIAS.into()).unwrap();
+    let model = model::Model::new((3, 4), vec![ColourModel::ideal((3, 4))]).unwrap();
+    let learned = Target {
+        model: Some(model.into()),
+        ..Target::from(display.clone().with_size(h, w).unwrap())
+    };
+    let steps = EncoderOptions {
+        midpoint_steps: 2,
+        ..Encoding::ANTI_ALIAS.into()
+    };
+    let sweep = Method::Sweep(Sweep::for_display(&display));
+    let plain = (Target::from(&display), Encoding::ANTI_ALIAS.into());
+    for (method, (target, options)) in [
+        (sweep.clone(), plain.clone()),
+        (Method::trained(seeded), plain),
+        (sweep, (learned, steps)),
+    ] {
+        let plan = Pipeline::new((h, w), method.clone(), &target, &options).unwrap();
         let mut scratch = plan.scratch();
         let mut process = || {
             plan.process(&frame, &mut levels, &mut scratch).unwrap();

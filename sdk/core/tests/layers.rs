@@ -20,6 +20,7 @@ const LAYERS: &[&str] = &[
     "display::illumination",
     "display::panel",
     "display::registration",
+    "display::model",
     "display::target",
     "frame",
     "depth",

@@ -165,9 +165,9 @@ impl GpuPipeline {
                 "a display of one laser, which is the CPU's; the GPU makes holograms of three colours".into(),
             ));
         }
-        if !job.target.panel.is_plain() || job.target.registration.moves() {
+        if !job.target.panel.is_plain() || job.target.registration.moves() || job.target.model.is_some() {
             return Err(GpuError::Refused(
-                "a panel's flatness, carrier, lens or range over 2π and colours that are moved, which are the CPU's"
+                "a learned model, a panel's flatness, carrier, lens or range over 2π and colours that are moved, which are the CPU's"
                     .into(),
             ));
         }

@@ -65,6 +65,7 @@ impl DisplayFile {
             ("per_pixel", phase_only && self.target.response.shape().is_some()),
             ("laser", phase_only && self.target.illumination.is_some()),
             ("aberration", self.aberration.is_some()),
+            ("model", phase_only && self.target.model.is_some()),
             (
                 "carrier_mrad, lens_mm or flatness",
                 phase_only && self.target.panel.adds(),
@@ -124,7 +125,7 @@ pub fn own_devices() -> Vec<PathBuf> {
 }
 
 /// The keys of a display file that name other files.
-const NAMED: [&str; 4] = ["lut", "per_pixel", "laser", "aberration"];
+const NAMED: [&str; 5] = ["lut", "per_pixel", "laser", "aberration", "model"];
 
 /// The keys that define the phase of each level. A file has at most one of them.
 const PHASES: [&str; 4] = ["lut", "per_pixel", "levels_turns", "range_turns"];
@@ -146,8 +147,8 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
     }
 }
 
-/// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser` and `aberration` name files relative to it: `lut`
-/// is a text file of 256 levels, and [`crate::display::calibration`] describes the others. [`ModulatorSpec`] and
+/// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser`, `aberration` and `model` name files relative to
+/// it: `lut` is a text file of 256 levels, and [`crate::display::calibration`] describes the others. [`ModulatorSpec`] and
 /// `crate::display::panel` describe the remaining keys.
 ///
 /// # Errors
@@ -163,30 +164,11 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
         Some(_) => Err(Error::file(path, format!("{key} must be the name of a file"))),
     };
     let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
-    let (laser_path, aberration_path) = (named("laser")?, named("aberration")?);
+    let (laser_path, aberration_path, model_path) = (named("laser")?, named("aberration")?, named("model")?);
     let panel = panel::take(path, &mut table)?;
     let device = ModulatorSpec::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
     let display = &device.display;
-    let lut = match lut_path {
-        None => None,
-        Some(path) => {
-            let levels: std::result::Result<Vec<u8>, _> =
-                input::text(&path)?.split_whitespace().map(str::parse).collect();
-            let levels = levels.map_err(|e| Error::file(&path, format!("holds what is no level of 0..=255: {e}")))?;
-            let lut = lut_of(&levels).map_err(|e| Error::file(&path, e))?;
-            let most = lut.into_iter().max().unwrap_or_default();
-            if u32::from(most) >> display.bits() != 0 {
-                return Err(Error::file(
-                    &path,
-                    format!(
-                        "holds a level of {most}, over the {} bits of the display",
-                        display.bits()
-                    ),
-                ));
-            }
-            Some(lut)
-        }
-    };
+    let lut = lut_path.map(|path| read_lut(&path, display)).transpose()?;
     let per_pixel = match per_pixel_path {
         None => None,
         Some(path) => {
@@ -216,6 +198,10 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     }
     target.illumination = laser_path.map(|p| calibration::read_laser(&p)).transpose()?;
     panel.onto(path, &mut target)?;
+    if let Some(path) = model_path {
+        target.model = Some(calibration::read_model(&path)?.into());
+        target.check().map_err(|e| Error::file(path, e))?;
+    }
     let aberration = match aberration_path {
         None => None,
         Some(path) => {
@@ -230,6 +216,24 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
         lut,
         aberration,
     })
+}
+
+/// Reads a look-up table for `display`: a text file of 256 levels.
+fn read_lut(path: &Path, display: &Display) -> Result<[u8; 256]> {
+    let levels: std::result::Result<Vec<u8>, _> = input::text(path)?.split_whitespace().map(str::parse).collect();
+    let levels = levels.map_err(|e| Error::file(path, format!("holds what is no level of 0..=255: {e}")))?;
+    let lut = lut_of(&levels).map_err(|e| Error::file(path, e))?;
+    let most = lut.into_iter().max().unwrap_or_default();
+    if u32::from(most) >> display.bits() != 0 {
+        return Err(Error::file(
+            path,
+            format!(
+                "holds a level of {most}, over the {} bits of the display",
+                display.bits()
+            ),
+        ));
+    }
+    Ok(lut)
 }
 
 /// Converts levels to a look-up table.

@@ -12,6 +12,7 @@
 mod file;
 
 use crate::display::illumination::Illumination;
+use crate::display::model::Model;
 use crate::display::panel::Panel;
 use crate::display::registration::Registration;
 use crate::display::response::Response;
@@ -19,6 +20,7 @@ use crate::display::{Display, check_colours};
 use crate::optics::asm::{Padding, Propagator};
 use crate::optics::zernike::Aberration;
 use crate::runtime::error::{Error, Result};
+use std::sync::Arc;
 
 /// A display and its calibration. A hologram smaller than the modulator lies in its middle.
 #[derive(Debug, Clone)]
@@ -37,6 +39,9 @@ pub struct Target {
     /// The shift and the scale of each colour, from a calibration file.
     #[doc(hidden)]
     pub registration: Registration,
+    /// What was learned from photographs beyond all of these.
+    #[doc(hidden)]
+    pub model: Option<Arc<Model>>,
 }
 
 impl From<Display> for Target {
@@ -51,6 +56,7 @@ impl From<Display> for Target {
             correction: None,
             panel: Panel::default(),
             registration: Registration::default(),
+            model: None,
         }
     }
 }
@@ -73,7 +79,8 @@ impl Target {
     ///
     /// # Errors
     /// Returns an error if a table or a map is for another modulator or number of lasers, if a table is given for a
-    /// display of more than 8 bits, or if the panel or the registration is invalid.
+    /// display of more than 8 bits, or if the panel or the registration is invalid, or if the
+    /// panel of a learned model adds phases.
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         let colours = self.display.colours();
@@ -85,6 +92,15 @@ impl Target {
         }
         if let Some(correction) = &self.correction {
             check_colours("the correction", correction.coefficients().len(), colours)?;
+        }
+        if let Some(model) = &self.model {
+            check_colours("the learned model", model.colours().len(), colours)?;
+            if !self.panel.is_plain() {
+                return Err(Error::Setting(
+                    "a learned model is for a panel without carrier, lens, flatness and range over 2π; leave one out"
+                        .into(),
+                ));
+            }
         }
         let shape = (self.display.height(), self.display.width());
         if let Some(other) = self.response.shape()

@@ -389,6 +389,20 @@ impl Propagator {
             .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
     }
 
+    /// Filters `plane`, (H, W), on the padded plane of this propagation: `filter` replaces its transfer function. Does not
+    /// allocate.
+    ///
+    /// # Panics
+    /// Panics in the cases of [`Self::propagate`].
+    pub fn convolve(
+        &self,
+        plane: &mut [Complex32],
+        filter: impl Fn(usize, &mut [Complex32]) + Sync,
+        scratch: &mut ConvolveScratch,
+    ) {
+        self.fft.convolve(plane, filter, scratch);
+    }
+
     /// Propagates like [`Self::propagate`] through an aperture of `radius`, where 1 reaches the Nyquist frequency.
     ///
     /// # Panics

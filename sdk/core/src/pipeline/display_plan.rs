@@ -10,6 +10,7 @@ use crate::display::response;
 use crate::display::target::Target;
 use crate::encode::brightness::{Brightness, Past, Percentile};
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
+use crate::encode::modelled::{ModelScratch, ModelSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
 use crate::optics::asm::Propagator;
 use crate::optics::fft::ConvolveScratch;
@@ -31,6 +32,8 @@ pub struct DisplayPlan {
     registration: Option<RegistrationPlan>,
     encoder: Encoder,
     midpoint: Option<MidpointSteps>,
+    /// Takes the place of `midpoint` on a display with a learned model.
+    modelled: Option<ModelSteps>,
     panel: Option<PanelPlan>,
     bits: u32,
     keeps_phase: bool,
@@ -44,6 +47,7 @@ pub struct DisplayScratch {
     moved: Vec<Complex32>,
     encoder: EncoderScratch,
     midpoint: Option<MidpointScratch>,
+    modelled: Option<ModelScratch>,
     /// Phases in memory before they are converted to levels. Empty if the encoder writes levels directly.
     phases: Vec<f32>,
     percentile: Percentile,
@@ -56,6 +60,9 @@ impl DisplayScratch {
         self.encoder.set_cancel(cancel);
         if let Some(midpoint) = &mut self.midpoint {
             midpoint.set_cancel(cancel);
+        }
+        if let Some(modelled) = &mut self.modelled {
+            modelled.set_cancel(cancel);
         }
         self.cancel = cancel.clone();
     }
@@ -99,9 +106,10 @@ impl DisplayPlan {
             registration: RegistrationPlan::new(shape, colours, &target.registration)?,
             encoder: Encoder::new(shape, target, options)?,
             midpoint: match options.midpoint_steps {
-                0 => None,
-                steps => Some(MidpointSteps::new(shape, target, steps)?),
+                steps if steps > 0 && target.model.is_none() => Some(MidpointSteps::new(shape, target, steps)?),
+                _ => None,
             },
+            modelled: ModelSteps::new(shape, target, options.midpoint_steps)?,
             panel: PanelPlan::new(&target.panel, &target.display, shape)?,
             bits: target.display.bits(),
             keeps_phase: options.encoding.keeps_phase(),
@@ -135,6 +143,7 @@ impl DisplayPlan {
                 Some(_) => vec![Complex32::ZERO; self.height * self.width],
             },
             midpoint: self.midpoint.as_ref().map(MidpointSteps::scratch),
+            modelled: self.modelled.as_ref().map(ModelSteps::scratch),
             phases: if self.needs_phases() || self.bits > 8 {
                 vec![0.0; self.colours * self.height * self.width]
             } else {
@@ -147,7 +156,7 @@ impl DisplayPlan {
 
     /// Returns whether bytes are made from phases in memory rather than directly from the field.
     fn needs_phases(&self) -> bool {
-        self.midpoint.is_some() || self.panel.is_some()
+        self.midpoint.is_some() || self.modelled.is_some() || self.panel.is_some()
     }
 
     /// Propagates `field`, (C, H, W), to the modulator in place. Allocates nothing.
@@ -228,10 +237,18 @@ impl DisplayPlan {
         if let Some((plan, of)) = &mut midpoint {
             plan.keep(field, past.map(|past| past.scale), of);
         }
+        let mut modelled = self.modelled.as_ref().zip(scratch.modelled.as_mut());
+        if let Some((plan, of)) = &mut modelled {
+            plan.keep(field, of);
+        }
         let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
         if let Some((plan, of)) = midpoint {
             let _stage = stage!("midpoint");
             plan.correct(scale, phases, of);
+        }
+        if let Some((plan, of)) = modelled {
+            let _stage = stage!("learned model");
+            plan.correct(phases, of);
         }
         if let Some(panel) = &self.panel {
             panel.add(phases);

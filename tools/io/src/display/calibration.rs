@@ -1,6 +1,8 @@
-//! The calibration files that a display file refers to: the per-pixel table, the laser map and the aberrations.
+//! The calibration files that a display file refers to: the per-pixel table, the laser map, the aberrations
+//! and the learned model.
 //!
 //! * The table holds the bytes of [`phasefront_core::display::response::per_pixel`].
+//! * The learned model holds the bytes of [`phasefront_core::display::model`].
 //! * The laser map is an 8- or 16-bit PNG, RGB, or grey for one laser. It holds the lasers' amplitudes at nodes spread
 //!   evenly from the first to the last pixel of each axis. Each colour has an arbitrary scale.
 //! * The aberrations are TOML with one `[[at]]` for each calibrated distance, sorted by ascending z. Each has the
@@ -25,6 +27,7 @@ use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
 use phasefront::Display;
 use phasefront::target::{Aberration, Illumination};
+use phasefront_core::display::model::Model;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::optics::zernike::{Aberrations, Coefficients};
 use phasefront_core::runtime::keys;
@@ -47,6 +50,23 @@ pub fn read_per_pixel(path: &Path) -> Result<PerPixel> {
 /// Returns an error if the file cannot be written.
 pub fn write_per_pixel(path: &Path, table: &PerPixel) -> Result<()> {
     write_atomically(path, |file| file.write_all(&table.to_bytes()))
+}
+
+/// Reads a learned model.
+///
+/// # Errors
+/// Returns an error if the file is missing or is not a learned model.
+pub fn read_model(path: &Path) -> Result<Model> {
+    let bytes = input::bytes(path, MOST_ARRAY)?;
+    Model::from_bytes(&bytes).map_err(|e| Error::file(path, e))
+}
+
+/// Writes a learned model.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write_model(path: &Path, model: &Model) -> Result<()> {
+    write_atomically(path, |file| file.write_all(&model.to_bytes()))
 }
 
 /// Reads a laser map.

@@ -2,11 +2,12 @@
 //! results of a calibration.
 //!
 //! The file contains `PFCALIB1`, the length of a TOML text as u32, the text, the lasers' gains as f32, (C, Gh, Gw), the
-//! flatness maps as u16, (1 or 3, H, W), and the bytes of the per-pixel table. All numbers are little-endian.
+//! flatness maps as u16, (1 or 3, H, W), the bytes of the learned model, and those of the per-pixel table. All numbers are little-endian.
 
 use super::Target;
 use crate::display::Display;
 use crate::display::illumination::Illumination;
+use crate::display::model::Model;
 use crate::display::panel::{Flatness, Panel};
 use crate::display::registration::Registration;
 use crate::display::response::Response;
@@ -30,6 +31,9 @@ struct Header {
     /// The number of bytes of the per-pixel table.
     #[serde(default)]
     per_pixel: usize,
+    /// The number of bytes of the learned model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    model: Option<usize>,
     /// The grid of the laser map, Gh and Gw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     laser: Option<[usize; 2]>,
@@ -54,6 +58,27 @@ struct Header {
 
 fn refuse(what: impl std::fmt::Display) -> Error {
     Error::Setting(format!("calibration file: {what}"))
+}
+
+/// Returns the response of a file with `header` and the bytes of a per-pixel `table`.
+fn response(header: &Header, table: &[u8]) -> Result<Response> {
+    match (&header.lut, table) {
+        (None, []) => match &header.levels_turns {
+            None => Ok(Target::from(&header.display).response),
+            Some(turns) => Response::of_turns(turns),
+        },
+        (Some(levels), []) => {
+            let levels = levels.as_slice().try_into().map_err(|_| {
+                refuse(format!(
+                    "holds {} levels of a look-up table; there are 256",
+                    levels.len()
+                ))
+            })?;
+            Ok(Response::lut(levels))
+        }
+        (None, table) => Ok(Response::PerPixel(Arc::new(PerPixel::from_bytes(table)?))),
+        (Some(_), _) => Err(refuse("holds both a table and one for each pixel")),
+    }
 }
 
 impl Target {
@@ -84,7 +109,8 @@ impl Target {
         let (laser, rest) = (rest.split_at_checked(4 * colours * rows * columns)).ok_or_else(short)?;
         let modulator = (header.display.height(), header.display.width());
         let values = maps * modulator.0 * modulator.1;
-        let (flatness, table) = rest.split_at_checked(2 * values).ok_or_else(short)?;
+        let (flatness, rest) = rest.split_at_checked(2 * values).ok_or_else(short)?;
+        let (model, table) = (rest.split_at_checked(header.model.unwrap_or_default())).ok_or_else(short)?;
         if table.len() != header.per_pixel {
             return Err(refuse(format!(
                 "holds {} bytes of a table, its header says {}",
@@ -102,22 +128,7 @@ impl Target {
                 Some(Illumination::new(amplitude)?)
             }
         };
-        let response = match (header.lut, table) {
-            (None, []) => match &header.levels_turns {
-                None => Target::from(&header.display).response,
-                Some(turns) => Response::of_turns(turns)?,
-            },
-            (Some(levels), []) => {
-                let count = levels.len();
-                Response::lut(
-                    levels
-                        .try_into()
-                        .map_err(|_| refuse(format!("holds {count} levels of a look-up table; there are 256")))?,
-                )
-            }
-            (None, table) => Response::PerPixel(Arc::new(PerPixel::from_bytes(table)?)),
-            (Some(_), _) => return Err(refuse("holds both a table and one for each pixel")),
-        };
+        let response = response(&header, table)?;
         let target = Target {
             display: header.display,
             response,
@@ -138,6 +149,10 @@ impl Target {
             registration: Registration {
                 shift_px: header.shift_px.unwrap_or_default(),
                 scale: header.scale.unwrap_or_default(),
+            },
+            model: match header.model {
+                None => None,
+                Some(_) => Some(Model::from_bytes(model).map_err(refuse)?.into()),
             },
         };
         target.check().map_err(refuse)?;
@@ -163,9 +178,11 @@ impl Target {
             Response::Lut { level, .. } => (Some(level.to_vec()), vec![]),
             Response::PerPixel(table) => (None, table.to_bytes()),
         };
+        let model = self.model.as_ref().map(|model| model.to_bytes());
         let header = Header {
             lut,
             per_pixel: table.len(),
+            model: model.as_ref().map(Vec::len),
             laser: (self.illumination.as_ref()).map(|light| [light.nodes().0, light.nodes().1]),
             correction: (self.correction.as_ref()).map(|correction| correction.coefficients().to_vec()),
             carrier_rad: Some(*carrier_rad).filter(|rad| *rad != [0.0; 2]),
@@ -186,6 +203,7 @@ impl Target {
         bytes.extend(gains.flat_map(|gain| gain.to_le_bytes()));
         let maps = flatness.iter().flat_map(|flatness| flatness.maps());
         bytes.extend(maps.flat_map(|turns| turns.to_le_bytes()));
+        bytes.extend(model.into_iter().flatten());
         bytes.extend(table);
         Ok(bytes)
     }
@@ -195,6 +213,7 @@ impl Target {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::display::model::ColourModel;
     use crate::display::response::per_pixel::nodes;
     use ndarray::Array3;
 
@@ -228,6 +247,7 @@ mod tests {
                 shift_px: [[0.5, 0.0], [0.0, 0.0], [-1.0, 2.25]][..colours].into(),
                 scale: [1.001, 1.0, 0.998][..colours].into(),
             },
+            model: None,
         }
     }
 
@@ -265,6 +285,25 @@ mod tests {
             assert_eq!(got.response, response);
             assert!(got.illumination.is_none() && got.correction.is_none());
         }
+        // A learned model comes before the table.
+        let nodes = (2, 3);
+        let models = vec![ColourModel::ideal(nodes); want.display.colours()];
+        let modelled = Target {
+            model: Some(Model::new(nodes, models).unwrap().into()),
+            panel: Panel::default(),
+            ..want.clone()
+        };
+        let got = Target::from_bytes(&modelled.to_bytes().unwrap()).unwrap();
+        assert_eq!(
+            (got.model, got.response),
+            (modelled.model.clone(), modelled.response.clone())
+        );
+        let with_lens = Target {
+            panel: want.panel.clone(),
+            ..modelled
+        };
+        let error = with_lens.to_bytes().unwrap_err().to_string();
+        assert!(error.contains("without carrier, lens"), "{error}");
         // The response follows from the phases of the levels.
         let turns = [0.0, 0.1, 0.4, 0.8];
         let of_levels = Target {
