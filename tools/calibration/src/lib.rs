@@ -6,7 +6,8 @@
 //! * [`optics::laser`] computes the map of the laser's amplitude.
 //! * [`optics::spot`] finds the coefficients of an aberration from photographs of a focused spot, using the model of
 //!   [`optics::pupil`].
-//! * [`rehearse`] does all three on a simulated display.
+//! * [`learned`] fits a model of what is left to photographs of holograms.
+//! * [`rehearse`] does all of it on a simulated display.
 //!
 //! [`phasefront_io::display::calibration`] reads and writes the calibration files. [`curves::report`] and
 //! [`curves::chart`] produce the figures and charts.
@@ -14,6 +15,7 @@
 pub mod camera;
 mod cholesky;
 pub mod curves;
+pub mod learned;
 pub mod optics;
 pub mod rehearse;
 pub mod simulated_display;

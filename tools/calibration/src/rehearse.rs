@@ -1,5 +1,8 @@
 //! A complete calibration of a simulated display, compared with the true values that only a simulation knows.
 
+pub mod learned;
+
+use self::learned::Learned;
 use crate::camera::marks;
 use crate::camera::pattern::{PATTERNS, Pattern};
 use crate::camera::photograph::Photograph;
@@ -27,6 +30,9 @@ use std::f64::consts::TAU;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+/// The level that makes marks dark on a display with faults.
+const FAULTY_DARK: u8 = 140;
+
 /// The settings of a rehearsal.
 #[derive(Debug, Clone)]
 pub struct Rehearsal {
@@ -40,6 +46,9 @@ pub struct Rehearsal {
     pub spot_z_m: f64,
     /// Whether all photographs of the patterns are kept.
     pub keep_captures: bool,
+    /// The numbers of photographs from which a model of a display with faults is learned, in ascending order; none for a
+    /// display without faults. The display must have one laser.
+    pub learn: Vec<usize>,
 }
 
 /// A value for each colour, before and after calibration.
@@ -70,6 +79,12 @@ pub struct Outcome {
     pub found_coefficients: Vec<Coefficients>,
     /// The number of photographs taken.
     pub photographs: usize,
+    /// The PSNR of unseen holograms for each of [`learned::JUDGED`], in dB, calibrated without a learned model.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub psnr_db: Vec<f64>,
+    /// What the learned models are worth.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub learned: Vec<Learned>,
 }
 
 /// Calibrates a simulated display. Writes the four calibration files, `outcome.json`, pictures and charts to `folder`.
@@ -83,8 +98,15 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
     let stage = Stage {
         rehearsal,
         folder,
-        pattern: Pattern::new(display.height(), display.width())?,
-        simulated: SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
+        pattern: match rehearsal.learn[..] {
+            [] => Pattern::new(display.height(), display.width())?,
+            // Crosstalk brightens the marks, and takes more phase to make them dark.
+            _ => Pattern::new(display.height(), display.width())?.with_dark(FAULTY_DARK),
+        },
+        simulated: match rehearsal.learn[..] {
+            [] => SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
+            _ => SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?.with_faults(),
+        },
         progress,
     };
     // The search for aberrations comes last and would otherwise fail only there.
@@ -100,10 +122,11 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
     let calibrated = Response::PerPixel(per_pixel.into());
     let laser_map = stage.laser_map()?;
     let aberrations = stage.aberrations(&calibrated)?;
-    write_display(&folder.join("display.toml"), display)?;
+    write_display(&folder.join("display.toml"), display, "")?;
 
     let worth = stage.worth(&calibrated)?;
     stage.pictures(&calibrated, &laser_map, &aberrations.spots)?;
+    let (psnr_db, learned) = stage.learned(&aberrations)?;
     let Aberrations { truth, found, .. } = aberrations;
     let outcome = Outcome {
         lut,
@@ -121,6 +144,8 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
         true_coefficients: truth,
         found_coefficients: found,
         photographs: display.colours() * (PATTERNS + 1) + aberrations.photographs,
+        psnr_db,
+        learned,
     };
     let path = folder.join("outcome.json");
     let text = serde_json::to_string_pretty(&outcome).map_err(|e| Error::file(&path, e))?;
@@ -341,6 +366,29 @@ impl Stage<'_> {
         })
     }
 
+    /// Learns a model from each number of photographs, and returns what is displayed without a model and with them. Writes
+    /// the last model.
+    fn learned(&self, aberrations: &Aberrations) -> Result<(Vec<f64>, Vec<Learned>)> {
+        if self.rehearsal.learn.is_empty() {
+            return Ok((vec![], vec![]));
+        }
+        let path = self.folder.join("display.toml");
+        let simulated = (self.simulated.clone()).with_aberration(Aberration::new(aberrations.truth.clone())?);
+        let target = display::read_display(&path)?.corrected()?;
+        let without = learned::judge(&simulated, &target, 0)?;
+        let mut all = Vec::new();
+        for count in &self.rehearsal.learn {
+            let samples = learned::photographs(&simulated, &target, 0, *count)?;
+            let (target, learned) = learned::learn(&simulated, &target, &samples)?;
+            if let Some(model) = &target.model {
+                calibration::write_model(&self.folder.join("model.pfm"), model)?;
+            }
+            all.push(learned);
+        }
+        write_display(&path, &self.rehearsal.display, "model = \"model.pfm\"\n")?;
+        Ok((without, all))
+    }
+
     fn pictures(&self, calibrated: &Response, laser_map: &Array3<f32>, spots: &[Photograph; 2]) -> Result<()> {
         let (folder, display) = (self.folder, &self.rehearsal.display);
         let side = (24.0 * self.rehearsal.zoom) as usize;
@@ -362,8 +410,8 @@ fn apart(a: &Coefficients, b: &Coefficients) -> Coefficients {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// Writes the display file, which refers to the others.
-fn write_display(path: &Path, display: &Display) -> Result<()> {
+/// Writes the display file, which refers to the others, with `more` lines.
+fn write_display(path: &Path, display: &Display, more: &str) -> Result<()> {
     // JSON and TOML have the same syntax for numbers and for lists of them.
     let values = serde_json::to_value(display).map_err(|e| Error::file(path, e))?;
     let mut text = String::new();
@@ -371,6 +419,7 @@ fn write_display(path: &Path, display: &Display) -> Result<()> {
         text.push_str(&format!("{key} = {value}\n"));
     }
     text.push_str("per_pixel = \"table.pfp\"\nlaser = \"laser.png\"\naberration = \"aberration.toml\"\n");
+    text.push_str(more);
     output::write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 

@@ -142,6 +142,16 @@ impl Registration {
         out
     }
 
+    /// Returns the light of `photograph` at the middle of each pixel of the modulator, (H, W), as a fraction of the sensor's
+    /// range.
+    pub fn centres(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
+        let scale = 1.0 / f32::from(photograph.full);
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            let [u, v] = self.map.map([x as f64 + 0.5, y as f64 + 0.5]);
+            photograph.sample(u, v) * scale
+        })
+    }
+
     /// Returns the median of the light around the modulator, as a fraction of the sensor's range. This is the ambient
     /// light.
     pub fn surroundings(&self, photograph: &Photograph, (height, width): (usize, usize)) -> f32 {

@@ -4,6 +4,7 @@ mod aberration;
 mod capture;
 mod laser;
 mod lut;
+mod model;
 mod pack;
 mod rehearse;
 
@@ -18,6 +19,7 @@ pub(crate) enum Calibrate {
     Lut(lut::Lut),
     Laser(laser::Laser),
     Aberration(aberration::Aberration),
+    Model(model::LearnModel),
     Pack(pack::Pack),
     Rehearse(rehearse::Rehearse),
 }
@@ -28,6 +30,7 @@ impl Calibrate {
             Calibrate::Lut(command) => command.run(json),
             Calibrate::Laser(command) => command.run(json),
             Calibrate::Aberration(command) => command.run(json),
+            Calibrate::Model(command) => command.run(json),
             Calibrate::Pack(command) => command.run(json),
             Calibrate::Rehearse(command) => command.run(json),
         }

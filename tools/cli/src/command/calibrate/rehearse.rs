@@ -3,8 +3,9 @@
 use clap::Args;
 use phasefront::Display;
 use phasefront_calibration::colours;
+use phasefront_calibration::rehearse::learned::JUDGED;
 use phasefront_calibration::rehearse::{self, Rehearsal};
-use phasefront_command::flags::{OverwriteFlag, parse_size};
+use phasefront_command::flags::{OverwriteFlag, check_used, parse_size};
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::output;
 use phasefront_io::{Error, Result};
@@ -33,6 +34,10 @@ pub(crate) struct Rehearse {
     /// Keep all photographs, as input for `calibrate lut` and `calibrate laser`
     #[arg(long)]
     captures: bool,
+    /// Give the display faults that no calibration knows, and learn a model of them from so many photographs; needs
+    /// --laser-nm
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(4..=1000))]
+    learn: Vec<u16>,
     /// Output folder
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
@@ -43,6 +48,7 @@ pub(crate) struct Rehearse {
 impl Rehearse {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let (width, height) = self.size;
+        check_used(&[("--learn", !self.learn.is_empty(), self.laser_nm.is_some(), "--laser-nm")])?;
         let laser = (self.laser_nm).map_or(String::new(), |nm| format!("wavelengths_nm = [{nm:?}]"));
         let rehearsal = Rehearsal {
             display: Display::from_toml(&(format!("width = {width}\nheight = {height}\n") + &laser))?,
@@ -50,6 +56,7 @@ impl Rehearse {
             seed: self.seed,
             spot_z_m: self.spot_z_mm / 1e3,
             keep_captures: self.captures,
+            learn: self.learn.iter().map(|count| usize::from(*count)).collect(),
         };
         let names = colours(&rehearsal.display).join(" / ");
         output::folder(&self.output, self.overwrite.holding())?;
@@ -66,7 +73,7 @@ impl Rehearse {
             };
             format!("{what:<34}{:>24}   {:>24}", list(&of.before), list(&of.after))
         };
-        let text = [
+        let mut text = vec![
             format!("{:<34}{:>24}   {:>24}", names, "before", "after"),
             line("phase error, rad RMS", &outcome.phase_error_rad, 3),
             line("black against white, dB", &outcome.black_db, 1),
@@ -76,8 +83,36 @@ impl Rehearse {
             outcome.lut.text(),
             format!("{} photographs; {}", outcome.photographs, terminal::name(&self.output)),
         ];
+        if !outcome.psnr_db.is_empty() {
+            text.push(learned(&outcome));
+        }
         let value = serde_json::to_value(&outcome).map_err(|e| Error::file(&self.output, e))?;
         terminal::print(json, &value, text.join("\n"));
         Ok(())
     }
+}
+
+/// Returns a table of what learned models are worth.
+fn learned(outcome: &rehearse::Outcome) -> String {
+    let row = |name: String, misfit: String, psnr: &[f64]| {
+        let all: String = psnr.iter().map(|db| format!("{db:>12.1}")).collect();
+        format!("{name:<16}{misfit:>8}{all}")
+    };
+    let head: String = (JUDGED.iter())
+        .map(|(steps, z_m)| format!("{:>12}", format!("{steps} @ {} mm", z_m * 1e3)))
+        .collect();
+    let mut lines = vec![
+        String::new(),
+        "PSNR of unseen holograms, dB, by midpoint steps and z".to_owned(),
+        format!("{:<16}{:>8}{head}", "photographs", "misfit"),
+        row("no model".into(), String::new(), &outcome.psnr_db),
+    ];
+    for one in &outcome.learned {
+        lines.push(row(
+            one.photographs.to_string(),
+            format!("{:.3}", one.misfit[1]),
+            &one.psnr_db,
+        ));
+    }
+    lines.join("\n")
 }

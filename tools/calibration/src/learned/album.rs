@@ -1,0 +1,140 @@
+//! The photographs of holograms, checked when they come.
+
+use super::gradient::{BORDER, Path};
+use super::scenes::Scene;
+use crate::camera::marks::Registration;
+use crate::camera::pattern::Pattern;
+use crate::camera::photograph::Photograph;
+use ndarray::Array2;
+use phasefront::Target;
+use phasefront_core::display::model::ColourModel;
+use phasefront_io::Result;
+
+/// The share of saturated pixels above which a photograph cannot be used.
+const SATURATED: f64 = 1e-3;
+/// The contrast, standard deviation over mean, below which a photograph shows nothing.
+const CONTRAST: f64 = 0.05;
+/// The least correlation of a photograph's details with those of an ideal display.
+const LIKENESS: f64 = 0.3;
+/// The nodes of the ideal model.
+const NODES: (usize, usize) = (2, 2);
+
+/// Checks the photographs of one colour, in the order of their holograms.
+pub struct Album<'a> {
+    target: &'a Target,
+    colour: usize,
+    marks: Registration,
+    size: (usize, usize),
+    path: Option<(f64, Path)>,
+    /// The phases of the hologram before.
+    before: Option<Array2<f32>>,
+}
+
+impl<'a> Album<'a> {
+    /// Begins with the photograph of the marks.
+    ///
+    /// # Errors
+    /// Returns the reason why it cannot be used.
+    pub fn new(target: &'a Target, colour: usize, marks: &Photograph) -> std::result::Result<Self, String> {
+        unsaturated(marks)?;
+        let (height, width) = target.modulator();
+        let pattern = Pattern::new(height, width).map_err(|e| e.to_string())?;
+        Ok(Album {
+            target,
+            colour,
+            marks: Registration::find(marks, &pattern).map_err(|e| e.to_string())?,
+            size: (marks.height, marks.width),
+            path: None,
+            before: None,
+        })
+    }
+
+    /// Returns where the modulator is in the photographs.
+    pub fn registration(&self) -> Registration {
+        self.marks
+    }
+
+    /// Checks the photograph of `scene`.
+    ///
+    /// # Errors
+    /// Returns the reason why it cannot be used.
+    pub fn check(&mut self, scene: &Scene, photograph: &Photograph) -> std::result::Result<(), String> {
+        if (photograph.height, photograph.width) != self.size {
+            return Err(format!(
+                "is {}×{}, the photograph of the marks is {}×{}; both must be of one size",
+                photograph.width, photograph.height, self.size.1, self.size.0
+            ));
+        }
+        unsaturated(photograph)?;
+        let light = self.marks.centres(photograph, self.target.modulator());
+        let mean = f64::from(light.mean().unwrap_or_default());
+        if f64::from(light.std(0.0)) < CONTRAST * mean || mean <= 0.0 {
+            return Err("shows nothing; switch the laser on, open the shutter, and photograph it again".into());
+        }
+        let likeness = self
+            .likeness(scene.z_m, &scene.phases, &light)
+            .map_err(|e| e.to_string())?;
+        let before = match &self.before {
+            Some(before) if likeness < LIKENESS => self.likeness_of_last(before, &light),
+            _ => -1.0,
+        };
+        if likeness >= LIKENESS {
+            self.before = Some(scene.phases.clone());
+            return Ok(());
+        }
+        Err(if before > LIKENESS {
+            "shows the hologram before it; wait until the modulator shows the next, and photograph it again".into()
+        } else {
+            format!(
+                "does not show its hologram where the marks were (correlation {likeness:.2}, at least {LIKENESS} is needed); keep camera and focus in place, and photograph it again"
+            )
+        })
+    }
+
+    /// Returns the correlation of `light` with what an ideal display shows of `phases` at `z_m`.
+    fn likeness(&mut self, z_m: f64, phases: &Array2<f32>, light: &Array2<f32>) -> Result<f64> {
+        if self.path.as_ref().is_none_or(|(z, _)| *z != z_m) {
+            self.path = Some((z_m, Path::new(self.target, self.colour, z_m)?));
+        }
+        Ok(self.likeness_of_last(phases, light))
+    }
+
+    /// Returns the correlation at the z of the last photograph, or -1 if there is none.
+    fn likeness_of_last(&self, phases: &Array2<f32>, light: &Array2<f32>) -> f64 {
+        let Some(((_, path), phases)) = self.path.as_ref().zip(phases.as_slice()) else {
+            return -1.0;
+        };
+        likeness(
+            &path.expected(&ColourModel::ideal(NODES), NODES, phases, light).light,
+            light,
+        )
+    }
+}
+
+/// Returns the correlation of the details of two pictures: of the differences of pixels that are two apart. The laser's
+/// profile is no detail.
+fn likeness(a: &Array2<f32>, b: &Array2<f32>) -> f64 {
+    let (height, width) = a.dim();
+    let [mut both, mut of_a, mut of_b] = [0.0f64; 3];
+    for y in BORDER..height - BORDER {
+        for x in BORDER..width - BORDER {
+            for other in [(y, x + 2), (y + 2, x)] {
+                let [da, db] = [a, b].map(|of| f64::from(of[other] - of[(y, x)]));
+                both += da * db;
+                of_a += da * da;
+                of_b += db * db;
+            }
+        }
+    }
+    both / (of_a * of_b).max(f64::MIN_POSITIVE).sqrt()
+}
+
+fn unsaturated(photograph: &Photograph) -> std::result::Result<(), String> {
+    match photograph.saturated() {
+        share if share > SATURATED => Err(format!(
+            "{:.1} % of the photograph is saturated; shorten the exposure",
+            100.0 * share
+        )),
+        _ => Ok(()),
+    }
+}
