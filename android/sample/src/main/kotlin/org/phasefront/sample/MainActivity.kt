@@ -197,7 +197,7 @@ class MainActivity : Activity() {
         val found = getSystemService(DisplayManager::class.java).getDisplays(DisplayManager.DISPLAY_CATEGORY_PRESENTATION)
         if (output?.display?.displayId == found.firstOrNull()?.displayId) return
         output?.dismiss()
-        output = found.firstOrNull()?.let { PhaseOutput(this, it).apply { show() } }
+        output = found.firstOrNull()?.let { PhaseOutput(this, it, hologramDisplay.width, hologramDisplay.height).apply { show() } }
         needsLevels = output != null
     }
 

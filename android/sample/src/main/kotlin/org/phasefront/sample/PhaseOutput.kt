@@ -9,12 +9,19 @@ import android.os.Bundle
 import android.view.Display
 import android.view.View
 
-/** Shows the modulator's levels on an external screen, pixel for pixel. The screen drives the modulator. */
-class PhaseOutput(context: Context, display: Display) : Presentation(context, display) {
+/**
+ * Shows the levels of a modulator of [width]×[height] pixels on an external screen, pixel for pixel. The screen drives
+ * the modulator.
+ */
+class PhaseOutput(context: Context, display: Display, private val width: Int, private val height: Int) :
+    Presentation(context, display) {
     private val view = LevelsView(getContext())
 
     override fun onCreate(savedInstanceState: Bundle?) {
         super.onCreate(savedInstanceState)
+        // In another mode the screen would scale the levels.
+        val mode = display.supportedModes.firstOrNull { it.physicalWidth == width && it.physicalHeight == height }
+        mode?.let { window?.run { attributes = attributes.apply { preferredDisplayModeId = it.modeId } } }
         setContentView(view)
     }
 

@@ -71,7 +71,9 @@ class ActivitiesTest {
     fun levelsReachAScreenUnchanged() {
         val activity = Robolectric.buildActivity(Activity::class.java).setup().get()
         @Suppress("DEPRECATION")
-        val output = PhaseOutput(activity, activity.windowManager.defaultDisplay).apply { create() }
+        val display = activity.windowManager.defaultDisplay
+        val output = display.mode.run { PhaseOutput(activity, display, physicalWidth, physicalHeight) }.apply { create() }
+        assertEquals(display.mode.modeId, output.window?.attributes?.preferredDisplayModeId)
         val levels = Bitmaps(6, 4).next()
         for (y in 0 until 4) for (x in 0 until 6) levels.setPixel(x, y, Color.rgb(41 * x, 255 - 60 * y, 7 * x * y))
         output.show(levels)
