@@ -4,7 +4,7 @@ use crate::error::{Answer, of_core};
 use crate::hologram::{RawHologram, copied, size};
 use crate::target::RawTarget;
 use js_sys::{Object, Uint8Array};
-use phasefront::output::ModulatorSpec;
+use phasefront::output::{Layout, ModulatorSpec};
 use wasm_bindgen::prelude::*;
 
 /// A modulator.
@@ -64,6 +64,22 @@ impl RawModulator {
         let row = all.width * all.pixel_bytes;
         copied(to, row_stride, (all.height, row), |bytes| {
             input.write(hologram.output_levels(), image as usize, bytes, row)
+        })
+    }
+
+    /// Writes the same image in the pixels of a screen that drives the modulator, red, green, blue and alpha. The red,
+    /// green and blue of a grey image are its level.
+    ///
+    /// # Errors
+    /// Throws an error of kind `setting` in the cases of [`Self::write_output`], and for images of 16 bits.
+    #[wasm_bindgen(js_name = writePixels)]
+    pub fn write_pixels(&self, hologram: &RawHologram, image: u32, to: &Uint8Array, row_stride: u32) -> Answer<()> {
+        let hologram = &hologram.core;
+        let input = self.0.input(hologram.shape(), hologram.target()).map_err(of_core)?;
+        let all = self.0.output_size();
+        let row = 4 * all.width;
+        copied(to, row_stride, (all.height, row), |bytes| {
+            input.write_pixels(hologram.output_levels(), image as usize, Layout::Rgba, bytes, row)
         })
     }
 }

@@ -93,5 +93,9 @@ export async function run() {
   count("writeOutput", PLANE - 1, () => hologram.writeOutput({ layout: "rgba" }, pixels.data));
   count("writePreview", PLANE - 1, () => hologram.writePreview(0, pixels));
   count("writeOutput of a modulator", PLANE - 1, () => modulator.writeOutput(hologram, rgb));
+  count("writePixels of a modulator", PLANE - 1, () => modulator.writePixels(hologram, pixels.data));
+  modulator.writeOutput(hologram, rgb);
+  const wrong = pixels.data.findIndex((value, i) => value !== (i % 4 < 3 ? rgb[3 * (i >> 2) + (i % 4)] : 255));
+  if (wrong >= 0) throw new Error(`byte ${wrong} of the pixels is not that of the image`);
   return `bytes of new buffers: ${said.join(", ")}`;
 }

@@ -52,4 +52,17 @@ export class Modulator {
     const bytes = bytesOf("the image", to, "setting");
     hologram.call((raw) => this.#raw.writeOutput(raw, index, bytes, stride));
   }
+
+  /**
+   * Writes the same image in the pixels of a screen that drives the modulator into `to`, for example the data of an
+   * `ImageData` of the size {@link outputSize}. The red, green and blue of a grey image are its level.
+   *
+   * @throws PhasefrontError `setting`: as {@link writeOutput}, and for a modulator whose images have 16 bits.
+   */
+  writePixels(hologram: Hologram, to: Uint8Array | Uint8ClampedArray, options: OutputOptions = {}): void {
+    const index = whole("the image", options.image ?? 0);
+    const stride = whole("the row stride", options.rowStride ?? 4 * this.outputSize.width);
+    const bytes = bytesOf("the image", to, "setting");
+    hologram.call((raw) => this.#raw.writePixels(raw, index, bytes, stride));
+  }
 }
