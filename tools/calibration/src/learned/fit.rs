@@ -23,6 +23,8 @@ const REGISTER: usize = 20;
 /// The largest change of a value in a step: of the curve and the maps, and of the crosstalk.
 const RATE: f32 = 0.02;
 const CROSSTALK_RATE: f32 = 0.004;
+/// The least slope of the phase curve.
+const LEAST_SLOPE: f32 = 0.05;
 /// The decay of Adam's means.
 const MEANS: [f32; 2] = [0.9, 0.99];
 /// The number of pixels between two nodes of the maps over the modulator, and their largest number along an axis.
@@ -93,6 +95,7 @@ pub fn fit(target: &Target, colour: usize, samples: &[Sample], progress: &dyn Fn
         }
         let others: f32 = (0..9).filter(|i| *i != 4).map(|i| values[CURVE + i]).sum();
         values[CURVE + 4] = 1.0 - others;
+        keep_rising(&mut values[..CURVE]);
     }
     let model = ColourModel::from_values(&values);
     let after = all.misfit(&model);
@@ -105,6 +108,18 @@ pub fn fit(target: &Target, colour: usize, samples: &[Sample], progress: &dyn Fn
         model,
         misfit: [before, after],
     })
+}
+
+/// Bounds the errors of a phase curve such that the curve rises everywhere, from its middle outward. Where a table gives
+/// all phases out of reach the same level, the best curve would be flat.
+fn keep_rising(curve: &mut [f32]) {
+    let most = (1.0 - LEAST_SLOPE) * std::f32::consts::TAU / (CURVE - 1) as f32;
+    for k in CURVE / 2..CURVE - 1 {
+        curve[k + 1] = curve[k + 1].max(curve[k] - most);
+    }
+    for k in (0..CURVE / 2).rev() {
+        curve[k] = curve[k].min(curve[k + 1] + most);
+    }
 }
 
 /// The photographs of a fit, at the pixels of the modulator.
@@ -200,5 +215,28 @@ impl<'a> Fit<'a> {
             CURVE + 9 + 2 * PUPIL * PUPIL + 4 * self.nodes.0 * self.nodes.1
         );
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_that_falls_is_kept_rising_and_another_stays() {
+        let mut falls: [f32; CURVE] = std::array::from_fn(|k| if k < 3 { 2.0 } else { -0.6 * k as f32 });
+        keep_rising(&mut falls);
+        let colour = ColourModel {
+            curve: falls,
+            ..ColourModel::ideal((2, 2))
+        };
+        for k in 0..160 {
+            let phase = (k as f32 + 0.5) / 160.0 * std::f32::consts::TAU;
+            assert!(colour.response(phase).1 > 0.04, "{k}");
+        }
+        let rises: [f32; CURVE] = std::array::from_fn(|k| 0.2 * (k as f32 * 0.7).sin());
+        let mut same = rises;
+        keep_rising(&mut same);
+        assert_eq!(same, rises);
     }
 }
