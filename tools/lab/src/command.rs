@@ -5,6 +5,7 @@ mod evaluate;
 mod occlusion;
 mod scene;
 mod seeds;
+mod sensors;
 mod study;
 
 use clap::{Parser, Subcommand};

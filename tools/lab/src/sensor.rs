@@ -123,10 +123,28 @@ impl Reading {
         }
     }
 
+    /// Returns the range of metres that a session is given for this reading: the distances at the ends of the volume, or
+    /// percentiles for relative depth.
+    pub fn range(&self) -> DepthRange {
+        match self.relative {
+            true => DepthRange::Percentiles,
+            false => DepthRange::Fixed {
+                near_m: NEAR_M,
+                far_m: FAR_M,
+            },
+        }
+    }
+
+    /// Returns the images of this reading as a camera gives them.
+    pub fn images(&self) -> Images {
+        Images {
+            shape: self.depth.dim(),
+            depth: self.depth.iter().flat_map(|d| metres(*d).to_le_bytes()).collect(),
+            confidence: self.confidence.as_ref().map(|map| map.iter().copied().collect()),
+        }
+    }
+
     /// Returns the normalized depth, (H, W), that a session makes of this reading and the amplitudes `rgb`, (3, H, W).
-    ///
-    /// The distances at the ends of the volume are known, except for relative depth, which takes the session's
-    /// percentiles.
     ///
     /// # Errors
     /// Returns an error if no reading is confident enough.
@@ -135,34 +153,44 @@ impl Reading {
     /// Panics if `rgb` does not have the standard memory layout.
     pub fn session_depth(&self, rgb: &Array3<f32>) -> Result<Array2<f32>> {
         let (_, height, width) = rgb.dim();
-        let range = match self.relative {
-            true => DepthRange::Percentiles,
-            false => DepthRange::Fixed {
-                near_m: NEAR_M,
-                far_m: FAR_M,
-            },
-        };
         let options = DepthOptions {
-            range,
+            range: self.range(),
             ..DepthOptions::default()
         };
-        let (h, w) = self.depth.dim();
-        let bytes: Vec<u8> = self.depth.iter().flat_map(|d| metres(*d).to_le_bytes()).collect();
-        let mut image = DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&bytes, 4 * w, 4))?;
-        let confidence: Option<Vec<u8>> = self.confidence.as_ref().map(|map| map.iter().copied().collect());
-        if let Some(map) = &confidence {
-            image = image.with_confidence(ConfidenceFormat::LowMediumHigh, w, h, Plane::new(map, w, 1))?;
-        }
+        let images = self.images();
         let colours = colour_bytes(rgb);
         let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[Plane::new(&colours, 3 * width, 3)])?;
         let mut depth = Array2::zeros((height, width));
         DepthStream::new(options, (height, width))?.next(
-            &CameraFrame::new(0, colour, image),
+            &CameraFrame::new(0, colour, images.depth()?),
             None,
             rgb.as_slice().expect("standard layout"),
             depth.as_slice_mut().expect("standard layout"),
         )?;
         Ok(depth)
+    }
+}
+
+/// The bytes of a reading's images.
+pub struct Images {
+    shape: (usize, usize),
+    /// Metres in 32 bits.
+    depth: Vec<u8>,
+    confidence: Option<Vec<u8>>,
+}
+
+impl Images {
+    /// Returns the depth image, with its confidence if the sensor gives one.
+    ///
+    /// # Errors
+    /// Returns an error if the reading has no pixels.
+    pub fn depth(&self) -> Result<DepthImage<'_>> {
+        let (h, w) = self.shape;
+        let image = DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&self.depth, 4 * w, 4))?;
+        Ok(match &self.confidence {
+            Some(map) => image.with_confidence(ConfidenceFormat::LowMediumHigh, w, h, Plane::new(map, w, 1))?,
+            None => image,
+        })
     }
 }
 

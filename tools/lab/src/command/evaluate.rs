@@ -1,5 +1,6 @@
 //! `phasefront-lab evaluate` computes the paper's Table 2 on a data set.
 
+use super::sensors::{self, Sensors};
 use clap::{Args, ValueEnum};
 use phasefront::target::Response;
 use phasefront::{Display, EncoderOptions, Sweep, Target};
@@ -11,7 +12,6 @@ use phasefront_core::optics::aperture::Opening;
 use phasefront_io::{Error, Result, output};
 use phasefront_lab::dataset::Manifest;
 use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown};
-use phasefront_lab::sensor::Sensor;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +76,7 @@ pub(crate) struct Evaluate {
         requires = "encoder"
     )]
     look_shift: f64,
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = parse_sensor, help = sensor_help())]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = sensors::parse, help = format!("Simulated sensors whose depth methods receive as well, treated as in sessions, separated by commas: {}", sensors::names()))]
     sensor: Vec<Sensors>,
     /// Split of the data set
     #[arg(long, value_enum, default_value_t = Split::Test)]
@@ -139,32 +139,6 @@ enum Split {
     All,
 }
 
-/// One value of --sensor.
-#[derive(Clone)]
-struct Sensors(Vec<Sensor>);
-
-fn parse_sensor(text: &str) -> std::result::Result<Sensors, String> {
-    match text {
-        "all" => Ok(Sensors(Sensor::value_variants().to_vec())),
-        name => Sensor::from_str(name, false).map(|sensor| Sensors(vec![sensor])),
-    }
-}
-
-fn sensor_help() -> String {
-    let names: Vec<String> = Sensor::value_variants().iter().map(|sensor| name_of(*sensor)).collect();
-    format!(
-        "Simulated sensors whose depth methods receive as well, treated as in sessions, separated by commas: all, {}",
-        names.join(", ")
-    )
-}
-
-/// Returns the name of a sensor on the command line.
-fn name_of(sensor: Sensor) -> String {
-    sensor
-        .to_possible_value()
-        .map_or_else(String::new, |value| value.get_name().to_owned())
-}
-
 impl Evaluate {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if let Some(folder) = &self.pictures {
@@ -185,7 +159,7 @@ impl Evaluate {
         let sample = Sample {
             scenes,
             seed: self.seed,
-            sensors: self.sensor.iter().flat_map(|sensors| sensors.0.clone()).collect(),
+            sensors: Sensors::all(&self.sensor),
             margin: self.margin,
         };
         let rows = evaluate::evaluate(&manifest, &self.data, &sample, &methods, &shown, &|| bar.inc(1))?;
@@ -361,7 +335,7 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
     let widest = |least: usize, name: &dyn Fn(&Row) -> String| {
         rows.iter().map(|row| name(row).chars().count()).fold(least, usize::max)
     };
-    let depth = |row: &Row| row.sensor.map_or_else(|| "true".to_owned(), name_of);
+    let depth = |row: &Row| row.sensor.map_or_else(|| "true".to_owned(), sensors::name_of);
     let (method, shown) = (
         widest(6, &|row| row.method.clone()),
         widest(10, &|row| row.shown.clone()),

@@ -2,16 +2,17 @@
 //! benefit of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on slopes
 //! and on other displays.
 
+mod flicker;
+
+use super::sensors::{self, Sensors};
 use clap::{Args, ValueEnum};
-use phasefront::{Method, Sweep};
+use phasefront::Sweep;
 use phasefront_command::flags::{DisplayFlags, check_used};
-use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::Result;
 use phasefront_io::output::{self, Holding};
 use phasefront_io::picture;
 use phasefront_io::picture::plot::{self, Panel};
-use phasefront_lab::study::flicker;
 use phasefront_lab::study::slopes;
 use phasefront_lab::study::sweep_parts::{self, DisplayRow};
 use phasefront_lab::study::{self, Row, Scenes};
@@ -38,9 +39,22 @@ pub(crate) struct Study {
     /// Layers of a layered depth image in the study of planes [default: 5]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     ldi_layers: Option<u8>,
-    /// Seed of the first scene; the others use the following seeds
+    /// Seed of the first scene, or of the first reading of --data; the others use the following seeds
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 48))]
     seed: u64,
+    /// Folder of a data set whose scenes, from the first, the study of flicker takes instead of random ones. They need
+    /// --sensor
+    #[arg(long, value_name = "DIR", requires = "sensor")]
+    data: Option<PathBuf>,
+    #[arg(
+        long,
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        requires = "data",
+        value_parser = sensors::parse,
+        help = format!("Simulated sensors that read the scenes of --data, separated by commas: {}", sensors::names())
+    )]
+    sensor: Vec<Sensors>,
     #[command(flatten)]
     display: DisplayFlags,
     /// Folder for the results: NAME.json, NAME.svg for layers, planes and sweep, and slopes.png
@@ -77,8 +91,8 @@ impl Study {
             (
                 "--display",
                 self.display.is_given(),
-                self.what != What::Displays,
-                "studies of one display, `displays` has displays of its own",
+                self.what != What::Displays && self.data.is_none(),
+                "studies of one display, `displays` and --data have displays of their own",
             ),
             (
                 "--ldi-layers",
@@ -93,11 +107,17 @@ impl Study {
                 "studies other than of flicker",
             ),
             ("--planes", self.planes.is_some(), !of_flicker, "studies of exact waves"),
+            ("--data", self.data.is_some(), of_flicker, "the study of flicker"),
         ])?;
         output::folder(&self.output, Holding::Anything)?;
         match self.what {
             What::Layers | What::Planes => {}
-            What::Flicker => return self.flicker(json),
+            What::Flicker => {
+                return match &self.data {
+                    Some(data) => self.flicker_of_sensors(data, json),
+                    None => self.flicker(json),
+                };
+            }
             What::Sweep => return self.sweep(json),
             What::Slopes => return self.slopes(json),
             What::Displays => return self.displays(json),
@@ -297,50 +317,6 @@ impl Study {
             serde_json::to_writer_pretty(&mut *file, result)?;
             std::io::Write::write_all(file, b"\n")
         })
-    }
-
-    fn flicker(&self, json: bool) -> Result<()> {
-        /// The number of frames of each scene.
-        const FRAMES: usize = 30;
-        let (height, width) = flicker::SHAPE;
-        let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
-        let method = Method::Network(networks::network("8", None)?);
-        let scenes = usize::from(self.scenes);
-        let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
-        let mut rows: Vec<flicker::Row> = Vec::new();
-        for scene in 0..u64::from(self.scenes) {
-            let of_scene = flicker::study(self.seed + scene, FRAMES, &display, &method, &|| bar.inc(1))?;
-            match rows.is_empty() {
-                true => rows = of_scene,
-                false => {
-                    for (sum, row) in rows.iter_mut().zip(of_scene) {
-                        sum.brightness += row.brightness;
-                        sum.pixel += row.pixel;
-                    }
-                }
-            }
-        }
-        bar.finish_and_clear();
-        for row in &mut rows {
-            row.brightness /= scenes as f64;
-            row.pixel /= scenes as f64;
-        }
-        let result = json!({
-            "study": "flicker", "frames": FRAMES, "scenes": self.scenes, "seed": self.seed, "display": display,
-            "rows": rows,
-        });
-        self.write_json("flicker", &result)?;
-        let mut text = "change from frame to frame  brightness   a pixel's amplitude".to_owned();
-        for row in &rows {
-            text += &format!(
-                "\n{:26}  {:8.3} %   {:.5}",
-                row.setting,
-                100.0 * row.brightness,
-                row.pixel
-            );
-        }
-        terminal::print(json, &result, text);
-        Ok(())
     }
 
     fn plot(&self, name: &str, finest: usize, rows: &[Row]) -> Result<()> {

@@ -1,13 +1,14 @@
-//! Measures the flicker of video. A static scene with depth as noisy as a phone's runs through a session frame by
-//! frame, and the study measures how much the displayed image changes between frames.
+//! Measures the flicker of video. A static scene with depth as noisy as a phone's, or read by a simulated sensor, runs
+//! through a session frame by frame, and the study measures how much the displayed image changes between frames.
 
 use crate::scene;
 use crate::sensor::coarse::{Coarse, Sampling};
-use crate::sensor::colour_bytes;
-use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use crate::sensor::{Images, Reading, Sensor, colour_bytes};
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthRange, Plane};
 use phasefront::output::Layout;
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
-use phasefront_exact::truth::visible_depth;
+use phasefront_exact::truth::{visible_depth, visible_rgb};
+use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 
@@ -26,8 +27,6 @@ const FAULTS: Coarse = Coarse {
     noise: 0.01,
     holes: true,
 };
-/// The distances, in metres, at normalized depth 0 and 1.
-const RANGE_M: (f32, f32) = (0.5, 2.5);
 /// The frame rate.
 const RATE_HZ: u64 = 30;
 
@@ -49,7 +48,7 @@ pub struct Setting {
 }
 
 /// The default setting: each frame is processed alone.
-const ALONE: Setting = Setting {
+pub const ALONE: Setting = Setting {
     name: "each frame by itself",
     video: false,
     smoothed: false,
@@ -58,8 +57,8 @@ const ALONE: Setting = Setting {
     midpoint_steps: 0,
 };
 
-/// The setting with depth and brightness smoothed.
-const BOTH: Setting = Setting {
+/// The setting of video sessions: depth and brightness smoothed.
+pub const BOTH: Setting = Setting {
     name: "both",
     video: true,
     smoothed: true,
@@ -105,59 +104,79 @@ pub struct Row {
     pub pixel: f64,
 }
 
-/// Makes `frames` frames of random scene `seed`, of [`SHAPE`], by `method` in each of [`SETTINGS`].
-/// The displayed image is viewed at full light with the focus in the middle of the volume. `done` is called after each
-/// frame.
+/// A scene that does not move, and a reading of its depth for each frame.
+pub struct Standing {
+    /// (H, W) of the frames.
+    shape: (usize, usize),
+    /// The colours, interleaved.
+    rgb: Vec<u8>,
+    readings: Vec<Images>,
+    range: DepthRange,
+}
+
+impl Standing {
+    /// Makes `frames` frames of random scene `seed`, of [`SHAPE`], with depth as noisy as a phone's. The session takes
+    /// the range from percentiles.
+    ///
+    /// # Errors
+    /// Returns an error if the scene cannot be rendered.
+    pub fn random(seed: u64, frames: usize) -> Result<Self> {
+        let random = scene::random_scene(seed, SHAPE.0, SHAPE.1);
+        let ldi = scene::render_ldi_reference(&random, SHAPE.0, SHAPE.1, 1)?.quantized();
+        let depth = visible_depth(&ldi);
+        let read = |frame| FAULTS.read(depth.view(), seed + 1 + frame).images();
+        Ok(Standing {
+            shape: SHAPE,
+            rgb: colour_bytes(&ldi.layers[0].rgb),
+            readings: (0..frames as u64).map(read).collect(),
+            range: DepthRange::Percentiles,
+        })
+    }
+
+    /// Makes `frames` frames of the scene `ldi`, whose depth `sensor` reads anew for each frame, the first with `seed`.
+    pub fn read_by(sensor: Sensor, ldi: &Ldi, seed: u64, frames: usize) -> Self {
+        let depth = visible_depth(ldi);
+        let readings: Vec<Reading> = (0..frames as u64)
+            .map(|frame| sensor.read(depth.view(), seed + frame))
+            .collect();
+        Standing {
+            shape: depth.dim(),
+            rgb: colour_bytes(&visible_rgb(ldi)),
+            range: readings.first().map_or(DepthRange::Percentiles, Reading::range),
+            readings: readings.iter().map(Reading::images).collect(),
+        }
+    }
+}
+
+/// Runs the frames of `standing` through a session with each of `settings`, by `method`. The displayed image is viewed at
+/// full light with the focus in the middle of the volume. `done` is called after each frame.
 ///
 /// # Errors
 /// Returns an error if there are fewer than two frames or the session fails.
-pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done: &dyn Fn()) -> Result<Vec<Row>> {
+pub fn study(
+    standing: &Standing,
+    settings: &[Setting],
+    display: &Display,
+    method: &Method,
+    done: &dyn Fn(),
+) -> Result<Vec<Row>> {
+    let frames = standing.readings.len();
     if frames < 2 {
         return Err(Error::Input(
             "a change from frame to frame needs at least two frames".into(),
         ));
     }
-    let shape = (display.height(), display.width());
-    let random = scene::random_scene(seed, shape.0, shape.1);
-    let ldi = scene::render_ldi_reference(&random, shape.0, shape.1, 1)?.quantized();
-    let rgb = colour_bytes(&ldi.layers[0].rgb);
-    let depth = visible_depth(&ldi);
-    let readings: Vec<Vec<u8>> = (0..frames as u64)
-        .map(|frame| {
-            let readings = FAULTS.read(depth.view(), seed + 1 + frame).depth;
-            let metres = readings.mapv(|d| RANGE_M.0 + d * (RANGE_M.1 - RANGE_M.0));
-            metres.iter().flat_map(|m| m.to_le_bytes()).collect()
-        })
-        .collect();
-    (SETTINGS.iter())
+    let (height, width) = standing.shape;
+    (settings.iter())
         .map(|setting| {
-            let mut options = SessionOptions::new(display, method.clone());
-            options.encoder = EncoderOptions {
-                dark_threshold: setting.dark_threshold,
-                local_steps: setting.local_steps,
-                midpoint_steps: setting.midpoint_steps,
-                brightness: match setting.smoothed {
-                    true => Brightness::Smoothed,
-                    false => Brightness::FrameMax,
-                },
-                ..options.encoder
-            };
-            let process: Box<Process> = if setting.video {
-                let session = VideoSession::new(options)?;
-                Box::new(move |frame| session.process(frame))
-            } else {
-                let session = ImageSession::new(options)?;
-                Box::new(move |frame| session.process(frame))
-            };
+            let process = setting.session(display, method, standing.range)?;
             let mut seen: Vec<Vec<f32>> = Vec::with_capacity(frames);
-            for (frame, readings) in readings.iter().enumerate() {
-                let colour = Plane::new(&rgb, 3 * shape.1, 3);
-                let colour = ColourImage::new(ColourFormat::Rgb, shape.1, shape.0, &[colour])?;
-                let plane = Plane::new(readings, 4 * SENSOR.1, 4);
-                let depth = DepthImage::new(DepthFormat::MetresF32, SENSOR.1, SENSOR.0, plane)?;
+            for (frame, images) in standing.readings.iter().enumerate() {
+                let colour = Plane::new(&standing.rgb, 3 * width, 3);
+                let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[colour])?;
                 let timestamp = (1 + frame as u64) * 1_000_000_000 / RATE_HZ;
-                let hologram = process(&CameraFrame::new(timestamp, colour, depth))?;
-                let (height, width) = (shape.0 / 2, shape.1 / 2);
+                let hologram = process(&CameraFrame::new(timestamp, colour, images.depth()?))?;
+                let (height, width) = (height / 2, width / 2);
                 let mut rgba = vec![0; 4 * height * width];
                 hologram.write_preview(0.0, (height, width), Layout::Rgba, &mut rgba, 4 * width)?;
                 // The preview undoes the scale, but the eye sees the light, which is the amplitude divided by the
@@ -170,6 +189,31 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
             Ok(changes(setting.name, &seen))
         })
         .collect()
+}
+
+impl Setting {
+    /// Opens a session with this setting.
+    fn session(&self, display: &Display, method: &Method, range: DepthRange) -> Result<Box<Process>> {
+        let mut options = SessionOptions::new(display, method.clone());
+        options.depth.range = range;
+        options.encoder = EncoderOptions {
+            dark_threshold: self.dark_threshold,
+            local_steps: self.local_steps,
+            midpoint_steps: self.midpoint_steps,
+            brightness: match self.smoothed {
+                true => Brightness::Smoothed,
+                false => Brightness::FrameMax,
+            },
+            ..options.encoder
+        };
+        Ok(if self.video {
+            let session = VideoSession::new(options)?;
+            Box::new(move |frame| session.process(frame))
+        } else {
+            let session = ImageSession::new(options)?;
+            Box::new(move |frame| session.process(frame))
+        })
+    }
 }
 
 fn changes(setting: &'static str, seen: &[Vec<f32>]) -> Row {

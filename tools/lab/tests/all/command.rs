@@ -137,12 +137,17 @@ fn what_cannot_be_made_is_refused_in_one_line() {
         ("occlusion --offset-mm 3 -o study", at_the_modulator),
         (
             "study displays --display santec-slm-200 -o study",
-            "has displays of its own",
+            "have displays of their own",
         ),
         ("study flicker --size 64 -o study", "studies other than of flicker"),
+        (
+            "study layers --data data --sensor lidar -o study",
+            "the study of flicker",
+        ),
     ] {
         folder.refuses(&call.split(' ').collect::<Vec<_>>(), 1, &[word]);
     }
+    folder.refuses(&["study", "flicker", "--data", "data", "-o", "study"], 2, &["--sensor"]);
     folder.refuses(&["scene", "-o", "s"], 2, &["--model"]);
     folder.refuses(&["scene", "--seed", "1", "--size", "0x5", "-o", "s"], 2, &["WxH"]);
 }

@@ -1,13 +1,15 @@
 //! Tests the studies of layers and planes: their comparisons, and the files that the command writes.
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront::{Display, Method, RgbdFrame, Sweep};
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::metrics;
 use phasefront_exact::{sm_lbm, truth};
 use phasefront_io::ldi::Ldi;
 use phasefront_io::picture::plot::{self, Panel};
 use phasefront_lab::scene;
+use phasefront_lab::sensor::Sensor;
+use phasefront_lab::study::flicker::{self, ALONE, BOTH, Standing};
 use phasefront_lab::study::{self, Scenes, slopes, sweep_parts};
 use std::path::Path;
 use std::process::Command;
@@ -53,6 +55,23 @@ fn layers_are_compared_with_ten() {
     assert_eq!(rows[1].ssim_of_scenes, direct);
     assert!((rows[1].ssim - (direct[0] + direct[1]) / 2.0).abs() < 1e-12);
     assert!(rows[8].ssim >= rows[3].ssim && rows[3].ssim > rows[0].ssim, "{rows:?}");
+}
+
+#[test]
+fn video_sessions_flicker_less_with_sensors_than_single_frames() {
+    let display = Display::default().with_size(96, 96).unwrap();
+    let method = Method::Sweep(Sweep::for_display(&display));
+    for sensor in [Sensor::Noise, Sensor::Lidar, Sensor::Kinect] {
+        let study = |frames, settings: &[_]| {
+            let standing = Standing::read_by(sensor, &ldi(3, 96, 1), 5, frames);
+            flicker::study(&standing, settings, &display, &method, &|| {})
+        };
+        let rows = study(6, &[ALONE, BOTH]).unwrap();
+        let [alone, both] = &rows[..] else { panic!("{rows:?}") };
+        assert!(both.pixel < 0.9 * alone.pixel, "{sensor:?}: {rows:?}");
+        assert!(both.brightness < alone.brightness, "{sensor:?}: {rows:?}");
+        assert!(study(1, &[ALONE]).unwrap_err().to_string().contains("two frames"));
+    }
 }
 
 #[test]
