@@ -135,11 +135,13 @@ impl Reading {
         }
     }
 
-    /// Returns the images of this reading as a camera gives them.
-    pub fn images(&self) -> Images {
+    /// Returns the images of this reading as a camera gives them, with the distances `near_m` and `far_m` at normalized
+    /// depth 0 and 1.
+    pub fn images(&self, near_m: f32, far_m: f32) -> Images {
+        let metres = |d: &f32| near_m + d * (far_m - near_m);
         Images {
             shape: self.depth.dim(),
-            depth: self.depth.iter().flat_map(|d| metres(*d).to_le_bytes()).collect(),
+            depth: self.depth.iter().flat_map(|d| metres(d).to_le_bytes()).collect(),
             confidence: self.confidence.as_ref().map(|map| map.iter().copied().collect()),
         }
     }
@@ -157,7 +159,7 @@ impl Reading {
             range: self.range(),
             ..DepthOptions::default()
         };
-        let images = self.images();
+        let images = self.images(NEAR_M, FAR_M);
         let colours = colour_bytes(rgb);
         let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[Plane::new(&colours, 3 * width, 3)])?;
         let mut depth = Array2::zeros((height, width));

@@ -3,7 +3,7 @@
 
 use crate::scene;
 use crate::sensor::coarse::{Coarse, Sampling};
-use crate::sensor::{Images, Reading, Sensor, colour_bytes};
+use crate::sensor::{FAR_M, Images, NEAR_M, Reading, Sensor, colour_bytes};
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthRange, Plane};
 use phasefront::output::Layout;
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
@@ -27,6 +27,8 @@ const FAULTS: Coarse = Coarse {
     noise: 0.01,
     holes: true,
 };
+/// The distances, in metres, at normalized depth 0 and 1 in random scenes.
+const RANGE_M: (f32, f32) = (0.5, 2.5);
 /// The frame rate.
 const RATE_HZ: u64 = 30;
 
@@ -124,7 +126,7 @@ impl Standing {
         let random = scene::random_scene(seed, SHAPE.0, SHAPE.1);
         let ldi = scene::render_ldi_reference(&random, SHAPE.0, SHAPE.1, 1)?.quantized();
         let depth = visible_depth(&ldi);
-        let read = |frame| FAULTS.read(depth.view(), seed + 1 + frame).images();
+        let read = |frame| FAULTS.read(depth.view(), seed + 1 + frame).images(RANGE_M.0, RANGE_M.1);
         Ok(Standing {
             shape: SHAPE,
             rgb: colour_bytes(&ldi.layers[0].rgb),
@@ -143,7 +145,7 @@ impl Standing {
             shape: depth.dim(),
             rgb: colour_bytes(&visible_rgb(ldi)),
             range: readings.first().map_or(DepthRange::Percentiles, Reading::range),
-            readings: readings.iter().map(Reading::images).collect(),
+            readings: readings.iter().map(|reading| reading.images(NEAR_M, FAR_M)).collect(),
         }
     }
 }

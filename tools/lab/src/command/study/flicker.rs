@@ -2,7 +2,7 @@
 
 use super::Study;
 use crate::command::sensors::{self, Sensors};
-use phasefront::{Display, Method, Sweep};
+use phasefront::{Method, Sweep};
 use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::{Error, Result};
@@ -15,11 +15,11 @@ use std::path::Path;
 const FRAMES: usize = 30;
 
 impl Study {
-    /// Studies every setting on random scenes.
+    /// Studies every setting on random scenes, by the network of 8 layers.
     pub(super) fn flicker(&self, json: bool) -> Result<()> {
         let (height, width) = flicker::SHAPE;
         let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
-        let method = automatic(&display)?;
+        let method = Method::Network(networks::network("8", None)?);
         let bar = progress_bar((usize::from(self.scenes) * FRAMES * SETTINGS.len()) as u64, "frames");
         let of_scenes = (0..u64::from(self.scenes))
             .map(|scene| {
@@ -42,7 +42,8 @@ impl Study {
         Ok(())
     }
 
-    /// Studies frames by themselves and in a video session, on the data set's scenes as each sensor reads them.
+    /// Studies frames by themselves and in a video session, on the data set's scenes as each sensor reads them, by the
+    /// automatic choice.
     pub(super) fn flicker_of_sensors(&self, data: &Path, json: bool) -> Result<()> {
         let manifest = Manifest::read(data)?;
         let scenes = usize::from(self.scenes);
@@ -52,7 +53,8 @@ impl Study {
                 format!("holds {} scenes; --scenes {scenes} needs as many", manifest.scenes),
             ));
         }
-        let method = automatic(&manifest.display)?;
+        let sweep = Sweep::for_display(&manifest.display);
+        let method = Method::Auto(sweep, networks::network("8", None)?);
         let sensors = Sensors::all(&self.sensor);
         let settings = [ALONE, BOTH];
         let bar = progress_bar((sensors.len() * scenes * FRAMES * settings.len()) as u64, "frames");
@@ -83,11 +85,6 @@ impl Study {
         terminal::print(json, &result, text);
         Ok(())
     }
-}
-
-/// Returns the automatic choice, which `phasefront video` takes by default.
-fn automatic(display: &Display) -> Result<Method> {
-    Ok(Method::Auto(Sweep::for_display(display), networks::network("8", None)?))
 }
 
 /// Returns the mean of each setting's changes over the scenes.
