@@ -102,16 +102,6 @@ impl RawHologram {
         drawn.map_err(of_gpu)
     }
 
-    /// Returns the hologram if its levels are in the module's memory.
-    fn here(&self) -> Answer<&Hologram> {
-        if self.on_gpu() {
-            return Err(setting(
-                "the levels stayed on the GPU; draw them, or process the frame without onGpu",
-            ));
-        }
-        Ok(&self.core)
-    }
-
     /// Returns the modulator levels, (C, H, W).
     ///
     /// # Errors
@@ -216,6 +206,21 @@ impl RawHologram {
         copied(to, row_stride, (plan.shape().0, plan.row_bytes()), |bytes| {
             plan.write(core.output_levels(), image as usize, bytes, plan.row_bytes())
         })
+    }
+}
+
+impl RawHologram {
+    /// Returns the hologram if its levels are in the module's memory.
+    ///
+    /// # Errors
+    /// Returns an error of kind `setting` if they stayed on the GPU.
+    pub(crate) fn here(&self) -> Answer<&Hologram> {
+        if self.on_gpu() {
+            return Err(setting(
+                "the levels stayed on the GPU; draw them, or process the frame without onGpu",
+            ));
+        }
+        Ok(&self.core)
     }
 }
 

@@ -58,7 +58,7 @@ impl RawModulator {
     /// modulator.
     #[wasm_bindgen(js_name = writeOutput)]
     pub fn write_output(&self, hologram: &RawHologram, image: u32, to: &Uint8Array, row_stride: u32) -> Answer<()> {
-        let hologram = &hologram.core;
+        let hologram = hologram.here()?;
         let input = self.0.input(hologram.shape(), hologram.target()).map_err(of_core)?;
         let all = self.0.output_size();
         let row = all.width * all.pixel_bytes;
@@ -74,7 +74,7 @@ impl RawModulator {
     /// Throws an error of kind `setting` in the cases of [`Self::write_output`], and for images of 16 bits.
     #[wasm_bindgen(js_name = writePixels)]
     pub fn write_pixels(&self, hologram: &RawHologram, image: u32, to: &Uint8Array, row_stride: u32) -> Answer<()> {
-        let hologram = &hologram.core;
+        let hologram = hologram.here()?;
         let input = self.0.input(hologram.shape(), hologram.target()).map_err(of_core)?;
         let all = self.0.output_size();
         let row = 4 * all.width;
