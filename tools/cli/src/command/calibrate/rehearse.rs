@@ -35,7 +35,7 @@ pub(crate) struct Rehearse {
     #[arg(long)]
     captures: bool,
     /// Give the display faults that no calibration knows, and learn a model of them from so many photographs; needs
-    /// --laser-nm
+    /// --laser-nm, and room for larger marks: --size 400x240
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(4..=1000))]
     learn: Vec<u16>,
     /// Output folder
