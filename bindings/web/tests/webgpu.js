@@ -1,5 +1,5 @@
 // Compares the levels of a session on WebGPU with those of the CPU, and tests what happens if there is no such GPU.
-import { Frame, Network, PhasefrontError, Session, load } from "/phasefront/phasefront.js";
+import { Frame, Modulator, Network, PhasefrontError, Session, load } from "/phasefront/phasefront.js";
 
 const ADAPTER = "swiftshader";
 
@@ -210,9 +210,18 @@ export async function canvases() {
       await kindOf(() => kept.drawPreview(0, new OffscreenCanvas(0, 8))),
       await kindOf(() => kept.drawPreview(1e9, eye)),
     ];
-    if (options.backend !== "cpu")
-      for (const call of [() => kept.levels, () => kept.refocus(0), () => kept.field(), () => outputOf(kept)])
-        refused.push(await kindOf(call));
+    const pluto = Modulator.named("holoeye-pluto");
+    const readings = [
+      () => kept.levels,
+      () => kept.refocus(0),
+      () => kept.field(),
+      () => outputOf(kept),
+      () => pluto.writeOutput(kept, new Uint8Array(1)),
+    ];
+    for (const call of options.backend === "cpu" ? [] : readings) {
+      refused.push(await kindOf(call));
+      if (!refused.at(-1).includes("stayed on the GPU")) throw new Error(refused.at(-1));
+    }
     for (const why of refused)
       if (!why.startsWith("setting: ") || why.includes("\n")) throw new Error(`not refused: ${why}`);
     lines.push(...refused);
