@@ -9,6 +9,7 @@ use phasefront_core::runtime::error::Error;
 /// the session's own thread. No frame is processed while the listener is busy.
 #[derive(Debug)]
 #[non_exhaustive]
+#[allow(clippy::large_enum_variant, reason = "almost all events are holograms")]
 pub enum Event {
     /// A frame became a hologram.
     Processed(Hologram),
