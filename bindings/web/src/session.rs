@@ -71,8 +71,8 @@ impl RawSession {
         Ok(RawSession { core })
     }
 
-    /// Returns the hologram of a frame, and waits for the browser's GPU if it computes the frame. With `stay`, the levels
-    /// then stay on the GPU.
+    /// Returns the hologram of a frame, and waits for the browser's GPU if it computes the frame. With `stay`, the
+    /// levels then stay on the GPU.
     ///
     /// # Errors
     /// Rejects in the cases of [`RawSession::process`], and while another frame is computed.

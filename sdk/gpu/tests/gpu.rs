@@ -886,8 +886,8 @@ fn small_jobs((h, w): (usize, usize)) -> Vec<(Job, f32)> {
     ]
 }
 
-/// Runs every program on a small frame of odd sides, for drivers that are too slow for all tests: `tests/swiftshader` runs
-/// it on a second driver. `--nocapture` prints what the drivers' table in docs/reliability.md has.
+/// Runs every program on a small frame of odd sides, for drivers that are too slow for all tests: `tests/swiftshader`
+/// runs it on a second driver. `--nocapture` prints what the drivers' table in docs/reliability.md has.
 #[test]
 fn every_program_agrees_with_the_cpu_on_a_small_frame() {
     let device = device();

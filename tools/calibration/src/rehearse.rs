@@ -46,8 +46,8 @@ pub struct Rehearsal {
     pub spot_z_m: f64,
     /// Whether all photographs of the patterns are kept.
     pub keep_captures: bool,
-    /// The numbers of photographs from which a model of a display with faults is learned, in ascending order; none for a
-    /// display without faults. The display must have one laser.
+    /// The numbers of photographs from which a model of a display with faults is learned, in ascending order; none for
+    /// a display without faults. The display must have one laser.
     pub learn: Vec<usize>,
 }
 
@@ -366,8 +366,8 @@ impl Stage<'_> {
         })
     }
 
-    /// Learns a model from each number of photographs, and returns what is displayed without a model and with them. Writes
-    /// the last model.
+    /// Learns a model from each number of photographs, and returns what is displayed without a model and with them.
+    /// Writes the last model.
     fn learned(&self, aberrations: &Aberrations) -> Result<(Vec<f64>, Vec<Learned>)> {
         if self.rehearsal.learn.is_empty() {
             return Ok((vec![], vec![]));

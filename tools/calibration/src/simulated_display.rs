@@ -291,8 +291,8 @@ impl SimulatedDisplay {
         }))
     }
 
-    /// Returns the spectrum of the field at the modulator on a padded plane of (H', W') = `padded`, (W', H'). Each column
-    /// is passed to `filter` with its index.
+    /// Returns the spectrum of the field at the modulator on a padded plane of (H', W') = `padded`, (W', H'). Each
+    /// column is passed to `filter` with its index.
     fn spectrum(
         &self,
         levels: ArrayView2<'_, u8>,

@@ -148,8 +148,8 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 }
 
 /// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser`, `aberration` and `model` name files relative to
-/// it: `lut` is a text file of 256 levels, and [`crate::display::calibration`] describes the others. [`ModulatorSpec`] and
-/// `crate::display::panel` describe the remaining keys.
+/// it: `lut` is a text file of 256 levels, and [`crate::display::calibration`] describes the others.
+/// [`ModulatorSpec`] and `crate::display::panel` describe the remaining keys.
 ///
 /// # Errors
 /// Returns an error if a file is missing or has invalid contents.

@@ -123,8 +123,8 @@ impl Reading {
         }
     }
 
-    /// Returns the range of metres that a session is given for this reading: the distances at the ends of the volume, or
-    /// percentiles for relative depth.
+    /// Returns the range of metres that a session is given for this reading: the distances at the ends of the volume,
+    /// or percentiles for relative depth.
     pub fn range(&self) -> DepthRange {
         match self.relative {
             true => DepthRange::Percentiles,

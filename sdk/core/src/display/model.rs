@@ -5,10 +5,10 @@
 //!
 //!   v = Λ·(L·exp(iψ) + Q),  ψ = W∗(θ + c(θ)),
 //!
-//! where c is an error of the phase curve, W a kernel of 3×3 pixels (crosstalk; beyond the border, pixels repeat), L the
-//! relative light and Q the light that is not diffracted. Its spectrum is multiplied by the pupil A, and propagates from
-//! there as on an ideal display. c is piecewise linear, A is bilinear over the first order, and L and Q are bilinear
-//! over the modulator. All are the same for each pixel of a colour otherwise.
+//! where c is an error of the phase curve, W a kernel of 3×3 pixels (crosstalk; beyond the border, pixels repeat), L
+//! the relative light and Q the light that is not diffracted. Its spectrum is multiplied by the pupil A, and propagates
+//! from there as on an ideal display. c is piecewise linear, A is bilinear over the first order, and L and Q are
+//! bilinear over the modulator. All are the same for each pixel of a colour otherwise.
 
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;

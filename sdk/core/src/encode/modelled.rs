@@ -81,8 +81,8 @@ impl ModelScratch {
 }
 
 impl ModelSteps {
-    /// Plans `steps` for fields of (C, H, W) = `shape` at the modulator of `target`, or returns `None` if the target has
-    /// no model.
+    /// Plans `steps` for fields of (C, H, W) = `shape` at the modulator of `target`, or returns `None` if the target
+    /// has no model.
     ///
     /// # Errors
     /// Returns an error if the offset or correction cannot be planned.

@@ -389,8 +389,8 @@ impl Propagator {
             .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
     }
 
-    /// Filters `plane`, (H, W), on the padded plane of this propagation: `filter` replaces its transfer function. Does not
-    /// allocate.
+    /// Filters `plane`, (H, W), on the padded plane of this propagation: `filter` replaces its transfer function. Does
+    /// not allocate.
     ///
     /// # Panics
     /// Panics in the cases of [`Self::propagate`].

@@ -142,8 +142,8 @@ impl Registration {
         out
     }
 
-    /// Returns the light of `photograph` at the middle of each pixel of the modulator, (H, W), as a fraction of the sensor's
-    /// range.
+    /// Returns the light of `photograph` at the middle of each pixel of the modulator, (H, W), as a fraction of the
+    /// sensor's range.
     pub fn centres(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
         let scale = 1.0 / f32::from(photograph.full);
         Array2::from_shape_fn((height, width), |(y, x)| {

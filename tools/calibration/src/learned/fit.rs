@@ -1,7 +1,7 @@
 //! Fits a learned model to photographs of holograms, by Adam (Kingma and Ba, 2015) on the misfit of the light.
 //!
-//! The exposure of each photograph is free, because lasers drift. The place of the modulator in each photograph is refined
-//! while the model becomes better, because marks show it to a fraction of a pixel only.
+//! The exposure of each photograph is free, because lasers drift. The place of the modulator in each photograph is
+//! refined while the model becomes better, because marks show it to a fraction of a pixel only.
 
 use super::gradient::{BORDER, Path};
 use super::register;
@@ -110,8 +110,8 @@ pub fn fit(target: &Target, colour: usize, samples: &[Sample], progress: &dyn Fn
     })
 }
 
-/// Bounds the errors of a phase curve such that the curve rises everywhere, from its middle outward. Where a table gives
-/// all phases out of reach the same level, the best curve would be flat.
+/// Bounds the errors of a phase curve such that the curve rises everywhere, from its middle outward. Where a table
+/// gives all phases out of reach the same level, the best curve would be flat.
 fn keep_rising(curve: &mut [f32]) {
     let most = (1.0 - LEAST_SLOPE) * std::f32::consts::TAU / (CURVE - 1) as f32;
     for k in CURVE / 2..CURVE - 1 {

@@ -1,4 +1,5 @@
-//! What a model says that a photograph shows, how far it is off, and the gradient of that by each of the model's values.
+//! What a model says that a photograph shows, how far it is off, and the gradient of that by each of the model's
+//! values.
 
 use ndarray::Array2;
 use num_complex::Complex32;
@@ -199,7 +200,8 @@ impl Path {
         }
     }
 
-    /// Returns the gradient by the pupil, from the spectra of the field at the modulator and of the slopes at the focus.
+    /// Returns the gradient by the pupil, from the spectra of the field at the modulator and of the slopes at the
+    /// focus.
     fn by_pupil(&self, field: &[Complex32], slopes: &[Complex32]) -> Vec<Complex32> {
         let mut pupil = vec![Complex32::ZERO; PUPIL * PUPIL];
         self.by_frequency(|at, fx, fy| {
@@ -294,8 +296,8 @@ impl Exposure {
         }
     }
 
-    /// Returns the gradient of the misfit by the field at the focus. Gain and stray light are at their optimum, so their
-    /// own change does not count.
+    /// Returns the gradient of the misfit by the field at the focus. Gain and stray light are at their optimum, so
+    /// their own change does not count.
     fn slopes(&self, focus: &[Complex32], light: &Array2<f32>) -> Vec<Complex32> {
         let mut slopes = vec![Complex32::ZERO; focus.len()];
         inside(light, |at, light| {

@@ -1,5 +1,5 @@
-//! The holograms that a learned model is fitted to: random pictures with random phases, and the one that shows where the
-//! modulator is.
+//! The holograms that a learned model is fitted to: random pictures with random phases, and the one that shows where
+//! the modulator is.
 
 use crate::camera::pattern::Pattern;
 use ndarray::{Array2, ArrayView2};
@@ -21,8 +21,8 @@ pub struct Scene {
     pub z_m: f64,
 }
 
-/// Returns the z of photograph `index` of `count`: the first half lies at the middle of the volume, the rest in halves at
-/// a third of its depth before and behind. The camera is focused three times.
+/// Returns the z of photograph `index` of `count`: the first half lies at the middle of the volume, the rest in halves
+/// at a third of its depth before and behind. The camera is focused three times.
 pub fn z_m(target: &Target, index: usize, count: usize) -> f64 {
     let away = target.display.volume_depth_m() / 3.0;
     match 4 * index / count.max(1) {

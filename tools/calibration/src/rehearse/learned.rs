@@ -1,5 +1,5 @@
-//! A learned model of a simulated display with faults that it does not know in form, judged by holograms that the fit never
-//! saw.
+//! A learned model of a simulated display with faults that it does not know in form, judged by holograms that the fit
+//! never saw.
 
 use crate::camera::marks::Registration;
 use crate::camera::pattern::Pattern;

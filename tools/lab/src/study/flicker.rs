@@ -150,8 +150,8 @@ impl Standing {
     }
 }
 
-/// Runs the frames of `standing` through a session with each of `settings`, by `method`. The displayed image is viewed at
-/// full light with the focus in the middle of the volume. `done` is called after each frame.
+/// Runs the frames of `standing` through a session with each of `settings`, by `method`. The displayed image is viewed
+/// at full light with the focus in the middle of the volume. `done` is called after each frame.
 ///
 /// # Errors
 /// Returns an error if there are fewer than two frames or the session fails.

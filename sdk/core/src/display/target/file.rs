@@ -2,7 +2,8 @@
 //! results of a calibration.
 //!
 //! The file contains `PFCALIB1`, the length of a TOML text as u32, the text, the lasers' gains as f32, (C, Gh, Gw), the
-//! flatness maps as u16, (1 or 3, H, W), the bytes of the learned model, and those of the per-pixel table. All numbers are little-endian.
+//! flatness maps as u16, (1 or 3, H, W), the bytes of the learned model, and those of the per-pixel table. All numbers
+//! are little-endian.
 
 use super::Target;
 use crate::display::Display;
