@@ -27,8 +27,8 @@ thread_local! {
 }
 
 /// Copies `texture`, 8-bit RGBA, to the middle of `canvas`, an `HTMLCanvasElement` or an `OffscreenCanvas`, which
-/// becomes `size` (H, W), at least that of the texture. `around`, pixels of that size, is what surrounds it. The browser
-/// shows it at the end of the task.
+/// becomes `size` (H, W), at least that of the texture. `around`, pixels of that size, is what surrounds it. The
+/// browser shows it at the end of the task.
 ///
 /// # Errors
 /// Returns [`GpuError::Refused`] if it is no canvas or a canvas with a context of another kind, and [`GpuError::Lost`].
