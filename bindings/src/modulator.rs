@@ -58,8 +58,10 @@ impl RawModulator {
     /// Returns an error if there is no such image, it does not fit, or the hologram is larger than the modulator or for
     /// another number of lasers or bits; with bit planes, also if it has another size.
     pub fn write_output(&self, hologram: Arc<RawHologram>, image: usize, to: RawMemory) -> Result<(), PhasefrontError> {
-        self.write(&hologram.core, to, |input, levels, bytes| {
-            input.write(levels, image, bytes, to.row_stride)
+        guard(|| {
+            self.write(&hologram.core, to, |input, levels, bytes| {
+                input.write(levels, image, bytes, to.row_stride)
+            })
         })
     }
 
@@ -75,8 +77,10 @@ impl RawModulator {
         layout: Layout,
         to: RawMemory,
     ) -> Result<(), PhasefrontError> {
-        self.write(&hologram.core, to, |input, levels, bytes| {
-            input.write_pixels(levels, image, layout, bytes, to.row_stride)
+        guard(|| {
+            self.write(&hologram.core, to, |input, levels, bytes| {
+                input.write_pixels(levels, image, layout, bytes, to.row_stride)
+            })
         })
     }
 
@@ -117,10 +121,8 @@ impl RawModulator {
         to: RawMemory,
         write: impl FnOnce(&ModulatorInput, Levels<'_>, &mut [u8]) -> phasefront::Result<()> + Send,
     ) -> Result<(), PhasefrontError> {
-        guard(|| {
-            let input = self.core.input(hologram.shape(), hologram.target())?;
-            let (levels, bytes) = (hologram.output_levels(), to.bytes()?);
-            Ok(hologram.on_threads(|| write(&input, levels, bytes))?)
-        })
+        let input = self.core.input(hologram.shape(), hologram.target())?;
+        let (levels, bytes) = (hologram.output_levels(), to.bytes()?);
+        Ok(hologram.on_threads(|| write(&input, levels, bytes))?)
     }
 }
