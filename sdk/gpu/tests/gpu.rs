@@ -902,7 +902,11 @@ fn every_program_agrees_with_the_cpu_on_a_small_frame() {
     );
     let (h, w) = (13, 37);
     let frame = rgbd(h, w);
-    for (job, tolerance) in small_jobs((h, w)) {
+    for (mut job, tolerance) in small_jobs((h, w)) {
+        if job.chain.fusion == Fusion::Pairs && driver::software() == "SwiftShader" {
+            skip::or_fail("pairs of layers", "SwiftShader would compile them for minutes");
+            job.chain.fusion = Fusion::Layers;
+        }
         if job.chain.float == Float::F16 && !device.has_half() {
             skip::or_fail("16-bit floats", format!("{device:?} has none"));
             continue;
