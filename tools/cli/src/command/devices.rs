@@ -1,9 +1,10 @@
-//! `phasefront devices`: lists the modulators that are known by name.
+//! `phasefront devices`: lists the modulators that are known by name, or describes one with all that its file sets.
 
 use clap::Args;
 use phasefront::output::Layout;
 use phasefront::output::{ModulatorSpec, Packing};
 use phasefront_command::terminal;
+use phasefront_io::display::DisplayFile;
 use phasefront_io::{Result, display};
 use serde_json::json;
 use std::path::Path;
@@ -11,7 +12,7 @@ use std::path::Path;
 /// List the modulators that --display knows by name, or describe one of them
 #[derive(Args)]
 pub(crate) struct Devices {
-    /// Name or file of a modulator to describe, with the sources of its figures
+    /// Name or file of a modulator to describe, with all that its file sets and the sources of its figures
     #[arg(value_name = "NAME|FILE")]
     device: Option<String>,
 }
@@ -19,8 +20,8 @@ pub(crate) struct Devices {
 impl Devices {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if let Some(name) = &self.device {
-            let device = display::find_display(name)?.device;
-            terminal::print(json, &object(name, &device), describe(&device));
+            let file = display::find_display(name)?;
+            terminal::print(json, &object_of_file(name, &file), describe(&file));
             return Ok(());
         }
         let own: Vec<String> = (display::own_devices().iter())
@@ -67,8 +68,61 @@ fn row(name: &str, device: &ModulatorSpec) -> String {
     )
 }
 
-fn describe(device: &ModulatorSpec) -> String {
+/// Returns `value` to four digits after the point.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+/// Returns the keys of the calibrations that the file of a display names or holds.
+fn calibrated(file: &DisplayFile) -> Vec<&'static str> {
+    let target = &file.target;
+    let keys = [
+        ("lut", file.lut.is_some()),
+        ("per_pixel", target.response.shape().is_some()),
+        ("laser", target.illumination.is_some()),
+        ("aberration", file.aberration.is_some()),
+        ("model", target.model.is_some()),
+        ("carrier_mrad", target.panel.carrier_rad != [0.0; 2]),
+        ("lens_mm", target.panel.lens_m.is_some()),
+        ("flatness", target.panel.flatness.is_some()),
+        ("shift_px or scale", target.registration.moves()),
+    ];
+    (keys.into_iter().filter(|(_, there)| *there))
+        .map(|(key, _)| key)
+        .collect()
+}
+
+fn describe(file: &DisplayFile) -> String {
+    let (device, display) = (&file.device, &file.target.display);
+    let lasers: Vec<_> = (display.wavelengths_m().iter())
+        .map(|wavelength| format!("{:.0}", wavelength * 1e9))
+        .collect();
     let mut text = row(&device.name, device);
+    text += &format!("\n{:12} {} nm", "lasers", lasers.join(", "));
+    text += &format!(
+        "\n{:12} {} mm deep, its middle {} mm from the modulator",
+        "volume",
+        rounded(display.volume_depth_m() * 1e3),
+        rounded(display.offset_m() * 1e3),
+    );
+    text += &format!(
+        "\n{:12} {} of the Nyquist frequency",
+        "aperture",
+        rounded(display.aperture_radius())
+    );
+    if let Some(turns) = device.levels_turns.as_ref().and_then(|turns| turns.last()) {
+        text += &format!("\n{:12} {} turns at the last level", "range", rounded(*turns));
+    }
+    if let Some(rate) = device.rate_hz {
+        text += &format!("\n{:12} {} Hz", "rate", rounded(rate));
+    }
+    let flips = [(device.flip_x, "left to right"), (device.flip_y, "top to bottom")];
+    let flips: Vec<_> = flips.iter().filter(|(flips, _)| *flips).map(|(_, how)| *how).collect();
+    for (title, set) in [("flipped", flips), ("calibrated", calibrated(file))] {
+        if !set.is_empty() {
+            text += &format!("\n{title:12} {}", set.join(", "));
+        }
+    }
     for (title, figures) in [("from", &device.sources), ("unconfirmed", &device.unconfirmed)] {
         for (key, source) in figures {
             text += &format!("\n{title:12} {key}: {source}");
@@ -86,4 +140,18 @@ fn object(name: &str, device: &ModulatorSpec) -> serde_json::Value {
         "levels_turns": device.levels_turns, "rate_hz": device.rate_hz,
         "sources": device.sources, "unconfirmed": device.unconfirmed,
     })
+}
+
+/// Returns [`object`] with what only a file sets.
+fn object_of_file(name: &str, file: &DisplayFile) -> serde_json::Value {
+    let display = &file.target.display;
+    let mut told = object(name, &file.device);
+    told["wavelengths_nm"] = (display.wavelengths_m().iter())
+        .map(|wavelength| rounded(wavelength * 1e9))
+        .collect();
+    told["volume_mm"] = rounded(display.volume_depth_m() * 1e3).into();
+    told["offset_mm"] = rounded(display.offset_m() * 1e3).into();
+    told["aperture"] = display.aperture_radius().into();
+    told["calibrated"] = calibrated(file).into();
+    told
 }

@@ -342,6 +342,17 @@ fn devices_are_listed_with_their_sources() {
     }
     let one = folder.succeeds(&["devices", "ti-plm-p67"]);
     assert!(one.contains("unconfirmed") && one.contains("width: "), "{one}");
+    assert!(one.contains("638, 520, 450 nm"), "{one}");
+    // A file is described with all that it sets.
+    let set =
+        "width = 64\nheight = 48\noffset_mm = 6.5\ncarrier_mrad = [6.0, -2.0]\nlut = \"lut.txt\"\nflip_x = true\n";
+    fs::write(folder.path("set.toml"), set).unwrap();
+    let lut: Vec<_> = (0..256).map(|level| format!("{level}\n")).collect();
+    fs::write(folder.path("lut.txt"), lut.concat()).unwrap();
+    let set = folder.succeeds(&["devices", "set.toml"]);
+    for part in ["6.5 mm from", "lut, carrier_mrad", "left to right"] {
+        assert!(set.contains(part), "{part}: {set}");
+    }
     // The user's own devices are listed too, and one with the name of a bundled device replaces it.
     fs::create_dir_all(folder.path("phasefront/devices")).unwrap();
     fs::write(folder.path("phasefront/devices/mine.toml"), "width = 123\nheight = 99").unwrap();

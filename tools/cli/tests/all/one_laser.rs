@@ -184,6 +184,7 @@ fn holograms_are_judged_shown_on_pages_and_measured() {
     }
     let told = json(&folder.succeeds(&["devices", "one.toml", "--json"]));
     assert_eq!(told["packing"], "an image a colour, grey");
+    assert_eq!(told["wavelengths_nm"], serde_json::json!([532.0]));
 }
 
 #[test]
