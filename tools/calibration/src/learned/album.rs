@@ -8,7 +8,6 @@ use crate::camera::photograph::Photograph;
 use ndarray::Array2;
 use phasefront::Target;
 use phasefront_core::display::model::ColourModel;
-use phasefront_io::Result;
 
 /// The share of saturated pixels above which a photograph cannot be used.
 const SATURATED: f64 = 1e-3;
@@ -71,43 +70,29 @@ impl<'a> Album<'a> {
         if f64::from(light.std(0.0)) < CONTRAST * mean || mean <= 0.0 {
             return Err("shows nothing; switch the laser on, open the shutter, and photograph it again".into());
         }
-        let likeness = self
-            .likeness(scene.z_m, &scene.phases, &light)
-            .map_err(|e| e.to_string())?;
-        let before = match &self.before {
-            Some(before) if likeness < LIKENESS => self.likeness_of_last(before, &light),
-            _ => -1.0,
+        if self.path.as_ref().is_none_or(|(z_m, _)| *z_m != scene.z_m) {
+            let path = Path::new(self.target, self.colour, scene.z_m).map_err(|e| e.to_string())?;
+            self.path = Some((scene.z_m, path));
+        }
+        let (_, path) = self.path.as_ref().expect("it is planned above");
+        // What an ideal display shows of these phases.
+        let alike = |phases: &Array2<f32>| {
+            let phases = phases.as_slice().expect("standard layout");
+            let ideal = path.expected(&ColourModel::ideal(NODES), NODES, phases, &light);
+            likeness(&ideal.light, &light)
         };
+        let likeness = alike(&scene.phases);
         if likeness >= LIKENESS {
             self.before = Some(scene.phases.clone());
             return Ok(());
         }
-        Err(if before > LIKENESS {
+        Err(if self.before.as_ref().is_some_and(|before| alike(before) > LIKENESS) {
             "shows the hologram before it; wait until the modulator shows the next, and photograph it again".into()
         } else {
             format!(
                 "does not show its hologram where the marks were (correlation {likeness:.2}, at least {LIKENESS} is needed); keep camera and focus in place, and photograph it again"
             )
         })
-    }
-
-    /// Returns the correlation of `light` with what an ideal display shows of `phases` at `z_m`.
-    fn likeness(&mut self, z_m: f64, phases: &Array2<f32>, light: &Array2<f32>) -> Result<f64> {
-        if self.path.as_ref().is_none_or(|(z, _)| *z != z_m) {
-            self.path = Some((z_m, Path::new(self.target, self.colour, z_m)?));
-        }
-        Ok(self.likeness_of_last(phases, light))
-    }
-
-    /// Returns the correlation at the z of the last photograph, or -1 if there is none.
-    fn likeness_of_last(&self, phases: &Array2<f32>, light: &Array2<f32>) -> f64 {
-        let Some(((_, path), phases)) = self.path.as_ref().zip(phases.as_slice()) else {
-            return -1.0;
-        };
-        likeness(
-            &path.expected(&ColourModel::ideal(NODES), NODES, phases, light).light,
-            light,
-        )
     }
 }
 

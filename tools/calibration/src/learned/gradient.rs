@@ -176,8 +176,7 @@ impl Path {
         plane
     }
 
-    /// Calls `then` with the index and the frequency, in cycles per pixel, of each value of a spectrum that passes the
-    /// aperture.
+    /// Calls `then` with the index and the frequency, in cycles per pixel, of each value of a spectrum.
     fn by_frequency(&self, mut then: impl FnMut(usize, f64, f64)) {
         let (height, width) = self.padded;
         let frequency = |k: usize, n: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;

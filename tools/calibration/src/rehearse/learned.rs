@@ -16,13 +16,13 @@ use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 
-/// The numbers of midpoint steps, and the z in metres, of the holograms that are judged.
+/// The numbers of midpoint steps of the unseen holograms, and the z in metres at which they are viewed.
 pub const JUDGED: [(usize, f64); 5] = [(0, 0.0), (3, 0.0), (10, 0.0), (30, 0.0), (10, 2e-3)];
-/// The number of holograms that are judged.
+/// The number of unseen holograms.
 const UNSEEN: usize = 4;
 /// The seed of the first of them, above those of all photographs.
 const UNSEEN_SEED: u64 = 1 << 32;
-/// The border that is not judged, in pixels.
+/// The border that is left out of the PSNR, in pixels.
 const BORDER: usize = 8;
 
 /// What a model of some photographs is worth, for one colour.

@@ -81,19 +81,19 @@ impl LearnModel {
                 folder,
                 count: self.photographs.into(),
             };
-            match job.samples(&mut program)? {
-                Err(some) => missing += some,
-                Ok(samples) => {
-                    let bar = progress_bar(0, name);
-                    let progress = |done: usize, of: usize| {
-                        bar.set_length(of as u64);
-                        bar.set_position(done as u64);
-                    };
-                    let one = fit::fit(&target, colour, &samples, &progress);
-                    bar.finish_and_clear();
-                    fitted.push(one.map_err(|e| Error::file(&job.folder, e))?);
-                }
+            let (samples, without) = job.samples(&mut program)?;
+            missing += without;
+            if missing > 0 {
+                continue;
             }
+            let bar = progress_bar(0, name);
+            let progress = |done: usize, of: usize| {
+                bar.set_length(of as u64);
+                bar.set_position(done as u64);
+            };
+            let one = fit::fit(&target, colour, &samples, &progress);
+            bar.finish_and_clear();
+            fitted.push(one.map_err(|e| Error::file(&job.folder, e))?);
         }
         if missing > 0 {
             return self.ask(json, missing);
@@ -164,8 +164,8 @@ struct OfColour<'a> {
 }
 
 impl OfColour<'_> {
-    /// Returns all photographs, or the number of those that are missing. Lets `program` take them if there is one.
-    fn samples(&self, program: &mut Option<CaptureProgram>) -> Result<std::result::Result<Vec<Sample>, usize>> {
+    /// Returns the photographs and the number of those that are missing. Lets `program` take them if there is one.
+    fn samples(&self, program: &mut Option<CaptureProgram>) -> Result<(Vec<Sample>, usize)> {
         let (height, width) = self.target.modulator();
         let pattern = Pattern::new(height, width)?;
         let marks = scenes::marks(
@@ -201,7 +201,7 @@ impl OfColour<'_> {
             }
         }
         bar.finish_and_clear();
-        Ok(if missing > 0 { Err(missing) } else { Ok(samples) })
+        Ok((samples, missing))
     }
 
     /// Returns what `check` says of the photograph of `scene`, which `program` takes if it is not there. Without a
