@@ -13,13 +13,13 @@ internal static class Try
         var height = int.Parse(arguments[3]);
         var rgb = Last(arguments[0], width * height * 3);
         var depth = Last(arguments[1], width * height);
-        using (var target = Target.FromToml("width = " + width + "\nheight = " + height))
+        using (var target = HologramTarget.FromToml("width = " + width + "\nheight = " + height))
         using (var options = SessionOptions.For(target))
-        using (var session = Session.Open(options, RunningMode.Image))
-        using (var hologram = session.Process(new Frame
+        using (var session = HologramSession.Open(options, RunningMode.Image))
+        using (var hologram = session.Process(new CameraFrame
         {
-            Colour = new Colour { Format = ColourFormat.Rgb, Width = width, Height = height, Planes = new[] { new Plane(rgb, width * 3, 3) } },
-            Depth = new Depth { Format = DepthFormat.NormalizedU8, Width = width, Height = height, Plane = new Plane(depth, width, 1) },
+            Colour = new ColourImage { Format = ColourFormat.Rgb, Width = width, Height = height, Planes = new[] { new ImagePlane(rgb, width * 3, 3) } },
+            Depth = new DepthImage { Format = DepthFormat.NormalizedU8, Width = width, Height = height, Plane = new ImagePlane(depth, width, 1) },
         }))
             File.WriteAllBytes(arguments[4], hologram.Levels(0));
         return 0;
