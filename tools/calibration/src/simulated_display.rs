@@ -20,7 +20,7 @@ use phasefront_core::display::response::per_pixel;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::optics::aperture;
 use phasefront_core::optics::asm::{self, Padding, Transfer};
-use phasefront_core::optics::fft::Fft2;
+use phasefront_core::optics::fft::{Fft2, frequency};
 use phasefront_io::dice::Dice;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
@@ -260,12 +260,11 @@ impl SimulatedDisplay {
         let transfer = Transfer::corrected(padded, pitch, wavelength, distance, |mu, nu| {
             -self.aberration.phase(colour, mu, nu, pitch)
         });
-        let signed = |k: usize, n: usize| if 2 * k < n { k as f64 } else { k as f64 - n as f64 } / n as f64;
         let spectrum = self.spectrum(levels, colour, padded, |kx, column| {
             transfer.apply(kx, column);
-            let fx = signed(kx, pw);
+            let fx = frequency(kx, pw);
             for (ky, value) in column.iter_mut().enumerate() {
-                let fy = signed(ky, ph);
+                let fy = frequency(ky, ph);
                 match &self.faults {
                     _ if !aperture::passes(fx, fy, self.display.aperture_radius()) => *value = Complex32::ZERO,
                     Some(faults) => *value *= faults.aperture(fx, fy),
@@ -324,10 +323,7 @@ impl SimulatedDisplay {
         fft.spectrum(&scratch.rows, &mut scratch.columns, |_, _, _| (), &mut scratch.work);
         // The aperture passes the frequencies of whole pixels alone. Their phase is taken at the middle of a pixel.
         let of = |k: usize, n: usize| if 2 * k < n { k } else { k + (PARTS - 1) * n };
-        let middle = |k: usize, n: usize| {
-            let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
-            PI * k / n as f64 * (PARTS - 1) as f64 / PARTS as f64
-        };
+        let middle = |k: usize, n: usize| PI * frequency(k, n) * (PARTS - 1) as f64 / PARTS as f64;
         let mut columns = vec![Complex32::ZERO; ph * pw];
         columns.par_chunks_exact_mut(ph).enumerate().for_each(|(kx, column)| {
             let fine = &scratch.columns[of(kx, pw) * ph * PARTS..][..ph * PARTS];

@@ -33,6 +33,12 @@ pub struct Fft2 {
     column: [Arc<dyn Fft<f32>>; 2],
 }
 
+/// Returns the frequency of value `k` of a transform of `n` values, in cycles per value, from −½ to ½.
+pub fn frequency(k: usize, n: usize) -> f64 {
+    let signed = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
+    signed / n as f64
+}
+
 /// Returns the number of parts of a pass on the current thread pool.
 fn parts() -> usize {
     match rayon::current_num_threads() {

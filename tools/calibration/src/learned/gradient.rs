@@ -8,7 +8,7 @@ use phasefront::target::Aberration;
 use phasefront_core::display::model::{CURVE, ColourModel, PUPIL, around, pupil_node};
 use phasefront_core::encode::modelled::way;
 use phasefront_core::optics::asm::{Padding, Propagator};
-use phasefront_core::optics::fft::Fft2;
+use phasefront_core::optics::fft::{Fft2, frequency};
 use phasefront_io::Result;
 use std::f32::consts::TAU;
 
@@ -179,7 +179,6 @@ impl Path {
     /// Calls `then` with the index and the frequency, in cycles per pixel, of each value of a spectrum.
     fn by_frequency(&self, mut then: impl FnMut(usize, f64, f64)) {
         let (height, width) = self.padded;
-        let frequency = |k: usize, n: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
         for kx in 0..width {
             for ky in 0..height {
                 then(kx * height + ky, frequency(kx, width), frequency(ky, height));
