@@ -91,6 +91,8 @@ impl CaptureProgram {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(|e| refuse(format!("cannot be started: {e}")))?;
+        #[cfg(unix)]
+        interrupt::pass_on(rustix::process::Pid::from_child(&child));
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(refuse("has no standard input and output".into()));
         };
@@ -244,10 +246,66 @@ impl CaptureProgram {
     }
 }
 
+/// Interrupts. A terminal sends them to this process only, because the program has a process group of its own.
+#[cfg(unix)]
+mod interrupt {
+    use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    use signal_hook::low_level::emulate_default_handler;
+    use std::sync::{Mutex, Once, PoisonError};
+    use std::time::{Duration, Instant};
+
+    /// The time that the program has to end after an interrupt.
+    const LAST: Duration = Duration::from_secs(2);
+
+    /// The program that runs.
+    static PROGRAM: Mutex<Option<Pid>> = Mutex::new(None);
+
+    /// Lets an interrupt of this process end the process group of `program` too.
+    pub(super) fn pass_on(program: Pid) {
+        static BEGUN: Once = Once::new();
+        *PROGRAM.lock().unwrap_or_else(PoisonError::into_inner) = Some(program);
+        BEGUN.call_once(|| match Signals::new([SIGINT, SIGTERM]) {
+            Err(e) => log::warn!("an interrupt will not reach the program of --capture: {e}"),
+            Ok(mut signals) => {
+                std::thread::spawn(move || {
+                    for signal in signals.forever() {
+                        end(signal);
+                        let _ = emulate_default_handler(signal);
+                    }
+                });
+            }
+        });
+    }
+
+    /// Forgets the program, which has ended.
+    pub(super) fn forget() {
+        *PROGRAM.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn end(signal: i32) {
+        let Some(program) = *PROGRAM.lock().unwrap_or_else(PoisonError::into_inner) else {
+            return;
+        };
+        let passed = if signal == SIGINT { Signal::INT } else { Signal::TERM };
+        let _ = kill_process_group(program, passed);
+        let end = Instant::now() + LAST;
+        // It is not reaped here, because others may wait for it.
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        while Instant::now() < end && matches!(waitid(WaitId::Pid(program), options), Ok(None)) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let _ = kill_process_group(program, Signal::KILL);
+    }
+}
+
 impl Drop for CaptureProgram {
     fn drop(&mut self) {
         self.input = None;
         self.finish();
+        #[cfg(unix)]
+        interrupt::forget();
     }
 }
 
