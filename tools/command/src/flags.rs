@@ -22,6 +22,14 @@ pub struct DisplayFlags {
 }
 
 impl DisplayFlags {
+    /// Names the display's file at `path`.
+    pub fn of_file(path: &std::path::Path) -> Self {
+        DisplayFlags {
+            display: Some(path.display().to_string()),
+            offset_mm: None,
+        }
+    }
+
     /// Checks whether a display is given.
     pub fn is_given(&self) -> bool {
         self.display.is_some()

@@ -95,6 +95,41 @@ pub fn find_display(name: &str) -> Result<DisplayFile> {
     })
 }
 
+/// Returns the keys of the display `name`, a file or a device, without those that a calibration measures. The names of
+/// flatness maps become absolute, so that the keys can move to a file elsewhere.
+///
+/// # Errors
+/// Returns an error if `name` is neither a file nor a device, or if the file is not TOML.
+pub fn uncalibrated(name: &str) -> Result<toml::Table> {
+    let mut table = match display_path(name) {
+        None => ModulatorSpec::shipped_table(name)?,
+        Some(path) => {
+            let mut table = parse(&path)?;
+            let absolute = |value: &mut toml::Value| -> Result<()> {
+                if let toml::Value::String(name) = value {
+                    let moved = std::path::absolute(path.with_file_name(&*name)).map_err(|e| Error::file(&path, e))?;
+                    *name = moved.display().to_string();
+                }
+                Ok(())
+            };
+            match table.get_mut("flatness") {
+                Some(toml::Value::Array(names)) => names.iter_mut().try_for_each(absolute)?,
+                Some(name) => absolute(name)?,
+                None => {}
+            }
+            table
+        }
+    };
+    let measured = [&NAMED[..], &PHASES].concat();
+    table.retain(|key, _| !measured.contains(&key));
+    Ok(table)
+}
+
+fn parse(path: &Path) -> Result<toml::Table> {
+    let text = input::text(path)?;
+    toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))
+}
+
 /// Returns the file that --display `name` reads, or `None` if `name` is a device without a file.
 pub fn display_path(name: &str) -> Option<PathBuf> {
     let path = Path::new(name);
@@ -148,15 +183,13 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 }
 
 /// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser`, `aberration` and `model` name files relative to
-/// it: `lut` is a text file of 256 levels, and [`crate::display::calibration`] describes the others.
-/// [`ModulatorSpec`] and `crate::display::panel` describe the remaining keys.
+/// it: `lut` is a text file of 256 levels in one or two columns, and [`crate::display::calibration`] describes the
+/// others. [`ModulatorSpec`] and `crate::display::panel` describe the remaining keys.
 ///
 /// # Errors
 /// Returns an error if a file is missing or has invalid contents.
 pub fn read_display(path: &Path) -> Result<DisplayFile> {
-    let text = input::text(path)?;
-    let mut table: toml::Table =
-        toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let mut table = parse(path)?;
     check_keys(path, &table)?;
     let mut named = |key: &str| match table.remove(key) {
         None => Ok(None),
@@ -218,9 +251,25 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     })
 }
 
-/// Reads a look-up table for `display`: a text file of 256 levels.
+/// Reads a look-up table for `display`: a text file of 256 levels, or of two columns, the numbers 0 to 255 and their
+/// levels (a Meadowlark `.lut`).
 fn read_lut(path: &Path, display: &Display) -> Result<[u8; 256]> {
-    let levels: std::result::Result<Vec<u8>, _> = input::text(path)?.split_whitespace().map(str::parse).collect();
+    let text = input::text(path)?;
+    let numbers: std::result::Result<Vec<u16>, _> = text.split_whitespace().map(str::parse).collect();
+    let mut numbers = numbers.map_err(|e| Error::file(path, format!("holds what is no level of 0..=255: {e}")))?;
+    let is_indexed = numbers.chunks(2).map(|pair| usize::from(pair[0])).eq(0..256);
+    if numbers.len() == 512 && is_indexed {
+        numbers = numbers.chunks(2).map(|pair| pair[1]).collect();
+        if let Some(voltage) = numbers.iter().find(|number| **number > 255) {
+            return Err(Error::file(
+                path,
+                format!(
+                    "holds the driver's voltage {voltage}, and images hold levels up to 255; load the file into the modulator's driver and leave lut out"
+                ),
+            ));
+        }
+    }
+    let levels: std::result::Result<Vec<u8>, _> = numbers.into_iter().map(u8::try_from).collect();
     let levels = levels.map_err(|e| Error::file(path, format!("holds what is no level of 0..=255: {e}")))?;
     let lut = lut_of(&levels).map_err(|e| Error::file(path, e))?;
     let most = lut.into_iter().max().unwrap_or_default();

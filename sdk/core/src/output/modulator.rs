@@ -123,11 +123,20 @@ impl ModulatorSpec {
     /// # Errors
     /// Returns an error if no bundled device has this name.
     pub fn shipped(name: &str) -> Result<Self> {
+        Self::from_table(Self::shipped_table(name)?)
+    }
+
+    /// Returns the parsed file of the bundled device called `name`.
+    ///
+    /// # Errors
+    /// Returns an error if no bundled device has this name.
+    #[doc(hidden)]
+    pub fn shipped_table(name: &str) -> Result<toml::Table> {
         let (_, text) = SHIPPED.iter().find(|(known, _)| *known == name).ok_or_else(|| {
             let all: Vec<_> = Self::names().collect();
             refuse(format!("there is no device {name}; there are {}", all.join(", ")))
         })?;
-        Self::from_toml(text)
+        toml::from_str(text).map_err(|e| refuse(keys::message(&e)))
     }
 
     /// Parses a device from TOML.

@@ -33,7 +33,7 @@ impl std::fmt::Display for NoMarks {
         match self {
             NoMarks::Count(n) => write!(
                 f,
-                "shows {n} of the 4 corner marks; focus on the modulator, light it, have all of it in the picture; where the marks are not dark, write patterns with another --dark"
+                "shows {n} of the 4 corner marks; focus on the modulator, light it, have all of it in the picture"
             ),
             NoMarks::Turned(corner) => write!(
                 f,

@@ -89,6 +89,9 @@ impl What {
                 "{:.1} % of its pixels are saturated; shorten the exposure and photograph all patterns again",
                 share * 100.0
             ),
+            What::NoMarks(why @ NoMarks::Count(_)) => {
+                format!("{why}; where the marks are not dark, write patterns with another --dark")
+            }
             What::NoMarks(why) => why.to_string(),
             What::Shows(other) => {
                 format!("shows pattern {other:03}; name the captures in the order of the patterns")

@@ -1,6 +1,7 @@
 //! `phasefront calibrate`: makes the files that a `--display` file refers to, from photographs of a display.
 
 mod aberration;
+mod all;
 mod capture;
 mod laser;
 mod lut;
@@ -10,12 +11,15 @@ mod rehearse;
 
 use clap::Subcommand;
 use phasefront::Display;
+use phasefront_command::terminal;
 use phasefront_io::{Error, Result, output};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Calibrate a real display, or rehearse it on a simulated one
 #[derive(Subcommand)]
 pub(crate) enum Calibrate {
+    All(all::All),
     Lut(lut::Lut),
     Laser(laser::Laser),
     Aberration(aberration::Aberration),
@@ -27,6 +31,7 @@ pub(crate) enum Calibrate {
 impl Calibrate {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         match self {
+            Calibrate::All(command) => command.run(json),
             Calibrate::Lut(command) => command.run(json),
             Calibrate::Laser(command) => command.run(json),
             Calibrate::Aberration(command) => command.run(json),
@@ -34,6 +39,30 @@ impl Calibrate {
             Calibrate::Pack(command) => command.run(json),
             Calibrate::Rehearse(command) => command.run(json),
         }
+    }
+}
+
+/// The result of a calibration.
+struct Told {
+    value: Value,
+    /// The result in one line.
+    line: String,
+    /// A table that comes before it, if there is one.
+    table: String,
+}
+
+impl Told {
+    fn new(value: Value, line: String) -> Self {
+        Told {
+            value,
+            line,
+            table: String::new(),
+        }
+    }
+
+    fn print(&self, json: bool) {
+        let text = [&self.table, &self.line].map(String::as_str);
+        terminal::print(json, &self.value, text.join("\n").trim_start());
     }
 }
 

@@ -3,12 +3,17 @@
 use crate::folder;
 
 use folder::Folder;
+use ndarray::Array2;
+use phasefront::Display;
+use phasefront::target::Response;
 use phasefront_calibration::camera::photograph::Photograph;
+use phasefront_calibration::simulated_display::SimulatedDisplay;
 use phasefront_core::optics::metrics;
+use phasefront_io::display::calibration;
 use phasefront_io::picture;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// Answers each request by the rehearsal's photograph that is next, but for `FAULTS`, cases of the request's number.
@@ -283,4 +288,181 @@ fn programs_that_do_not_help_are_named() {
     ];
     assert!(folder.fails(&patterns, 1).contains("--capture goes with --captures"));
     assert!(!Path::new(&folder.path("p")).exists());
+}
+
+/// Waits until the process `id`, which a shell wrote to `file`, has ended.
+fn ends(folder: &Folder, file: &str) -> bool {
+    let alive = format!("kill -0 {}", fs::read_to_string(folder.path(file)).unwrap().trim());
+    let quiet = |command: &mut Command| command.stderr(Stdio::null()).status().unwrap().success();
+    (0..1000).any(|_| {
+        std::thread::sleep(Duration::from_millis(10));
+        !quiet(Command::new("sh").args(["-c", &alive]))
+    })
+}
+
+/// A terminal sends an interrupt to the command alone, because the program has a process group of its own.
+#[test]
+fn an_interrupt_ends_a_program_that_hangs_too() {
+    // The second program ignores interrupts.
+    for ignored in ["", "trap '' INT; "] {
+        let folder = Folder::new();
+        fs::write(
+            folder.path("one.toml"),
+            "width = 144\nheight = 64\nwavelengths_nm = [532]",
+        )
+        .unwrap();
+        let program = format!("{ignored}read -r line; sleep 1000 & echo $! >sleep.part; mv sleep.part sleep; wait");
+        fs::write(folder.path("program.sh"), program).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .args(LUT)
+            .current_dir(folder.path(""))
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        while !folder.path("sleep").exists() {
+            std::thread::sleep(Duration::from_millis(10));
+            assert_eq!(command.try_wait().unwrap(), None);
+        }
+        let id = command.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        let status = command.wait().unwrap();
+        assert_eq!(
+            std::os::unix::process::ExitStatusExt::signal(&status),
+            Some(2),
+            "{status}"
+        );
+        assert!(ends(&folder, "sleep"));
+    }
+}
+
+#[test]
+fn all_calibrations_need_a_program_and_what_they_can_use() {
+    let folder = Folder::new();
+    for (name, text) in [
+        ("one.toml", "width = 144\nheight = 64\nwavelengths_nm = [532]\n"),
+        ("ten.toml", "width = 144\nheight = 64\nbits = 10\n"),
+        ("lens.toml", "width = 144\nheight = 64\nlens_mm = 900\n"),
+    ] {
+        fs::write(folder.path(name), text).unwrap();
+    }
+    for (call, words) in [
+        ("--display one.toml --z-mm 5.5", "--capture is needed"),
+        (
+            "--display ten.toml --z-mm 5.5 --capture sh",
+            "a display of 10 bits; curves are measured for 8 bits",
+        ),
+        ("--display one.toml --z-mm 900 --capture sh", "z"),
+        (
+            "--display lens.toml --z-mm 5.5 --photographs 8 --capture sh",
+            "without carrier, lens and flatness",
+        ),
+    ] {
+        let all = format!("calibrate all bench {call}");
+        let said = folder.fails(&all.split(' ').collect::<Vec<_>>(), 1);
+        assert!(said.contains(words) && said.lines().count() == 1, "{said}");
+        assert!(!folder.path("bench").exists());
+    }
+}
+
+const MODEL: [&str; 14] = [
+    "calibrate",
+    "model",
+    "taken",
+    "--photographs",
+    "8",
+    "-o",
+    "model.pfm",
+    "--display",
+    "one.toml",
+    "--json",
+    "--overwrite",
+    "--capture",
+    "sh",
+    "program.sh",
+];
+
+/// Photographs the holograms that `calibrate model` writes, as `source/capture_000.png` (the marks) and so on.
+fn holograms(folder: &Folder) {
+    let text = "width = 144\nheight = 72\nwavelengths_nm = [532]\n";
+    let display = Display::from_toml(text).unwrap();
+    let simulated = SimulatedDisplay::new(&display, 2.5, 3).unwrap().with_faults();
+    let Response::PerPixel(table) = simulated.response().unwrap() else {
+        panic!("a table");
+    };
+    calibration::write_per_pixel(&folder.path("table.pfp"), &table).unwrap();
+    fs::write(folder.path("one.toml"), format!("{text}per_pixel = \"table.pfp\"\n")).unwrap();
+    let by_hand: Vec<&str> = MODEL[..11]
+        .iter()
+        .map(|word| if *word == "taken" { "hand" } else { *word })
+        .collect();
+    let said = folder.succeeds(&by_hand);
+    assert!(said.contains("\"missing\":9"), "{said}");
+    let list = fs::read_to_string(folder.path("hand/holograms.json")).unwrap();
+    let list: serde_json::Value = serde_json::from_str(&list).unwrap();
+    fs::create_dir(folder.path("source")).unwrap();
+    for k in 0..9 {
+        let (name, z_mm) = match k {
+            0 => ("hand/laser/marks.png".to_owned(), 0.0),
+            k => (
+                format!("hand/laser/hologram_{:03}.png", k - 1),
+                list["z_mm"][k - 1].as_f64().unwrap(),
+            ),
+        };
+        let shown = read(folder, &name);
+        let levels = Array2::from_shape_fn((72, 144), |(y, x)| shown.values[y * 144 + x] as u8);
+        let photo = simulated.photograph(levels.view(), 0, z_mm / 1e3, k as u64).unwrap();
+        photo
+            .write(&folder.path(&format!("source/capture_{k:03}.png")))
+            .unwrap();
+    }
+}
+
+/// A camera that sees nothing, saturates, moves half-way or drops a frame costs one line each, and a new photograph.
+#[test]
+#[ignore = "slow: 20 seconds of a core"]
+fn a_model_is_learned_by_a_program_whose_camera_fails_at_times() {
+    let folder = Folder::new();
+    holograms(&folder);
+    spoiled(&folder, "source/capture_001.png", "dark.png", |_, _| 700);
+    spoiled(&folder, "source/capture_004.png", "moved.png", |photo, i| {
+        photo.values[(i + 12 * (photo.width + 1)) % photo.values.len()]
+    });
+    spoiled(&folder, "source/capture_002.png", "bright.png", |photo, i| {
+        photo.values[i].saturating_mul(20) & 0xfff0
+    });
+    write_program(
+        &folder,
+        "source",
+        r#"1) cp dark.png "$photo" ;;
+        3) cp dark.png "$photo" ;;
+        5) cp bright.png "$photo" ;;
+        8) cp source/capture_003.png "$photo" ;;
+        9) cp moved.png "$photo" ;;
+        11) exit 3 ;;"#,
+    );
+    let said = folder.fails(&MODEL, 1);
+    let lines = [
+        "taken/laser/capture_marks.png: shows 0 of the 4 corner marks",
+        "taken/laser/capture_000.png: shows nothing",
+        "taken/laser/capture_001.png: ",
+        "taken/laser/capture_003.png: shows the hologram before it",
+        "taken/laser/capture_003.png: does not show its hologram where the marks were",
+        "--capture sh: it ended (exit status: 3); what was taken is kept",
+    ];
+    assert_eq!(said.lines().count(), lines.len(), "{said}");
+    for (line, words) in said.lines().zip(lines) {
+        assert!(line.contains(words) && !line.contains("write patterns"), "{said}");
+    }
+    assert!(said.contains("saturated"), "{said}");
+    assert_eq!(taken(&folder), 5, "{said}");
+    let fitted: serde_json::Value = serde_json::from_str(&folder.succeeds(&MODEL)).unwrap();
+    assert_eq!(taken(&folder), 9);
+    let asked = fs::read_to_string(folder.path("asked")).unwrap();
+    assert_eq!(
+        asked.lines().count(),
+        9 + 6,
+        "a photograph that exists is not asked for"
+    );
+    let misfit = |i: usize| fitted["misfit"][0][i].as_f64().unwrap();
+    assert!(misfit(1) < 0.5 * misfit(0), "{fitted}");
 }

@@ -380,3 +380,34 @@ fn the_links_pattern_goes_through_files() {
     let told = folder.succeeds(&["link", "read", "limited.png", "--size", "640x96"]);
     assert!(told.starts_with("limited range"), "{told}");
 }
+
+/// A Meadowlark table has two columns: the numbers 0 to 255, and the levels or voltages.
+#[test]
+fn tables_of_two_columns_are_read_and_voltages_are_the_drivers() {
+    let folder = Folder::new().with_frame();
+    let level = |i: usize| 250 - i * 3 / 4;
+    let column: Vec<_> = (0..256).map(|i| level(i).to_string()).collect();
+    fs::write(folder.path("one.txt"), column.join("\n")).unwrap();
+    for (name, factor, first) in [("two.lut", 1, 0), ("volts.lut", 8, 0), ("late.lut", 1, 1)] {
+        let lines: String = (0..256)
+            .map(|i| format!("{}\t{}\r\n", i + first, factor * level(i)))
+            .collect();
+        fs::write(folder.path(name), lines).unwrap();
+    }
+    let made = |table: &str| {
+        fs::write(folder.path("d.toml"), format!("lut = \"{table}\"")).unwrap();
+        folder.run(&[&SMALL_HOLOGRAM[..], &["--display", "d.toml", "-o", "h.png"]].concat())
+    };
+    let shown = |table: &str| {
+        assert!(made(table).status.success());
+        levels(&folder.path("h.png"))
+    };
+    assert_eq!(shown("one.txt"), shown("two.lut"));
+    for (table, words) in [
+        ("volts.lut", "load the file into the modulator's driver"),
+        ("late.lut", "no level of 0..=255"),
+    ] {
+        let said = String::from_utf8(made(table).stderr).unwrap();
+        assert!(said.contains(words) && said.lines().count() == 1, "{said}");
+    }
+}

@@ -1,12 +1,12 @@
 //! `phasefront calibrate aberration`: the coefficients of the optics' aberration.
 
-use super::capture::CaptureFlags;
-use super::{channel, find_photo, photo_path};
+use super::capture::{Capture, CaptureFlags};
+use super::{Told, channel, find_photo, photo_path};
 use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use phasefront::{Display, Target};
 use phasefront_calibration::camera::photograph::Photograph;
-use phasefront_calibration::camera::program::{self, CaptureProgram, Shot};
+use phasefront_calibration::camera::program::{self, Shot};
 use phasefront_calibration::colours;
 use phasefront_calibration::optics::spot::{self, Search, TRIALS};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag};
@@ -30,31 +30,31 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Aberration {
     /// Folder of the search
     #[arg(value_name = "DIR")]
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// z of the spot, mm from the middle of the volume
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
-    z_mm: f64,
+    pub(super) z_mm: f64,
     /// Colour of the light; not for one laser
     #[arg(long, value_enum)]
-    colour: Option<ColourName>,
+    pub(super) colour: Option<ColourName>,
     /// Position of the spot in the frame, from its left and top, 0 to 1, for aberrations that differ over it [default:
     /// the middle, for the whole frame]
     #[arg(long, value_name = "X,Y", value_parser = parse_place)]
-    at: Option<[f64; 2]>,
+    pub(super) at: Option<[f64; 2]>,
     #[command(flatten)]
-    capture: CaptureFlags,
+    pub(super) capture: CaptureFlags,
     #[command(flatten)]
-    display: DisplayFlags,
+    pub(super) display: DisplayFlags,
     /// Output coefficients: `aberration` of a display file
     #[arg(short, value_name = "FILE.toml")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     #[command(flatten)]
-    overwrite: OverwriteFlag,
+    pub(super) overwrite: OverwriteFlag,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum ColourName {
+pub(super) enum ColourName {
     Red,
     Green,
     Blue,
@@ -83,6 +83,12 @@ struct SearchFile {
 
 impl Aberration {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        self.calibrate(&mut self.capture.later()?)?.print(json);
+        Ok(())
+    }
+
+    /// Begins or continues the search. With a program, ends it.
+    pub(super) fn calibrate(&self, capture: &mut Capture<'_>) -> Result<Told> {
         // The command adds coefficients to this file, and the display's file may refer to it, so it is an input too.
         output::check_file(&self.output)?;
         let state = self.folder.join("search.json");
@@ -92,31 +98,25 @@ impl Aberration {
             true => calibration::read_entries(&self.output)?,
             false => Vec::new(),
         };
-        let mut program = self.capture.start()?;
         let mut now = match state.exists() {
             false => self.begin(&entries, &file.target)?,
             true => {
                 let now = self.read(&state)?;
-                if let Some(program) = &mut program {
-                    self.take(&now, &file.target.display, program)?;
-                }
+                self.take(&now, &file.target.display, capture)?;
                 self.next(now, &file.target)?
             }
         };
-        if let Some(program) = &mut program {
-            while !now.search.is_done() {
-                write_state(&state, &now)?;
-                self.take(&now, &file.target.display, program)?;
-                now = self.next(now, &file.target)?;
-            }
+        while capture.is_given() && !now.search.is_done() {
+            write_state(&state, &now)?;
+            self.take(&now, &file.target.display, capture)?;
+            now = self.next(now, &file.target)?;
         }
         if now.search.is_done() {
-            return self.finish(json, &now, entries, &state, &file.target.display);
+            return self.finish(&now, entries, &state, &file.target.display);
         }
         write_state(&state, &now)?;
-        terminal::print(
-            json,
-            &json!({"round": now.search.round, "rounds": spot::ROUNDS, "folder": self.round(&now).display().to_string(), "best": now.search.best}),
+        Ok(Told::new(
+            json!({"round": now.search.round, "rounds": spot::ROUNDS, "folder": self.round(&now).display().to_string(), "best": now.search.best}),
             format!(
                 "round {} of {}: photograph trial_00.png to trial_{:02}.png of {} as capture_00.png …, then run this again",
                 now.search.round + 1,
@@ -124,8 +124,7 @@ impl Aberration {
                 TRIALS - 1,
                 terminal::name(&self.round(&now))
             ),
-        );
-        Ok(())
+        ))
     }
 
     fn check_colour(&self, display: &Display) -> Result<()> {
@@ -197,8 +196,11 @@ impl Aberration {
         Ok(())
     }
 
-    /// Lets `program` take the photographs of this round that are missing.
-    fn take(&self, now: &SearchFile, display: &Display, program: &mut CaptureProgram) -> Result<()> {
+    /// Lets the program of --capture, if there is one, take the photographs of this round that are missing.
+    fn take(&self, now: &SearchFile, display: &Display, capture: &mut Capture<'_>) -> Result<()> {
+        if !capture.is_given() {
+            return Ok(());
+        }
         let (round, channel) = (self.round(now), channel(display, self.index()));
         let mut size = find_photo(&round, "capture_00")
             .map(|path| Photograph::read(&path, channel))
@@ -219,7 +221,7 @@ impl Aberration {
                 z_m: self.z_mm / 1e3,
                 may_expose: true,
             };
-            program.take(&shot, &round.join(format!("capture_{i:02}.png")), |path| {
+            let check = |path: &Path| {
                 let photo = Photograph::read(path, channel).map_err(|e| e.to_string())?;
                 let first = *size.get_or_insert((photo.height, photo.width));
                 if first != (photo.height, photo.width) {
@@ -227,7 +229,10 @@ impl Aberration {
                 }
                 let zoom = photo.width as f64 / display.width() as f64;
                 spot::sharpness(&photo, spot::window(zoom)).map_err(|e| e.to_string())
-            })?;
+            };
+            if let Some(program) = capture.program()? {
+                program.take(&shot, &round.join(format!("capture_{i:02}.png")), check)?;
+            }
         }
         Ok(())
     }
@@ -280,7 +285,7 @@ impl Aberration {
         Ok(sharpness)
     }
 
-    fn finish(&self, json: bool, now: &SearchFile, entries: Vec<Entry>, state: &Path, display: &Display) -> Result<()> {
+    fn finish(&self, now: &SearchFile, entries: Vec<Entry>, state: &Path, display: &Display) -> Result<Told> {
         let mut entries = entries;
         let flat = || Entry::flat(self.z_mm, self.at, display.colours());
         let mut entry = self.entry(&entries).unwrap_or_else(flat);
@@ -293,16 +298,14 @@ impl Aberration {
         }
         calibration::write_aberrations(&self.output, &entries)?;
         std::fs::remove_file(state).map_err(|e| Error::file(state, format!("cannot be removed: {e}")))?;
-        terminal::print(
-            json,
-            &json!({"output": self.output.display().to_string(), "coefficients_rad": now.search.best}),
+        Ok(Told::new(
+            json!({"output": self.output.display().to_string(), "coefficients_rad": now.search.best}),
             format!(
                 "{}: coefficients {:.3?} rad",
                 terminal::name(&self.output),
                 now.search.best
             ),
-        );
-        Ok(())
+        ))
     }
 }
 

@@ -6,7 +6,7 @@ use phasefront_io::{Error, Result};
 use std::time::Duration;
 
 /// A program that shows patterns and photographs them.
-#[derive(Args)]
+#[derive(Args, Default)]
 pub(super) struct CaptureFlags {
     /// Program that shows each pattern and photographs it, with its arguments; comes last (docs/calibration.md)
     #[arg(long, value_name = "COMMAND", num_args = 1.., allow_hyphen_values = true)]
@@ -24,11 +24,37 @@ impl CaptureFlags {
         self.capture.is_some()
     }
 
-    /// Starts the program, if one is given.
-    pub(super) fn start(&self) -> Result<Option<CaptureProgram>> {
+    /// Returns the program, which starts with the first photograph that is missing.
+    pub(super) fn later(&self) -> Result<Capture<'_>> {
         let timeout = Duration::try_from_secs_f64(self.capture_timeout_s)
             .map_err(|e| Error::Input(format!("--capture-timeout-s {}: {e}", self.capture_timeout_s)))?;
-        let start = |command: &Vec<String>| CaptureProgram::start(command, self.capture_tries.into(), timeout);
-        self.capture.as_ref().map(start).transpose()
+        Ok(Capture {
+            flags: self,
+            timeout,
+            running: None,
+        })
+    }
+}
+
+/// The program of --capture, if it is given.
+pub(super) struct Capture<'a> {
+    flags: &'a CaptureFlags,
+    timeout: Duration,
+    running: Option<CaptureProgram>,
+}
+
+impl Capture<'_> {
+    /// Checks whether there is a program.
+    pub(super) fn is_given(&self) -> bool {
+        self.flags.is_given()
+    }
+
+    /// Returns the running program, or `None` if none is given.
+    pub(super) fn program(&mut self) -> Result<Option<&mut CaptureProgram>> {
+        if let (None, Some(command)) = (&self.running, &self.flags.capture) {
+            let tries = self.flags.capture_tries.into();
+            self.running = Some(CaptureProgram::start(command, tries, self.timeout)?);
+        }
+        Ok(self.running.as_mut())
     }
 }

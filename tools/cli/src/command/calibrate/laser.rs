@@ -1,7 +1,7 @@
 //! `phasefront calibrate laser`: the laser's amplitude over the modulator.
 
-use super::capture::CaptureFlags;
-use super::{channel, find_photo, photo_path, reading_captures};
+use super::capture::{Capture, CaptureFlags};
+use super::{Told, channel, find_photo, photo_path, reading_captures};
 use clap::Args;
 use ndarray::{Array2, Axis, stack};
 use phasefront::Display;
@@ -29,26 +29,32 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Laser {
     /// Folder with the folders red, green and blue, or laser
     #[arg(value_name = "CAPTURES")]
-    captures: PathBuf,
+    pub(super) captures: PathBuf,
     /// Fit a mixture of this many Gaussian beams
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=4))]
-    gaussians: Option<u8>,
+    pub(super) gaussians: Option<u8>,
     #[command(flatten)]
-    capture: CaptureFlags,
+    pub(super) capture: CaptureFlags,
     #[command(flatten)]
-    display: DisplayFlags,
+    pub(super) display: DisplayFlags,
     /// Output map: `laser` of a display file
     #[arg(short, value_name = "OUT.png")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     #[command(flatten)]
-    overwrite: OverwriteFlag,
+    pub(super) overwrite: OverwriteFlag,
 }
 
 impl Laser {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         output::new_file(&self.output, &["png"], self.overwrite.is_given())?;
+        self.calibrate(&mut self.capture.later()?)?.print(json);
+        Ok(())
+    }
+
+    /// Takes the photographs that are missing, if there is a program, and maps the light.
+    pub(super) fn calibrate(&self, capture: &mut Capture<'_>) -> Result<Told> {
         let display = self.display.read_without_offset()?.target.display;
-        self.take(&display)?;
+        self.take(&display, capture)?;
         reading_captures(&self.captures, colours(&display))?;
         let shape = (display.height(), display.width());
         let pattern = Pattern::new(shape.0, shape.1)?;
@@ -96,24 +102,22 @@ impl Laser {
                 map.iter().copied().fold(f32::INFINITY, f32::min) / most
             })
             .collect();
-        terminal::print(
-            json,
-            &json!({"output": self.output.display().to_string(), "least_amplitude": least, "fit_residual": left}),
+        Ok(Told::new(
+            json!({"output": self.output.display().to_string(), "least_amplitude": least, "fit_residual": left}),
             format!(
                 "{}: least amplitude {:.2?} of the most in {}",
                 terminal::name(&self.output),
                 least,
                 colours(&display).join(", ")
             ),
-        );
-        Ok(())
+        ))
     }
 
     /// Lets the program of --capture, if there is one, take the photographs that are missing.
-    fn take(&self, display: &Display) -> Result<()> {
-        let Some(mut program) = self.capture.start()? else {
+    fn take(&self, display: &Display, capture: &mut Capture<'_>) -> Result<()> {
+        if !capture.is_given() {
             return Ok(());
-        };
+        }
         let pattern = Pattern::new(display.height(), display.width())?;
         let (frame, flat) = (pattern.frame(0), Array2::zeros(pattern.shape()));
         let lasers = colours(display).iter().zip(display.wavelengths_m());
@@ -128,7 +132,9 @@ impl Laser {
                 z_m: display.offset_m(),
                 may_expose: true,
             };
-            if find_photo(&folder, "capture_000").is_none() {
+            if find_photo(&folder, "capture_000").is_none()
+                && let Some(program) = capture.program()?
+            {
                 program.take(&shot, &folder.join("capture_000.png"), |path| {
                     let photo = Photograph::read(path, channel).map_err(|e| e.to_string())?;
                     Checks::default()
@@ -136,7 +142,9 @@ impl Laser {
                         .map_err(|what| what.told(0))
                 })?;
             }
-            if find_photo(&folder, light_stem(&folder)).is_none() {
+            if find_photo(&folder, light_stem(&folder)).is_none()
+                && let Some(program) = capture.program()?
+            {
                 // As bright as the pattern, and of the same exposure.
                 (shot.levels, shot.may_expose) = (flat.view(), false);
                 let marked = Photograph::read(&photo_path(&folder, "capture_000")?, channel)?;

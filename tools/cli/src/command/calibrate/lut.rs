@@ -1,14 +1,14 @@
 //! `phasefront calibrate lut`: each pixel's phase curve.
 
-use super::capture::CaptureFlags;
-use super::{channel, reading_captures};
+use super::capture::{Capture, CaptureFlags};
+use super::{Told, channel, reading_captures};
 use clap::Args;
 use phasefront::Display;
 use phasefront_calibration::camera::pattern::{DARK, PATTERNS, Pattern};
 use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_calibration::camera::program::{self, Shot};
 use phasefront_calibration::colours;
-use phasefront_calibration::curves::lut::{self, Checks, Refusal};
+use phasefront_calibration::curves::lut::{self, Checks, Errors, Refusal};
 use phasefront_calibration::curves::report;
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, check_used};
 use phasefront_command::terminal::{self, progress_bar};
@@ -30,28 +30,28 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Lut {
     /// Write pattern_000.png to pattern_255.png to this folder
     #[arg(long, value_name = "DIR", group = "step", conflicts_with = "output")]
-    patterns: Option<PathBuf>,
+    pub(super) patterns: Option<PathBuf>,
     /// Level that makes the marks of the patterns dark, which turns the phase by about π [default: 105]
     #[arg(long, value_name = "LEVEL")]
-    dark: Option<u8>,
+    pub(super) dark: Option<u8>,
     /// Folder with the folders red, green and blue, or laser, of photographs
     #[arg(long, value_name = "DIR", group = "step", requires = "output")]
-    captures: Option<PathBuf>,
+    pub(super) captures: Option<PathBuf>,
     /// Output table for a phone: `per_pixel` of a display file
     #[arg(short, value_name = "FILE")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
     /// Also write the full tables to this folder: full_red.npy …, uint8 (H, W, 256)
     #[arg(long, value_name = "DIR", requires = "captures")]
-    full: Option<PathBuf>,
+    pub(super) full: Option<PathBuf>,
     /// Write drawings of curves, residuals and maps to this folder
     #[arg(long, value_name = "DIR", requires = "captures")]
-    report: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     #[command(flatten)]
-    capture: CaptureFlags,
+    pub(super) capture: CaptureFlags,
     #[command(flatten)]
-    display: DisplayFlags,
+    pub(super) display: DisplayFlags,
     #[command(flatten)]
-    overwrite: OverwriteFlag,
+    pub(super) overwrite: OverwriteFlag,
 }
 
 impl Lut {
@@ -61,19 +61,31 @@ impl Lut {
         let by_hand = self.patterns.is_some() || self.capture.is_given();
         check_used(&[("--dark", self.dark.is_some(), by_hand, "--patterns or --capture")])?;
         self.check_outputs()?;
+        match &self.patterns {
+            Some(folder) => self.write_patterns(json, folder),
+            None => {
+                self.calibrate(&mut self.capture.later()?)?.print(json);
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes the photographs that are missing, if there is a program, and measures the curves.
+    pub(super) fn calibrate(&self, capture: &mut Capture<'_>) -> Result<Told> {
+        let (Some(captures), Some(output)) = (&self.captures, &self.output) else {
+            return Err(Error::Input("give --patterns, or --captures and -o".into()));
+        };
         let display = self.display.read_without_offset()?.target.display;
-        if let (Some(captures), false) = (&self.captures, self.capture.is_given()) {
+        if !capture.is_given() {
             reading_captures(captures, colours(&display))?;
         }
-        let pattern = Pattern::new(display.height(), display.width())?.with_dark(self.dark.unwrap_or(DARK));
-        match (&self.patterns, &self.captures, &self.output) {
-            (Some(folder), ..) => self.write_patterns(json, &pattern, folder),
-            (None, Some(captures), Some(output)) => {
-                self.take(&display, &pattern, captures)?;
-                self.measure(json, &display, &pattern, captures, output)
-            }
-            _ => Err(Error::Input("give --patterns, or --captures and -o".into())),
-        }
+        let pattern = self.pattern(&display)?;
+        self.take(&display, &pattern, captures, capture)?;
+        self.measure(&display, &pattern, captures, output)
+    }
+
+    fn pattern(&self, display: &Display) -> Result<Pattern> {
+        Ok(Pattern::new(display.height(), display.width())?.with_dark(self.dark.unwrap_or(DARK)))
     }
 
     fn check_outputs(&self) -> Result<()> {
@@ -83,7 +95,8 @@ impl Lut {
         (self.output.iter()).try_for_each(|path| output::new_file(path, &[], self.overwrite.is_given()))
     }
 
-    fn write_patterns(&self, json: bool, pattern: &Pattern, folder: &Path) -> Result<()> {
+    fn write_patterns(&self, json: bool, folder: &Path) -> Result<()> {
+        let pattern = self.pattern(&self.display.read_without_offset()?.target.display)?;
         let path = |k: usize| folder.join(format!("pattern_{k:03}.png"));
         output::make_folder(folder)?;
         let bar = progress_bar(PATTERNS as u64, "patterns");
@@ -104,10 +117,10 @@ impl Lut {
     }
 
     /// Lets the program of --capture, if there is one, take the photographs that are missing.
-    fn take(&self, display: &Display, pattern: &Pattern, captures: &Path) -> Result<()> {
-        let Some(mut program) = self.capture.start()? else {
+    fn take(&self, display: &Display, pattern: &Pattern, captures: &Path, capture: &mut Capture<'_>) -> Result<()> {
+        if !capture.is_given() {
             return Ok(());
-        };
+        }
         let lasers = colours(display).iter().zip(display.wavelengths_m());
         for (colour, (name, wavelength_m)) in lasers.enumerate() {
             let folder = captures.join(name);
@@ -136,14 +149,16 @@ impl Lut {
                     // No pattern is brighter than the first, and all have its exposure.
                     may_expose: k == 0,
                 };
-                program.take(&shot, &folder.join(format!("capture_{k:03}.png")), check)?;
+                if let Some(program) = capture.program()? {
+                    program.take(&shot, &folder.join(format!("capture_{k:03}.png")), check)?;
+                }
             }
             bar.finish_and_clear();
         }
         Ok(())
     }
 
-    fn measure(&self, json: bool, display: &Display, pattern: &Pattern, captures: &Path, path: &Path) -> Result<()> {
+    fn measure(&self, display: &Display, pattern: &Pattern, captures: &Path, path: &Path) -> Result<Told> {
         let colours = colours(display);
         let spool = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -201,11 +216,23 @@ impl Lut {
             }
         }
         calibration::write_per_pixel(path, &per_pixel)?;
-        terminal::print(
-            json,
-            &json!({"output": path.display().to_string(), "report": report}),
-            format!("{}\n{}", report.text(), terminal::name(path)),
-        );
-        Ok(())
+        let errors = |of: fn(&Errors) -> f64| {
+            let all: Vec<_> = report
+                .colours
+                .iter()
+                .map(|c| format!("{:.3}", of(&c.errors_rad)))
+                .collect();
+            all.join(" / ")
+        };
+        Ok(Told {
+            table: report.text(),
+            line: format!(
+                "{}: phase error {} rad without it, {} with it, by its own measurement",
+                terminal::name(path),
+                errors(|e| e.linear_rms),
+                errors(|e| e.compact_rms),
+            ),
+            value: json!({"output": path.display().to_string(), "report": report}),
+        })
     }
 }

@@ -1,12 +1,12 @@
 //! `phasefront calibrate model`: what photographs of holograms say about a display beyond its other calibrations.
 
-use super::capture::CaptureFlags;
-use super::{channel, find_photo};
+use super::capture::{Capture, CaptureFlags};
+use super::{Told, channel, find_photo};
 use clap::Args;
 use phasefront::Target;
 use phasefront_calibration::camera::pattern::Pattern;
 use phasefront_calibration::camera::photograph::Photograph;
-use phasefront_calibration::camera::program::{self, CaptureProgram, Shot};
+use phasefront_calibration::camera::program::{self, Shot};
 use phasefront_calibration::colours;
 use phasefront_calibration::learned::album::Album;
 use phasefront_calibration::learned::fit::{self, Fitted, Sample};
@@ -36,19 +36,19 @@ const LIST: &str = "holograms.json";
 pub(crate) struct LearnModel {
     /// Folder of the holograms and their photographs
     #[arg(value_name = "DIR")]
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Number of photographs for each colour
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(4..=1000))]
-    photographs: u16,
+    pub(super) photographs: u16,
     #[command(flatten)]
-    capture: CaptureFlags,
+    pub(super) capture: CaptureFlags,
     #[command(flatten)]
-    display: DisplayFlags,
+    pub(super) display: DisplayFlags,
     /// Output model: `model` of a display file
     #[arg(short, value_name = "FILE")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     #[command(flatten)]
-    overwrite: OverwriteFlag,
+    pub(super) overwrite: OverwriteFlag,
 }
 
 /// The contents of [`LIST`].
@@ -62,6 +62,12 @@ struct List {
 impl LearnModel {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         output::new_file(&self.output, &[], self.overwrite.is_given())?;
+        self.calibrate(&mut self.capture.later()?)?.print(json);
+        Ok(())
+    }
+
+    /// Takes the photographs that are missing, if there is a program, and fits the model if none is missing.
+    pub(super) fn calibrate(&self, capture: &mut Capture<'_>) -> Result<Told> {
         output::folder(&self.folder, Holding::RunOf(LIST))?;
         let target = Target {
             model: None,
@@ -69,49 +75,43 @@ impl LearnModel {
         };
         target.check()?;
         self.check_list(&target)?;
-        let mut program = self.capture.start()?;
-        let (mut fitted, mut missing): (Vec<Fitted>, usize) = (Vec::new(), 0);
-        for (colour, name) in colours(&target.display).iter().enumerate() {
-            let folder = self.folder.join(name);
-            output::make_folder(&folder)?;
-            let job = OfColour {
-                target: &target,
-                colour,
-                name,
-                folder,
-                count: self.photographs.into(),
-            };
-            let (samples, without) = job.samples(&mut program)?;
-            missing += without;
-            if missing > 0 {
-                continue;
-            }
-            let bar = progress_bar(0, name);
-            let progress = |done: usize, of: usize| {
-                bar.set_length(of as u64);
-                bar.set_position(done as u64);
-            };
-            let one = fit::fit(&target, colour, &samples, &progress);
-            bar.finish_and_clear();
-            fitted.push(one.map_err(|e| Error::file(&job.folder, e))?);
+        let names = colours(&target.display);
+        let jobs = names.iter().enumerate().map(|(colour, name)| OfColour {
+            target: &target,
+            colour,
+            name,
+            folder: self.folder.join(name),
+            count: self.photographs.into(),
+        });
+        let jobs: Vec<_> = jobs.collect();
+        // All photographs are there before the first fit, which takes minutes.
+        let mut missing = 0;
+        for job in jobs.iter().filter(|_| !jobs.iter().all(OfColour::is_complete)) {
+            output::make_folder(&job.folder)?;
+            missing += job.samples(capture)?.1;
         }
         if missing > 0 {
-            return self.ask(json, missing);
+            return Ok(self.ask(missing));
         }
+        let fitted: Result<Vec<Fitted>> = jobs.iter().map(|job| job.fit(capture)).collect();
+        let fitted = fitted?;
         let misfit: Vec<[f64; 2]> = fitted.iter().map(|one| one.misfit).collect();
         let models = fitted.into_iter().map(|one| one.model).collect();
         calibration::write_model(&self.output, &Model::new(fit::nodes(target.modulator()), models)?)?;
-        let told: Vec<String> = (misfit.iter().zip(colours(&target.display)))
-            .map(|([before, after], name)| {
-                format!("{name}: misfit of the light {before:.3} without the model, {after:.3} with it")
-            })
-            .collect();
-        terminal::print(
-            json,
-            &json!({"output": self.output.display().to_string(), "misfit": misfit}),
-            format!("{}\n{}", told.join("\n"), terminal::name(&self.output)),
-        );
-        Ok(())
+        let list = |which: usize| {
+            let all: Vec<_> = misfit.iter().map(|of| format!("{:.3}", of[which])).collect();
+            all.join(" / ")
+        };
+        Ok(Told::new(
+            json!({"output": self.output.display().to_string(), "misfit": misfit}),
+            format!(
+                "{}: misfit of the light {} without the model, {} with it ({})",
+                terminal::name(&self.output),
+                list(0),
+                list(1),
+                names.join(" / ")
+            ),
+        ))
     }
 
     /// Writes the list of holograms, or compares it with that of an earlier run.
@@ -141,16 +141,14 @@ impl LearnModel {
         output::write_atomically(&path, |file| writeln!(file, "{text}"))
     }
 
-    fn ask(&self, json: bool, missing: usize) -> Result<()> {
-        terminal::print(
-            json,
-            &json!({"folder": self.folder.display().to_string(), "missing": missing}),
+    fn ask(&self, missing: usize) -> Told {
+        Told::new(
+            json!({"folder": self.folder.display().to_string(), "missing": missing}),
             format!(
                 "{missing} photographs to take: show marks.png and each hologram_….png of {}, focus as {LIST} says, photograph them as capture_marks.png, capture_000.png …, then run this again",
                 terminal::name(&self.folder)
             ),
-        );
-        Ok(())
+        )
     }
 }
 
@@ -164,8 +162,27 @@ struct OfColour<'a> {
 }
 
 impl OfColour<'_> {
-    /// Returns the photographs and the number of those that are missing. Lets `program` take them if there is one.
-    fn samples(&self, program: &mut Option<CaptureProgram>) -> Result<(Vec<Sample>, usize)> {
+    /// Checks whether all photographs are there.
+    fn is_complete(&self) -> bool {
+        let there = |stem: &str| find_photo(&self.folder, &format!("capture_{stem}")).is_some();
+        there("marks") && (0..self.count).all(|index| there(&format!("{index:03}")))
+    }
+
+    /// Fits the model to the photographs.
+    fn fit(&self, capture: &mut Capture<'_>) -> Result<Fitted> {
+        let (samples, _) = self.samples(capture)?;
+        let bar = progress_bar(0, self.name);
+        let progress = |done: usize, of: usize| {
+            bar.set_length(of as u64);
+            bar.set_position(done as u64);
+        };
+        let fitted = fit::fit(self.target, self.colour, &samples, &progress);
+        bar.finish_and_clear();
+        fitted.map_err(|e| Error::file(&self.folder, e))
+    }
+
+    /// Returns the photographs and the number of those that are missing. A program takes them if there is one.
+    fn samples(&self, capture: &mut Capture<'_>) -> Result<(Vec<Sample>, usize)> {
         let (height, width) = self.target.modulator();
         let pattern = Pattern::new(height, width)?;
         let marks = scenes::marks(
@@ -175,7 +192,7 @@ impl OfColour<'_> {
             scenes::z_m(self.target, 0, self.count),
         )?;
         let begin = |photo: &Photograph| Album::new(self.target, self.colour, photo);
-        let mut album = self.photograph("marks", &marks, program, begin)?;
+        let mut album = self.photograph("marks", &marks, capture, begin)?;
         let (mut samples, mut missing) = (Vec::new(), usize::from(album.is_none()));
         let bar = progress_bar(self.count as u64, self.name);
         for index in 0..self.count {
@@ -189,7 +206,7 @@ impl OfColour<'_> {
                 }
             };
             match self
-                .photograph(&format!("{index:03}"), &scene, program, check)?
+                .photograph(&format!("{index:03}"), &scene, capture, check)?
                 .flatten()
             {
                 None => missing += 1,
@@ -204,13 +221,13 @@ impl OfColour<'_> {
         Ok((samples, missing))
     }
 
-    /// Returns what `check` says of the photograph of `scene`, which `program` takes if it is not there. Without a
+    /// Returns what `check` says of the photograph of `scene`, which a program takes if it is not there. Without a
     /// program, writes the levels and returns `None`.
     fn photograph<T>(
         &self,
         stem: &str,
         scene: &Scene,
-        program: &mut Option<CaptureProgram>,
+        capture: &mut Capture<'_>,
         mut check: impl FnMut(&Photograph) -> std::result::Result<T, String>,
     ) -> Result<Option<T>> {
         let channel = channel(&self.target.display, self.colour);
@@ -232,7 +249,7 @@ impl OfColour<'_> {
             // The fit finds the exposure of each photograph.
             may_expose: true,
         };
-        if let Some(program) = program {
+        if let Some(program) = capture.program()? {
             let path = self.folder.join(format!("capture_{stem}.png"));
             return program.take(&shot, &path, read).map(Some);
         }
