@@ -100,6 +100,19 @@ impl ColourModel {
         [0.0, TAU].map(|phase| self.response(phase).0)
     }
 
+    /// Returns the response that is `wanted` modulo 2π, or the nearest within reach.
+    pub fn nearest(&self, wanted: f32) -> f32 {
+        let [low, high] = self.reach();
+        let turned = low + (wanted - low).rem_euclid(TAU);
+        if turned <= high {
+            turned
+        } else if turned - high < low + TAU - turned {
+            high
+        } else {
+            low
+        }
+    }
+
     /// Returns the phase in \[0, 2π] whose response is `wanted`, or the nearest within reach.
     pub fn inverse(&self, wanted: f32) -> f32 {
         let (mut from, mut to) = (0.0, TAU);

@@ -2,12 +2,11 @@
 //! ([`crate::display::model`]). The phases of the encoder are those of an ideal display; these steps replace them by
 //! phases whose light on this display is nearest to the target field at the midpoint.
 //!
-//! The steps begin with the encoder's phases turned such that phase 0 lies in the middle of what a pixel reaches, so
-//! that they wrap as little as possible: where neighbours lie on both sides of the wrap, crosstalk passes through all
-//! phases between. Phases then go through the inverse of the learned curve. Without steps, crosstalk is undone before
-//! that, as far as the pixels reach: [`SHARPENINGS`] steps r ← r + μ·(ψ − W∗r), μ = [`SHARPER`], bring the pixels' own
-//! phases r to those whose blurred phases are ψ. Steps do not begin there: they end 3 dB lower. A step follows the
-//! gradient of
+//! The steps begin with the encoder's phases turned by π, so that they wrap as little as possible: where neighbours lie
+//! on both sides of the wrap, crosstalk passes through all phases between. Phases then go through the inverse of the
+//! learned curve. Without steps, the phases are turned into the middle of what a pixel reaches, and crosstalk is undone
+//! as far as the pixels reach: [`SHARPENINGS`] steps r ← r + μ·(ψ − W∗r), μ = [`SHARPER`], bring the pixels' own phases
+//! r to those whose blurred phases are ψ. Other steps that begin there end lower. A step follows the gradient of
 //!
 //!   E = λ·Σ|u − cT|² + (1 − λ)·Σ(|u| − |cT|)²,  u = K(v(θ)),
 //!
@@ -170,7 +169,13 @@ impl ModelSteps {
         assert_eq!(phases.len(), scratch.field.len());
         let area = self.height * self.width;
         for (colour, phases) in phases.chunks_exact_mut(area).enumerate() {
-            self.undo(colour, phases, scratch);
+            if self.steps == 0 {
+                self.undo(colour, phases, scratch);
+            } else {
+                let model = &self.model.colours()[colour];
+                let start = |phase: f32| model.inverse(model.nearest(wrap(phase + PI))).min(TAU.next_down());
+                (phases.par_chunks_exact_mut(self.width).flatten()).for_each(|phase| *phase = start(*phase));
+            }
             let mut wanted = std::mem::take(&mut scratch.field);
             self.correct_colour(colour, &mut wanted[colour * area..][..area], phases, scratch);
             scratch.field = wanted;
@@ -192,8 +197,7 @@ impl ModelSteps {
                 *own = *phase;
             }
         });
-        let sharpenings = if self.steps == 0 { SHARPENINGS } else { 0 };
-        for _ in 0..sharpenings {
+        for _ in 0..SHARPENINGS {
             let own = &*responses;
             (spread.par_chunks_exact_mut(width).enumerate()).for_each(|(y, row)| model.spread_row(own, y, row));
             let rows = (responses
