@@ -1,7 +1,6 @@
 //! The sources of the input stage and their parts of its program.
 
 use super::camera::Camera;
-use super::condition::Conditioning;
 use super::frame::{Colour, ColourData, Depth, DepthData, Frame};
 use crate::Result;
 use crate::device::Device;
@@ -17,9 +16,7 @@ pub(crate) enum Source<'a> {
     Field(&'a wgpu::Buffer, InputKind),
     /// A frame's surfaces and the sweep's field of that frame, both on the GPU.
     Seeded(&'a wgpu::Buffer, &'a wgpu::Buffer),
-    /// A frame's surfaces on the GPU: red, green, blue and depth.
-    Surfaces(&'a wgpu::Buffer),
-    /// A frame, in the packer's own buffers. Its surfaces have no depth if that is readings.
+    /// A frame, in the packer's own buffers.
     Frame(Colour, Depth),
 }
 
@@ -42,9 +39,7 @@ pub(super) struct Frames {
     pub(super) camera: Option<Camera>,
     size: (usize, usize),
     colour: wgpu::Buffer,
-    depth: Option<wgpu::Buffer>,
-    /// Adds the depth of readings.
-    pub(super) conditioning: Option<Conditioning>,
+    depth: wgpu::Buffer,
 }
 
 impl Reader {
@@ -76,10 +71,6 @@ impl Reader {
                 second: Some(seed.clone()),
                 ..reader(include_str!("seeded.wgsl"), surfaces.clone())
             },
-            Source::Surfaces(surfaces) => {
-                let text = [include_str!("surfaces.wgsl"), include_str!("frame.wgsl")].concat();
-                reader(&text, surfaces.clone())
-            }
             Source::Frame(colour, depth) => Reader::of_frames(device, colour, depth, size)?,
         })
     }
@@ -104,27 +95,21 @@ impl Reader {
             }
         };
         let depth_bytes = match depth {
-            Depth::F32 => Some(4 * area),
-            Depth::U16 => Some(2 * area),
-            Depth::Readings { .. } => None,
-        };
-        let depth_text = match depth_bytes {
-            Some(_) => include_str!("depth.wgsl"),
-            None => "fn distance_at(at: u32) -> f32 { return 0.0; }\n",
+            Depth::F32 => 4 * area,
+            Depth::U16 => 2 * area,
         };
         let frames = Frames {
             formats: (colour, depth),
             camera,
             size,
             colour: device.buffer("colour", bytes)?,
-            depth: depth_bytes.map(|bytes| device.buffer("depth", bytes)).transpose()?,
-            conditioning: None,
+            depth: device.buffer("depth", depth_bytes)?,
         };
         Ok(Reader {
             header,
-            text: [text, depth_text, include_str!("frame.wgsl")].concat(),
+            text: text.to_owned() + include_str!("frame.wgsl"),
             first: frames.colour.clone(),
-            second: frames.depth.clone(),
+            second: Some(frames.depth.clone()),
             frames: Some(frames),
         })
     }
@@ -159,17 +144,14 @@ impl Frames {
             }
             _ => return Err(other("colour").into()),
         }
-        match (frame.depth, depth, &self.depth, &self.conditioning) {
-            (DepthData::F32(values), Depth::F32, Some(buffer), _) => {
+        match (frame.depth, depth) {
+            (DepthData::F32(values), Depth::F32) => {
                 length("depth", values.len(), area)?;
-                device.write(buffer, 0, bytemuck::cast_slice(values));
+                device.write(&self.depth, 0, bytemuck::cast_slice(values));
             }
-            (DepthData::U16(words), Depth::U16, Some(buffer), _) => {
+            (DepthData::U16(words), Depth::U16) => {
                 length("depth", words.len(), area)?;
-                device.write(buffer, 0, bytemuck::cast_slice(words));
-            }
-            (DepthData::Readings(readings), Depth::Readings { .. }, _, Some(conditioning)) => {
-                conditioning.upload(device, &readings)?;
+                device.write(&self.depth, 0, bytemuck::cast_slice(words));
             }
             _ => return Err(other("depth").into()),
         }
