@@ -177,7 +177,7 @@ impl RawHologram {
     }
 
     /// Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
-    /// Coordinates run from 0 to 1 from the upper left corner. After a frame on a GPU, depth has the sensor's resolution.
+    /// Coordinates run from 0 to 1 from the upper left corner.
     pub fn z_at(&self, x: f64, y: f64) -> f64 {
         self.core.z_at(x, y) * 1e3
     }
