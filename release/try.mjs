@@ -10,5 +10,5 @@ const pixels = (path, bytes) => readFileSync(path).subarray(-bytes * size.width 
 
 await load(readFileSync(new URL("node_modules/phasefront/raw/phasefront_web_bg.wasm", import.meta.url)));
 const session = new Session({ target: size });
-const frame = new Frame({ ...size, data: pixels(rgb, 3), format: "rgb" }, { ...size, data: pixels(depth, 1) });
+const frame = new Frame({ ...size, data: pixels(rgb, 3), format: "RGB" }, { ...size, data: pixels(depth, 1) });
 writeFileSync(levels, session.process(frame).levels);
