@@ -5,7 +5,7 @@
 //! The steps begin with the encoder's phases turned by π, so that they wrap as little as possible: where neighbours lie
 //! on both sides of the wrap, crosstalk passes through all phases between. Phases then go through the inverse of the
 //! learned curve. Without steps, the phases are turned into the middle of what a pixel reaches, and crosstalk is undone
-//! as far as the pixels reach: [`SHARPENINGS`] steps r ← r + μ·(ψ − W∗r), μ = [`SHARPER`], bring the pixels' own phases
+//! as far as the pixels reach: `SHARPENINGS` steps r ← r + μ·(ψ − W∗r), μ = `SHARPER`, bring the pixels' own phases
 //! r to those whose blurred phases are ψ. Other steps that begin there end lower. A step follows the gradient of
 //!
 //!   E = λ·Σ|u − cT|² + (1 − λ)·Σ(|u| − |cT|)²,  u = K(v(θ)),
