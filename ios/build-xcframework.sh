@@ -59,7 +59,6 @@ else
 fi
 
 sysroot=$(rustc --print sysroot)
-host=$(rustc -vV | sed -n 's/^host: //p')
 for target in "${targets[@]}"; do
     standard=()
     [ -d "$sysroot/lib/rustlib/$target/lib" ] || rustup target add "$target" || {
@@ -71,9 +70,7 @@ for target in "${targets[@]}"; do
     library="$built/$target/${profile/#dev/debug}/libphasefront_ffi.a"
     mkdir -p "$build/$target"
     cp "$library" "$build/$target/"
-    # Bitcode serves only further optimization, and Debian's LLVM does not read that of a newer one.
-    LD_LIBRARY_PATH="$sysroot/lib" "$sysroot/lib/rustlib/$host/bin/rust-objcopy" --strip-debug \
-        --remove-section=__LLVM,__bitcode --remove-section=__LLVM,__cmdline "$build/$target/libphasefront_ffi.a"
+    release/without-bitcode "$build/$target/libphasefront_ffi.a"
 done
 ios/required-reasons "$build/${targets[0]}/libphasefront_ffi.a"
 
