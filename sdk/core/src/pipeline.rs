@@ -35,9 +35,9 @@ pub struct PipelineScratch {
 /// The time that each stage of a frame took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameTimes {
-    /// Rotating, converting and resizing the colour image. On a GPU this includes the depth.
+    /// Rotating, converting and resizing the colour image. On a GPU this includes depth of the frame's size.
     pub colour: Duration,
-    /// Reading, aligning, temporally smoothing and refining the depth.
+    /// Reading, aligning, temporally smoothing and conditioning the depth.
     pub depth: Duration,
     /// Computing the midpoint hologram from the frame. On a GPU this includes both transfers.
     pub method: Duration,

@@ -2,6 +2,7 @@
 //! counterparts are [`phasefront_core::frame`] and the quantiser of the kernels.
 
 mod camera;
+mod condition;
 mod frame;
 mod rounding;
 mod source;
@@ -12,6 +13,7 @@ pub(super) use source::Source;
 use super::Result;
 use super::device::{Device, Dispatch};
 use super::numbers::{GROUP, Numbers};
+use condition::Conditioning;
 use phasefront_core::method::network::chain::Chain;
 use source::{Frames, Reader};
 
@@ -107,12 +109,42 @@ pub(super) struct Packer {
     frames: Option<Frames>,
     pub(super) input: ChainInput,
     step: Dispatch,
+    /// Converts surfaces whose depth was decided on the GPU.
+    last: Option<Box<Packer>>,
 }
 
 impl Packer {
     /// Plans the stage for frames of `size` (height, width). It writes to new memory or to `input`, the memory of
     /// another stage of the same form and size.
     pub(super) fn new(
+        device: &Device,
+        form: Form<'_>,
+        size: (usize, usize),
+        source: Source<'_>,
+        input: Option<ChainInput>,
+    ) -> Result<Self> {
+        let Source::Frame(_, Depth::Readings { height, width }) = source else {
+            return Self::alone(device, form, size, source, input);
+        };
+        let (is_last, surfaces) = match form {
+            Form::Surfaces => (true, input.clone()),
+            Form::Chain(..) => (false, None),
+        };
+        let mut packer = Self::alone(device, Form::Surfaces, size, source, surfaces)?;
+        let surfaces = packer.input.first.clone();
+        if let Some(frames) = &mut packer.frames {
+            frames.conditioning = Some(Conditioning::new(device, (height, width), size, &surfaces)?);
+        }
+        if !is_last {
+            let last = Self::alone(device, form, size, Source::Surfaces(&surfaces), input)?;
+            packer.input = last.input.clone();
+            packer.last = Some(Box::new(last));
+        }
+        Ok(packer)
+    }
+
+    /// Plans the stage without conditioning.
+    fn alone(
         device: &Device,
         form: Form<'_>,
         size: (usize, usize),
@@ -159,6 +191,7 @@ impl Packer {
             frames,
             input,
             step,
+            last: None,
         })
     }
 
@@ -177,6 +210,17 @@ impl Packer {
 
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.step.run(pass);
+    }
+
+    /// Decides the depth of the pixels, if it comes as readings, after [`Self::run`].
+    pub(super) fn condition(&self, pass: &mut wgpu::ComputePass<'_>) {
+        let conditioning = self.frames.as_ref().and_then(|frames| frames.conditioning.as_ref());
+        if let Some(conditioning) = conditioning {
+            conditioning.run(pass);
+        }
+        if let Some(last) = &self.last {
+            last.run(pass);
+        }
     }
 }
 

@@ -4,12 +4,12 @@
 //!
 //! Each stage is a .wgsl file beside its Rust file. The Rust code prepends a header of constants to the shader text, so
 //! that loops have constant bounds. The CPU stage is the reference: f32 agrees with it to 1e-4, int8 networks agree bit
-//! for bit. A device is used only after it has computed a small frame as the CPU does.
+//! for bit. A device is used only after it has computed small frames as the CPU does.
 //!
 //! | module | purpose |
 //! |---|---|
 //! | `device` | opens a GPU, compiles programs, allocates memory, returns failures as errors |
-//! | `input` | converts camera formats to groups of four channels |
+//! | `input` | converts camera formats to groups of four channels, and decides the depth of pixels from readings |
 //! | `method` | runs a network (`chain`), the plane sweep (`sweep`, `hidden`), or the network on the sweep's field |
 //! | `fft` | applies a filter in the Fourier domain in three dispatches |
 //! | `encode` | filters, largest amplitude, double phase, levels, local and midpoint correction |

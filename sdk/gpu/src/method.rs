@@ -138,9 +138,14 @@ impl MethodPlan {
         self.packer.upload(device, frame)
     }
 
-    /// Converts the uploaded frame to the method's input.
+    /// Converts the uploaded frame to the method's input, up to depth that comes as readings.
     pub(super) fn read(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.packer.run(pass);
+    }
+
+    /// Adds depth that comes as readings.
+    pub(super) fn condition(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.packer.condition(pass);
     }
 
     /// Computes the field from the converted input.

@@ -25,7 +25,7 @@ pub const FLIGHTS: usize = 3;
 const LEVELS_AT: usize = 256;
 const STAMPS_AT: u64 = 16;
 /// The number of time stamps of a frame: one before and one after each stage.
-const STAMPS: u32 = 8;
+const STAMPS: u32 = 10;
 
 /// A description of the holograms to compute.
 #[derive(Clone)]
@@ -307,6 +307,25 @@ impl GpuPipeline {
         })
     }
 
+    /// Reads a frame without making its hologram, so that the next one has its past.
+    ///
+    /// # Errors
+    /// Returns an error if the frame's byte lengths differ from the plan, or the device is lost.
+    pub async fn read_async(&mut self, frame: &Frame<'_>) -> Result<()> {
+        let device = self.device.clone();
+        let work = || {
+            self.method.upload(&device, frame)?;
+            let mut encoder = device.inner.create_command_encoder(&Default::default());
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            self.method.read(&mut pass);
+            self.method.condition(&mut pass);
+            drop(pass);
+            device.queue.submit([encoder.finish()]);
+            Ok(())
+        };
+        device.guarded_async(work).await
+    }
+
     fn commands(&self, at: usize, deliver: Deliver) -> wgpu::CommandBuffer {
         let slot = &self.slots[at];
         let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
@@ -324,18 +343,19 @@ impl GpuPipeline {
             work(&mut pass);
         };
         stage(0, &|pass| self.method.read(pass));
-        stage(1, &|pass| {
+        stage(1, &|pass| self.method.condition(pass));
+        stage(2, &|pass| {
             self.method.run(pass);
             if let Some(mean) = &self.mean {
                 mean.run(pass);
             }
         });
-        stage(2, &|pass| {
+        stage(3, &|pass| {
             if let Some(offset) = &self.offset {
                 offset.run(pass);
             }
         });
-        stage(3, &|pass| self.encoder.run(pass, at));
+        stage(4, &|pass| self.encoder.run(pass, at));
         encoder.copy_buffer_to_buffer(&self.encoder.largest, 0, &slot.readable, 0, 16);
         if let Some((set, resolved)) = &slot.stamps {
             let bytes = u64::from(STAMPS) * 8;
@@ -455,10 +475,10 @@ impl GpuPipeline {
             scale: self.encoder.scale(word(0)),
             times: slot.stamps.is_some().then(|| FrameTimes {
                 colour: stage(0),
-                method: stage(1),
-                propagate: stage(2),
-                encode: stage(3),
-                ..FrameTimes::default()
+                depth: stage(1),
+                method: stage(2),
+                propagate: stage(3),
+                encode: stage(4),
             }),
         })
     }

@@ -1,20 +1,25 @@
-//! Checks a device by comparing a small frame with the CPU's.
+//! Checks a device by comparing small frames with the CPU's.
 
 use super::device::Device;
-use super::input::Frame;
+use super::input::{Colour, ColourData, Depth, DepthData, Frame};
 use super::pipeline::{Deliver, GpuPipeline, Job};
 use super::{GpuError, Result};
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
+use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
-use phasefront_core::frame::RgbdFrame;
+use phasefront_core::frame::{Crop, RgbdFrame};
+use phasefront_core::pipeline::Pipeline;
 use std::sync::Arc;
 
 /// The rows and columns of the frame: odd, and more than one tile of every program.
 const SIZE: (usize, usize) = (37, 43);
+/// The rows and columns of the readings that become the depth of such a frame.
+const READINGS: (usize, usize) = (9, 11);
 
-/// Runs a small frame of `job` on `device` and on the CPU and compares their phases.
+/// Runs small frames of `job`, with depth of their size and with readings, on `device` and on the CPU and compares
+/// their phases.
 ///
 /// # Errors
 /// Returns [`GpuError::Wrong`] if the phases differ by more than the rounding of the numbers, [`GpuError::Lost`] if the
@@ -30,24 +35,45 @@ pub async fn probe_async(device: &Arc<Device>, job: &Job) -> Result<()> {
             },
             ..job.target.clone()
         },
-        colour: super::Colour::Planar,
-        depth: super::Depth::F32,
+        colour: Colour::Planar,
+        depth: Depth::F32,
         ..job.clone()
     };
     // The GPU goes first, so that its errors are known before the CPU works.
     let mut gpu = GpuPipeline::new_async(device, &job).await?;
-    let size = 3 * SIZE.0 * SIZE.1;
-    let frame = frame()?;
-    let cpu = job.on_cpu()?;
-    let mut scratch = cpu.scratch();
-    let mut expected = vec![0; size];
-    cpu.process(&frame, &mut expected, &mut scratch)?;
-    let mut levels = vec![0; size];
+    let (mut frame, cpu) = (frame()?, job.on_cpu()?);
     // Two frames, because the state that one leaves must not affect the next.
-    for _ in 0..2 {
-        let ticket = gpu.submit_async(None, &Frame::of(&frame), Deliver::Levels).await?;
+    let twice = [Frame::of(&frame); 2];
+    compare(&mut gpu, &twice, &on_cpu(&cpu, &frame)?, &job.target.response).await?;
+    let rgb = frame.values().0.to_vec();
+    let plan = Conditioner::new(READINGS, Crop::cover(READINGS, SIZE), SIZE, true)?;
+    let mut scratch = plan.scratch();
+    plan.find(&readings(), &rgb, &mut scratch)?;
+    plan.decide(&rgb, frame.planes_mut().1, &mut scratch);
+    let (height, width) = READINGS;
+    gpu.expect_async(Colour::Planar, Depth::Readings { height, width })
+        .await?;
+    let given = Frame {
+        colour: ColourData::Planar(&rgb),
+        depth: DepthData::Readings(plan.readings(&scratch)),
+    };
+    compare(&mut gpu, &[given], &on_cpu(&cpu, &frame)?, &job.target.response).await
+}
+
+/// Returns the CPU's levels.
+fn on_cpu(cpu: &Pipeline, frame: &RgbdFrame) -> Result<Vec<u8>> {
+    let mut levels = vec![0; 3 * SIZE.0 * SIZE.1];
+    cpu.process(frame, &mut levels, &mut cpu.scratch())?;
+    Ok(levels)
+}
+
+/// Compares the phases of each of the frames with those of the `expected` levels.
+async fn compare(gpu: &mut GpuPipeline, frames: &[Frame<'_>], expected: &[u8], response: &Response) -> Result<()> {
+    let mut levels = vec![0; expected.len()];
+    for frame in frames {
+        let ticket = gpu.submit_async(None, frame, Deliver::Levels).await?;
         gpu.collect_async(ticket, &mut levels).await?;
-        let apart = apart(&levels, &expected, &job.target.response);
+        let apart = apart(&levels, expected, response);
         let most = if gpu.numbers() == "f16" { 0.1 } else { 0.01 };
         if apart > most {
             return Err(GpuError::Wrong(format!(
@@ -85,6 +111,18 @@ fn frame() -> Result<RgbdFrame> {
         }
     });
     Ok(RgbdFrame::new(rgb, depth)?)
+}
+
+/// Creates readings of two surfaces with mixed readings between them, and holes.
+fn readings() -> Vec<f32> {
+    let (height, width) = READINGS;
+    let reading = |i: usize| match (i / width, i % width) {
+        (2, 7) => f32::NAN,
+        (_, x) if 2 * x < width => 0.1 + 0.01 * x as f32,
+        (y, x) if 2 * x < width + 2 => 0.3 + 0.05 * y as f32,
+        _ => 0.9,
+    };
+    (0..height * width).map(reading).collect()
 }
 
 #[cfg(test)]

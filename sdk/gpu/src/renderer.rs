@@ -133,6 +133,23 @@ impl Renderer {
         }
     }
 
+    /// Reads a frame without making its hologram, as [`GpuPipeline::read_async`] does.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Renderer::submit`].
+    pub async fn read(&mut self, frame: &Frame<'_>) -> Result<()> {
+        loop {
+            let pipeline = match &mut self.pipeline {
+                Some(pipeline) => pipeline,
+                None => self.open(None).await?,
+            };
+            match pipeline.read_async(frame).await {
+                Ok(()) => return Ok(()),
+                Err(why) => self.note(why)?,
+            }
+        }
+    }
+
     /// Waits for a frame and copies its levels, (3, H, W).
     ///
     /// # Errors

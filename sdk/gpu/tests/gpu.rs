@@ -11,14 +11,16 @@ mod skip;
 use ndarray::{Array2, Array3};
 use network_models::{Model, frame};
 use num_complex::Complex32;
+use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::encode::brightness::Brightness;
 use phasefront_core::encode::{EncoderOptions, Encoding};
-use phasefront_core::frame::RgbdFrame;
-use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix};
+use phasefront_core::frame::{
+    ColourFormat, ColourImage, Crop, Orientation, Plane, RgbdFrame, Rotation, YuvEncoding, YuvMatrix,
+};
 use phasefront_core::method::Method;
 use phasefront_core::method::network::Network;
 use phasefront_core::method::network::{Isa, reference};
@@ -958,6 +960,54 @@ fn every_program_agrees_with_the_cpu_on_a_camera_image() {
     let apart = apart(&levels, &expected, &job.target.response);
     println!("{}: {apart:.6} apart", plan.describe());
     assert!(apart < tolerance, "{apart}");
+}
+
+/// Runs videos whose depth comes as readings, for the sweep and for networks, and compares them with those of the depth
+/// that the CPU decides from the same readings.
+#[test]
+fn every_program_agrees_with_the_cpu_on_readings() {
+    let device = device();
+    let (out, jobs) = ((13, 37), small_jobs((13, 37)));
+    for (cells, which) in [((5, 11), 3), ((13, 37), 0), ((5, 11), 1), ((7, 9), 4)] {
+        let (mut job, tolerance) = jobs[which].clone();
+        job.chain.fusion = Fusion::Layers;
+        let display = rgbd(out.0, out.1);
+        let rgb = display.values().0;
+        let plan = Conditioner::new(cells, Crop::cover(cells, out), out, true).unwrap();
+        let mut scratch = plan.scratch();
+        let mut gpu = GpuPipeline::new(&device, &job).unwrap();
+        let (height, width) = cells;
+        gpu.expect(Colour::Planar, Depth::Readings { height, width }).unwrap();
+        for time in 0..3 {
+            let reading = |i: usize| match (i / width, i % width) {
+                (1, 3) => f32::NAN,
+                (y, x) if 3 * x + y < width + time => 0.2 + 0.004 * (i * 7 % 5) as f32,
+                (_, x) => 0.8 + 0.01 * x as f32,
+            };
+            let depth: Vec<f32> = (0..height * width).map(reading).collect();
+            plan.find(&depth, rgb, &mut scratch).unwrap();
+            let frame = Frame {
+                colour: ColourData::Planar(rgb),
+                depth: DepthData::Readings(plan.readings(&scratch)),
+            };
+            let mut levels = vec![0; 3 * out.0 * out.1];
+            // The second frame is only read, and the third has it as its past.
+            match time {
+                1 => block_on(gpu.read_async(&frame)).unwrap(),
+                _ => assert!(gpu.process(&frame, &mut levels).unwrap().scale > 0.0),
+            }
+            let mut decided = display.clone();
+            plan.decide(rgb, decided.planes_mut().1, &mut scratch);
+            if time != 1 {
+                let (expected, _) = on_cpu(&job, &decided);
+                let apart = apart(&levels, &expected, &job.target.response);
+                println!("{cells:?} {time}: {apart:.6} apart");
+                assert!(apart < tolerance, "{cells:?} {time}: {apart}");
+            }
+        }
+        let flat = Frame::of(&display);
+        assert!(gpu.process(&flat, &mut vec![0; 3 * out.0 * out.1]).is_err());
+    }
 }
 
 /// Reads a texture of 8-bit RGBA back.

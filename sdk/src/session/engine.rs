@@ -136,6 +136,26 @@ impl Engine {
         report
     }
 
+    /// Returns whether the frame's depth comes as readings, from which the processor decides the depth of pixels.
+    pub(super) fn takes_readings(&self) -> bool {
+        !matches!(self.processor, Processor::Cpu(_))
+    }
+
+    /// Updates the state of the processor with a frame, without computing its levels.
+    ///
+    /// # Errors
+    /// Returns an error if the frame is invalid. Of a GPU that is lost, the next frame tells.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only a GPU has a state.
+    pub(super) async fn replay(&mut self, input: &FrameInput<'_>) -> Result<()> {
+        #[cfg(feature = "gpu")]
+        if let Processor::Gpu(gpu) = &mut self.processor
+            && let Err(Failure::Frame(why)) = gpu.read(input).await
+        {
+            return Err(why);
+        }
+        Ok(())
+    }
+
     /// Computes the levels of a frame. If the GPU turns out to be unusable, switches to the CPU from this frame on.
     ///
     /// # Errors
@@ -144,7 +164,7 @@ impl Engine {
     pub(super) async fn process(
         &mut self,
         context: &mut LevelContext<'_>,
-        input: &FrameInput<'_>,
+        input: &mut FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         levels: LevelsMut<'_>,
     ) -> Result<FrameReport> {
@@ -175,7 +195,7 @@ impl Engine {
         match &mut self.processor {
             Processor::Cpu(cpu) => {
                 let past = brightness.past(input.elapsed);
-                let made = cpu.process(past, input.rgbd, levels)?;
+                let made = cpu.process(past, input.rgbd(), levels)?;
                 brightness.set_scale(made.scale);
                 Ok(made)
             }

@@ -105,6 +105,8 @@ pub struct Hologram {
     pub(super) words: Option<Pooled<u16>>,
     /// Normalized depth as d·65535. Empty if the hologram was made of a field, whose depth is not known.
     pub(super) depth: Pooled<u16>,
+    /// The shape of `depth`, which covers the hologram at any resolution.
+    pub(super) depth_shape: (usize, usize),
     pub(super) scale: f32,
     pub(super) times: FrameTimes,
     pub(super) range_m: Option<(f32, f32)>,
@@ -181,6 +183,7 @@ impl Hologram {
                 levels,
                 words,
                 depth: Pool::default().take(0),
+                depth_shape: (0, 0),
                 scale: modulation.scale,
                 times: FrameTimes {
                     propagate,
@@ -278,13 +281,14 @@ impl Hologram {
     }
 
     /// Returns the z in metres of the scene point at (`x`, `y`) of the picture, for example to focus where the user
-    /// taps. Coordinates run from 0 to 1 from the upper left corner; values outside are clamped to the edge. Returns 0
-    /// for a hologram of a field, whose depth is not known.
+    /// taps. Coordinates run from 0 to 1 from the upper left corner; values outside are clamped to the edge. A GPU's
+    /// session knows it at the depth sensor's resolution. Returns 0 for a hologram of a field, whose depth is not
+    /// known.
     pub fn z_at(&self, x: f64, y: f64) -> f64 {
         if self.depth.values.is_empty() {
             return 0.0;
         }
-        let (height, width) = self.shape;
+        let (height, width) = self.depth_shape;
         let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
         let d = self.depth.values[at(y, height) * width + at(x, width)];
         self.viewer.target.display.z_of_depth(f64::from(d) / 65535.0)

@@ -7,7 +7,7 @@ use super::engine::BrightnessTracker;
 use super::engine::FrameInput;
 use super::engine::OnCpu;
 use super::engine::{Engine, GpuState, LevelContext};
-use super::hologram::{Hologram, Pool, Viewer};
+use super::hologram::{Hologram, Pool, Pooled, Viewer};
 use super::live::guarded;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::BackendReport;
@@ -38,7 +38,8 @@ struct LevelPlan {
 }
 
 impl LevelPlan {
-    /// Converts the colour and depth of `frame` to those of the hologram.
+    /// Converts the colour and depth of `frame` to those of the hologram. Leaves the depth of pixels undecided if the
+    /// engine decides it.
     fn take_in(
         &mut self,
         frame: &CameraFrame<'_>,
@@ -77,12 +78,55 @@ impl LevelPlan {
         let report = match estimates {
             Some(estimates) if frame.depth.is_none() => {
                 let estimate = estimates.estimate(rgb, (height, width), elapsed.is_none(), cancel)?;
-                self.depth.next_estimate(&estimate, elapsed, rgb, depth)?
+                self.depth.read_estimate(&estimate, elapsed, rgb)?
             }
-            _ => self.depth.next(frame, elapsed, rgb, depth)?,
+            _ => self.depth.read(frame, elapsed, rgb)?,
         };
+        if !self.engine.takes_readings() {
+            self.depth.decide(rgb, depth);
+        }
         times.depth = stage.end();
         Ok(report)
+    }
+
+    /// Returns the engine and its input: `camera`, which was taken in.
+    fn input<'a>(
+        &'a mut self,
+        camera: &'a CameraFrame<'_>,
+        elapsed: Option<Duration>,
+    ) -> (&'a mut Engine, FrameInput<'a>) {
+        let undecided = self.engine.takes_readings().then_some(&mut self.depth);
+        let input = FrameInput {
+            camera: Some(camera),
+            frame: &mut self.frame,
+            undecided,
+            elapsed,
+        };
+        (&mut self.engine, input)
+    }
+
+    /// Returns the depth of the frame that was taken in as d·65535, and its shape: that of the hologram, or of the
+    /// readings where the depth of pixels is undecided.
+    fn depth_map(&self, pool: &Pool<u16>) -> (Pooled<u16>, (usize, usize)) {
+        let to_word = |d: f32| (d * 65535.0 + 0.5) as u16;
+        let (height, width) = self.frame.shape();
+        if !self.engine.takes_readings() {
+            let mut map = pool.take(height * width);
+            for (to, d) in map.values.iter_mut().zip(self.frame.depth()) {
+                *to = to_word(*d);
+            }
+            return (map, (height, width));
+        }
+        let readings = self.depth.readings();
+        let (rows, columns) = readings.shape();
+        let (rows, columns) = (rows.min(height), columns.min(width));
+        let mut map = pool.take(rows * columns);
+        for (i, to) in map.values.iter_mut().enumerate() {
+            let pixel = |i: usize, n: usize, pixels: usize| (2 * i + 1) * pixels / (2 * n);
+            let (y, x) = (pixel(i / columns, rows, height), pixel(i % columns, columns, width));
+            *to = to_word(readings.depth_near(y, x));
+        }
+        (map, (rows, columns))
     }
 }
 
@@ -236,14 +280,15 @@ impl Stages {
                 gpu,
                 cancel,
             };
-            let input = FrameInput {
+            let mut input = FrameInput {
                 camera: None,
-                rgbd: &plan.frame,
+                frame: &mut plan.frame,
+                undecided: None,
                 elapsed: None,
             };
             let levels = LevelsMut::Bytes(&mut levels.values);
             (plan.engine)
-                .process(&mut context, &input, &mut brightness, levels)
+                .process(&mut context, &mut input, &mut brightness, levels)
                 .await
         };
         let result = pool.run(work).await;
@@ -321,9 +366,14 @@ impl Stages {
             ..
         } = self;
         let mut times = FrameTimes::default();
-        let taken = pool.install(|| plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times));
+        let work = async || {
+            plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
+            let (engine, input) = plan.input(frame, elapsed);
+            engine.replay(&input).await
+        };
+        let replayed = pool.run(work).await;
         self.plan = Some(plan);
-        taken?;
+        replayed?;
         given_up(&self.cancel)?;
         self.brightness.set_scale(scale);
         self.last_ns = Some(frame.timestamp_ns);
@@ -363,32 +413,24 @@ impl Stages {
         let values = display.colours() * shape.0 * shape.1;
         let mut levels = levels.take(values);
         let mut words = (display.bits() > 8).then(|| words.take(values));
-        let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
         let work = async || -> Result<_> {
             let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
             let report = plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
             given_up(cancel)?;
-            let depth = plan.frame.depth();
-            for (to, d) in depths.values.iter_mut().zip(depth) {
-                *to = (d * 65535.0 + 0.5) as u16;
-            }
+            let depth_map = plan.depth_map(depths);
             let mut context = LevelContext {
                 options,
                 quality_level,
                 gpu,
                 cancel,
             };
-            let input = FrameInput {
-                camera: Some(frame),
-                rgbd: &plan.frame,
-                elapsed,
-            };
+            let (engine, mut input) = plan.input(frame, elapsed);
             let made = match &mut words {
                 None => LevelsMut::Bytes(&mut levels.values),
                 Some(words) => LevelsMut::Words(&mut words.values),
             };
-            let encoded = (plan.engine).process(&mut context, &input, brightness, made).await?;
+            let encoded = engine.process(&mut context, &mut input, brightness, made).await?;
             given_up(cancel)?;
             if let Some(words) = &words {
                 let below = display.bits() - 8;
@@ -396,19 +438,20 @@ impl Stages {
                     *level = (*word >> below) as u8;
                 }
             }
-            Ok((report, encoded))
+            Ok((report, depth_map, encoded))
         };
-        let (report, encoded) = pool.run(work).await?;
+        let (report, (depth, depth_shape), encoded) = pool.run(work).await?;
         Ok(Hologram {
             timestamp_ns: frame.timestamp_ns,
             shape,
             levels,
             words,
-            depth: depths,
+            depth,
+            depth_shape,
             scale: encoded.scale,
             times: FrameTimes {
                 colour: times.colour,
-                depth: times.depth,
+                depth: times.depth + encoded.times.depth,
                 ..encoded.times
             },
             range_m: report.range_m,

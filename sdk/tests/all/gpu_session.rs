@@ -195,6 +195,66 @@ fn video_is_as_smooth_as_on_the_cpu() {
     assert_eq!(gpu.statistics().processed, 8);
 }
 
+/// The levels of coarse and of full-size depth, in a video in which something moves. A frame that is replayed counts.
+#[test]
+fn depth_is_conditioned_on_the_gpu_as_on_the_cpu() {
+    for (height, width) in [(H / 4, W / 4), (H, W)] {
+        let mut plain = options(W, H);
+        plain.quality_levels[0].method = Method::Sweep(Sweep::for_display(&plain.target.display));
+        let cpu = VideoSession::new(plain.clone()).unwrap();
+        let [gpu, resumed] = [(); 2].map(|()| VideoSession::new(on_gpu(plain.clone())).unwrap());
+        for time in 0..4 {
+            let scene = Scene::new(H, W, 8 + 4 * time);
+            let mut sensor = Scene::new(height, width, (8 + 4 * time) * width / W);
+            // A hole and noise.
+            sensor.metres[width / 2] = 0.0;
+            let noise = |i: usize| 0.01 * ((i * 7 + time) % 5) as f32;
+            sensor
+                .metres
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, m)| *m += noise(i) * *m);
+            let metres = sensor.depth_bytes(DepthFormat::MetresF32);
+            let depth = depth(&metres, DepthFormat::MetresF32, width, height);
+            let frame = CameraFrame::new(33_000_000 * (time as u64 + 1), scene.colour(), depth);
+            let expected = cpu.process(&frame).unwrap();
+            let made = gpu.process(&frame).unwrap();
+            let share = differing(made.levels(), expected.levels(), 0.01);
+            println!("{height}×{width} {time}: {share}");
+            assert!(share < 0.1, "{height}×{width} {time}: {share}");
+            // On the GPU z is known at the sensor's resolution.
+            for (x, y) in [(0.9, 0.8), (0.1, 0.9)] {
+                assert!((made.z_at(x, y) - expected.z_at(x, y)).abs() < 1e-4);
+            }
+            match time {
+                3 => assert_eq!(resumed.process(&frame).unwrap().levels(), made.levels()),
+                _ => resumed.replay(&frame, made.scale()).unwrap(),
+            }
+        }
+    }
+}
+
+/// Depth that is too high for a GPU turns up in the midst of a session.
+#[test]
+fn depth_that_the_gpu_refuses_is_conditioned_on_the_cpu() {
+    let height = 65_536;
+    let plain = options(W, H);
+    let cpu = ImageSession::new(plain.clone()).unwrap();
+    let gpu = ImageSession::new(on_gpu(plain)).unwrap();
+    gpu.process(&frame_at(1)).unwrap();
+    assert_ne!(gpu.statistics().backend.name, cpu.statistics().backend.name);
+    let high = Scene::new(height, 1, 0);
+    let metres = high.depth_bytes(DepthFormat::MetresF32);
+    let frame = frame(2, &high, &metres);
+    let (made, expected) = (gpu.process(&frame).unwrap(), cpu.process(&frame).unwrap());
+    assert_eq!(made.levels(), expected.levels());
+    assert!(
+        gpu.statistics().backend.why.contains("workgroups"),
+        "{:?}",
+        gpu.statistics().backend
+    );
+}
+
 fn frame_at(timestamp_ns: u64) -> CameraFrame<'static> {
     static SCENE: std::sync::OnceLock<(Scene, Vec<u8>)> = std::sync::OnceLock::new();
     let (scene, metres) = SCENE.get_or_init(|| {

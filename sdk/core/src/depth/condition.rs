@@ -14,6 +14,9 @@
 //! 9. `history`: in video, a pixel at an edge whose colour stays prefers the surface that it had.
 //!
 //! Clean depth of the display's resolution is only shifted, narrowed and filled.
+//!
+//! Steps 1 to 6 are [`Conditioner::find`]. The others, which work on the display's pixels, are [`Conditioner::decide`];
+//! a GPU runs them from the [`ConditionedReadings`].
 
 mod axis;
 mod colour;
@@ -24,6 +27,7 @@ mod history;
 mod lanes;
 mod narrow;
 mod pixels;
+mod readings;
 pub mod reference;
 mod register;
 mod smooth;
@@ -38,6 +42,7 @@ use colour::Moments;
 use edges::Kind;
 use fill::FillScratch;
 use pixels::{Decider, Pixels};
+pub use readings::{ConditionedReadings, constants};
 pub use register::Misfit;
 use register::Registration;
 use smooth::SmoothScratch;
@@ -64,6 +69,8 @@ pub struct ConditionScratch {
     filled: Vec<bool>,
     /// Whether readings of the previous frame mixed surfaces.
     mixed: Option<bool>,
+    /// The number of frames since the last reset.
+    frames: usize,
     kinds: Vec<Kind>,
     bent: Vec<bool>,
     colours: Vec<Moments>,
@@ -78,6 +85,7 @@ impl ConditionScratch {
         self.registration.iter_mut().for_each(Registration::reset);
         self.pixels.reset();
         self.mixed = None;
+        self.frames = 0;
     }
 }
 
@@ -121,6 +129,7 @@ impl Conditioner {
             before: vec![0.0; size],
             filled: vec![false; size],
             mixed: None,
+            frames: 0,
             kinds: vec![Kind::Inside; size],
             bent: vec![false; size],
             colours: vec![Moments::default(); size],
@@ -141,10 +150,22 @@ impl Conditioner {
     /// # Panics
     /// Panics if a length does not match its shape.
     pub fn condition(&self, depth: &[f32], rgb: &[f32], to: &mut [f32], scratch: &mut ConditionScratch) -> Result<()> {
-        let (height, width) = self.out;
+        self.find(depth, rgb, scratch)?;
+        self.decide(rgb, to, scratch);
+        Ok(())
+    }
+
+    /// Runs the steps on the readings, the first part of [`Self::condition`]. [`Self::decide`] runs the others, or
+    /// another processor does, from [`Self::readings`].
+    ///
+    /// # Errors
+    /// Returns an error if there is no reading.
+    ///
+    /// # Panics
+    /// Panics if a length does not match its shape.
+    pub fn find(&self, depth: &[f32], rgb: &[f32], scratch: &mut ConditionScratch) -> Result<()> {
         assert_eq!(depth.len(), self.depth.0 * self.depth.1);
-        assert_eq!(rgb.len(), 3 * height * width);
-        assert_eq!(to.len(), height * width);
+        assert_eq!(rgb.len(), 3 * self.out.0 * self.out.1);
         if depth.iter().all(|d| d.is_nan()) {
             return Err(no_reading());
         }
@@ -154,13 +175,45 @@ impl Conditioner {
         if clean {
             scratch.kinds.fill(Kind::Inside);
         } else {
-            self.find_surfaces(rgb, scratch);
+            self.find_edges(rgb, scratch);
         }
+        scratch.frames += 1;
+        Ok(())
+    }
+
+    /// Returns what [`Self::find`] found.
+    pub fn readings<'a>(&self, scratch: &'a ConditionScratch) -> ConditionedReadings<'a> {
+        ConditionedReadings {
+            depth: &scratch.readings,
+            kinds: &scratch.kinds,
+            x: &scratch.x,
+            y: &scratch.y,
+            are_coarse: self.are_coarse(),
+            has_past: scratch.frames > 1,
+        }
+    }
+
+    /// Returns whether readings have several pixels.
+    fn are_coarse(&self) -> bool {
+        contradict::pixels(self.crop, self.out) > 1.0
+    }
+
+    /// Decides the depth of each pixel of `rgb`, (3, H, W), from what [`Self::find`] found, and writes it to `to`,
+    /// (H, W).
+    ///
+    /// # Panics
+    /// Panics if a length does not match its shape.
+    pub fn decide(&self, rgb: &[f32], to: &mut [f32], scratch: &mut ConditionScratch) {
+        assert_eq!(rgb.len(), 3 * self.out.0 * self.out.1);
+        assert_eq!(to.len(), self.out.0 * self.out.1);
         let _stage = stage!("surfaces");
+        let axes = (&scratch.x, &scratch.y);
+        let edges = (&scratch.kinds[..], Kind::is_at_edge);
+        colour::colours(rgb, axes, 1, edges, &mut scratch.colours);
         let readings = surfaces::Readings {
             depth: &scratch.readings,
             width: self.depth.1,
-            are_coarse: contradict::pixels(self.crop, self.out) > 1.0,
+            are_coarse: self.are_coarse(),
             kinds: &scratch.kinds,
             colours: &scratch.colours,
         };
@@ -171,7 +224,6 @@ impl Conditioner {
             rgb,
         };
         scratch.pixels.decide(decider, to);
-        Ok(())
     }
 
     /// Finds the shift between depth and colour, places the display's pixels among the readings, and returns the number
@@ -205,8 +257,8 @@ impl Conditioner {
         }
     }
 
-    /// Smooths the readings, finds their kinds and the colours around edges, and replaces contradicted readings.
-    fn find_surfaces(&self, rgb: &[f32], scratch: &mut ConditionScratch) {
+    /// Smooths the readings, finds their kinds, and replaces contradicted readings.
+    fn find_edges(&self, rgb: &[f32], scratch: &mut ConditionScratch) {
         let (axes, width) = ((&scratch.x, &scratch.y), self.depth.1);
         let stage = stage!("smooth");
         smooth::smooth(&mut scratch.readings, width, &mut scratch.smooth);
@@ -235,8 +287,6 @@ impl Conditioner {
                 *kind = Kind::Filled;
             }
         }
-        let edges = (&scratch.kinds[..], Kind::is_at_edge);
-        colour::colours(rgb, axes, 1, edges, &mut scratch.colours);
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::align::Cameras;
 use super::camera::{Alignment, CameraFrame};
-use super::condition::{ConditionScratch, Conditioner};
+use super::condition::{ConditionScratch, ConditionedReadings, Conditioner};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::smoothing::Smoother;
@@ -116,13 +116,11 @@ impl DepthStream {
         }
     }
 
-    /// Computes the normalized depth of `frame` along the edges of `rgb` and writes it to `depth`, (H, W) in \[0, 1].
-    ///
-    /// `rgb`, (3, H, W), is the part [`Crop::cover`] of the frame's colour. `elapsed` is the time since the previous
-    /// frame, or `None` if there is no previous frame to smooth with. Later frames of the same layout do not allocate.
+    /// Computes the normalized depth of `frame` along the edges of `rgb` and writes it to `depth`, (H, W) in \[0, 1]:
+    /// [`Self::read`] and [`Self::decide`].
     ///
     /// # Errors
-    /// Returns an error if the frame has no depth or no usable reading.
+    /// Returns an error in the cases of [`Self::read`].
     ///
     /// # Panics
     /// Panics if `rgb` does not have 3·H·W values or `depth` does not have H·W.
@@ -133,6 +131,42 @@ impl DepthStream {
         rgb: &[f32],
         depth: &mut [f32],
     ) -> Result<DepthReport> {
+        let report = self.read(frame, elapsed, rgb)?;
+        self.decide(rgb, depth);
+        Ok(report)
+    }
+
+    /// Decides the depth of each pixel of the frame that was read last, along the edges of its `rgb`, and writes it to
+    /// `depth`, (H, W) in \[0, 1].
+    ///
+    /// # Panics
+    /// Panics if no frame was read, if `rgb` does not have 3·H·W values or `depth` does not have H·W.
+    pub fn decide(&mut self, rgb: &[f32], depth: &mut [f32]) {
+        let plan = self.plan.as_mut().expect("a frame was read");
+        plan.conditioner.decide(rgb, depth, &mut plan.scratch);
+    }
+
+    /// Returns the conditioned readings of the frame that was read last, from which a GPU decides the pixels instead of
+    /// [`Self::decide`].
+    ///
+    /// # Panics
+    /// Panics if no frame was read.
+    pub fn readings(&self) -> ConditionedReadings<'_> {
+        let plan = self.plan.as_ref().expect("a frame was read");
+        plan.conditioner.readings(&plan.scratch)
+    }
+
+    /// Reads the depth of `frame` and conditions its readings along the edges of `rgb`.
+    ///
+    /// `rgb`, (3, H, W), is the part [`Crop::cover`] of the frame's colour. `elapsed` is the time since the previous
+    /// frame, or `None` if there is no previous frame to smooth with. Later frames of the same layout do not allocate.
+    ///
+    /// # Errors
+    /// Returns an error if the frame has no depth or no usable reading.
+    ///
+    /// # Panics
+    /// Panics if `rgb` does not have 3·H·W values.
+    pub fn read(&mut self, frame: &CameraFrame<'_>, elapsed: Option<Duration>, rgb: &[f32]) -> Result<DepthReport> {
         let Some(image) = &frame.depth else {
             return Err(Error::Frame(
                 "it has no depth; give it depth, or the session a depth network".into(),
@@ -148,23 +182,22 @@ impl DepthStream {
                 Alignment::Cameras(cameras) => Some(cameras),
             },
         };
-        self.process(image, layout, elapsed, rgb, depth)
+        self.process(image, layout, elapsed, rgb)
     }
 
-    /// Processes `estimate`, (h, w), the relative inverse depth that a network estimated for `rgb`, as [`Self::next`]
-    /// processes a frame's depth.
+    /// Reads `estimate`, (h, w), the relative inverse depth that a network estimated for `rgb`, as [`Self::read`] reads
+    /// a frame's depth.
     ///
     /// # Errors
     /// Returns an error if the estimate has no finite value.
     ///
     /// # Panics
-    /// Panics in the cases of [`Self::next`].
-    pub fn next_estimate(
+    /// Panics in the cases of [`Self::read`].
+    pub fn read_estimate(
         &mut self,
         estimate: &Array2<f32>,
         elapsed: Option<Duration>,
         rgb: &[f32],
-        depth: &mut [f32],
     ) -> Result<DepthReport> {
         let (height, width) = estimate.dim();
         let bytes: Vec<u8> = estimate.iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -181,7 +214,7 @@ impl DepthStream {
             colour: self.out,
             cameras: None,
         };
-        self.process(&image, layout, elapsed, rgb, depth)
+        self.process(&image, layout, elapsed, rgb)
     }
 
     fn process(
@@ -190,7 +223,6 @@ impl DepthStream {
         layout: Layout,
         elapsed: Option<Duration>,
         rgb: &[f32],
-        depth: &mut [f32],
     ) -> Result<DepthReport> {
         if elapsed.is_none()
             || self
@@ -238,8 +270,7 @@ impl DepthStream {
         if !metric {
             self.smoother.smooth(&mut plan.values, width, elapsed, false);
         }
-        plan.conditioner
-            .condition(&plan.values, rgb, depth, &mut plan.scratch)?;
+        plan.conditioner.find(&plan.values, rgb, &mut plan.scratch)?;
         Ok(DepthReport {
             range_m: range.filter(|_| metric),
             valid: found as f32 / plan.values.len() as f32,

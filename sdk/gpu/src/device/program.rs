@@ -75,8 +75,9 @@ impl Device {
             label: Some(what),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         };
-        // SAFETY: only sources of this crate are compiled. Their loops have constant bounds, and each index is clamped
-        // to its array where it is computed. The tests run every program on frames of odd sizes.
+        // SAFETY: only sources of this crate are compiled. Their loops have constant bounds, or bounds from tables of
+        // this crate, and each index is clamped to its array where it is computed. The tests run every program on
+        // frames of odd sizes.
         let module = unsafe {
             self.inner
                 .create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())

@@ -1,6 +1,7 @@
 //! A borrowed captured frame, in camera formats or as planes.
 
 use ndarray::{Array2, Array3};
+use phasefront_core::depth::condition::ConditionedReadings;
 use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, RgbdFrame};
 
 /// The format of colour images.
@@ -22,7 +23,8 @@ pub enum Colour {
     },
 }
 
-/// The format of normalized depth: one plane of the frame's size, from 0 (nearest) to 1 (farthest), without holes.
+/// The format of normalized depth, from 0 (nearest) to 1 (farthest), without holes: one plane of the frame's size, or
+/// conditioned readings of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Depth {
@@ -30,6 +32,14 @@ pub enum Depth {
     F32,
     /// u16, where 65535 represents 1.
     U16,
+    /// Conditioned readings, from which the GPU decides the depth of each pixel. It remembers its choices from frame to
+    /// frame.
+    Readings {
+        /// The rows of the sensor.
+        height: usize,
+        /// The columns of the sensor.
+        width: usize,
+    },
 }
 
 /// The colour of a frame in the planned [`Colour`] format.
@@ -42,14 +52,16 @@ pub enum ColourData<'a> {
     Camera(ColourImage<'a>),
 }
 
-/// The depth of a frame, (H, W), in the planned [`Depth`] format.
+/// The depth of a frame in the planned [`Depth`] format.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum DepthData<'a> {
-    /// f32 in \[0, 1].
+    /// f32 in \[0, 1], (H, W).
     F32(&'a [f32]),
-    /// u16, where 65535 represents 1.
+    /// u16, where 65535 represents 1, (H, W).
     U16(&'a [u16]),
+    /// Conditioned readings.
+    Readings(ConditionedReadings<'a>),
 }
 
 /// A borrowed frame.
@@ -93,6 +105,11 @@ impl<'a> Frame<'a> {
         let depth = match self.depth {
             DepthData::F32(values) => values.to_vec(),
             DepthData::U16(words) => words.iter().map(|&w| f32::from(w) / 65535.0).collect(),
+            DepthData::Readings(_) => {
+                return Err(phasefront_core::runtime::error::Error::Frame(
+                    "depth is readings, which the stage that conditioned them decides".into(),
+                ));
+            }
         };
         let wrong = |what: &str, is: usize| {
             phasefront_core::runtime::error::Error::Frame(format!(

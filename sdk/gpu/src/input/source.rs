@@ -1,6 +1,7 @@
 //! The sources of the input stage and their parts of its program.
 
 use super::camera::Camera;
+use super::condition::Conditioning;
 use super::frame::{Colour, ColourData, Depth, DepthData, Frame};
 use crate::Result;
 use crate::device::Device;
@@ -16,7 +17,9 @@ pub(crate) enum Source<'a> {
     Field(&'a wgpu::Buffer, InputKind),
     /// A frame's surfaces and the sweep's field of that frame, both on the GPU.
     Seeded(&'a wgpu::Buffer, &'a wgpu::Buffer),
-    /// A frame, in the packer's own buffers.
+    /// A frame's surfaces on the GPU: red, green, blue and depth.
+    Surfaces(&'a wgpu::Buffer),
+    /// A frame, in the packer's own buffers. Its surfaces have no depth if that is readings.
     Frame(Colour, Depth),
 }
 
@@ -39,7 +42,9 @@ pub(super) struct Frames {
     pub(super) camera: Option<Camera>,
     size: (usize, usize),
     colour: wgpu::Buffer,
-    depth: wgpu::Buffer,
+    depth: Option<wgpu::Buffer>,
+    /// Adds the depth of readings.
+    pub(super) conditioning: Option<Conditioning>,
 }
 
 impl Reader {
@@ -71,6 +76,10 @@ impl Reader {
                 second: Some(seed.clone()),
                 ..reader(include_str!("seeded.wgsl"), surfaces.clone())
             },
+            Source::Surfaces(surfaces) => {
+                let text = [include_str!("surfaces.wgsl"), include_str!("frame.wgsl")].concat();
+                reader(&text, surfaces.clone())
+            }
             Source::Frame(colour, depth) => Reader::of_frames(device, colour, depth, size)?,
         })
     }
@@ -95,21 +104,27 @@ impl Reader {
             }
         };
         let depth_bytes = match depth {
-            Depth::F32 => 4 * area,
-            Depth::U16 => 2 * area,
+            Depth::F32 => Some(4 * area),
+            Depth::U16 => Some(2 * area),
+            Depth::Readings { .. } => None,
+        };
+        let depth_text = match depth_bytes {
+            Some(_) => include_str!("depth.wgsl"),
+            None => "fn distance_at(at: u32) -> f32 { return 0.0; }\n",
         };
         let frames = Frames {
             formats: (colour, depth),
             camera,
             size,
             colour: device.buffer("colour", bytes)?,
-            depth: device.buffer("depth", depth_bytes)?,
+            depth: depth_bytes.map(|bytes| device.buffer("depth", bytes)).transpose()?,
+            conditioning: None,
         };
         Ok(Reader {
             header,
-            text: text.to_owned() + include_str!("frame.wgsl"),
+            text: [text, depth_text, include_str!("frame.wgsl")].concat(),
             first: frames.colour.clone(),
-            second: Some(frames.depth.clone()),
+            second: frames.depth.clone(),
             frames: Some(frames),
         })
     }
@@ -144,14 +159,17 @@ impl Frames {
             }
             _ => return Err(other("colour").into()),
         }
-        match (frame.depth, depth) {
-            (DepthData::F32(values), Depth::F32) => {
+        match (frame.depth, depth, &self.depth, &self.conditioning) {
+            (DepthData::F32(values), Depth::F32, Some(buffer), _) => {
                 length("depth", values.len(), area)?;
-                device.write(&self.depth, 0, bytemuck::cast_slice(values));
+                device.write(buffer, 0, bytemuck::cast_slice(values));
             }
-            (DepthData::U16(words), Depth::U16) => {
+            (DepthData::U16(words), Depth::U16, Some(buffer), _) => {
                 length("depth", words.len(), area)?;
-                device.write(&self.depth, 0, bytemuck::cast_slice(words));
+                device.write(buffer, 0, bytemuck::cast_slice(words));
+            }
+            (DepthData::Readings(readings), Depth::Readings { .. }, _, Some(conditioning)) => {
+                conditioning.upload(device, &readings)?;
             }
             _ => return Err(other("depth").into()),
         }

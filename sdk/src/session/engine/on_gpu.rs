@@ -1,4 +1,4 @@
-//! Computes a quality level on the GPU, from the camera's colour and conditioned depth to levels.
+//! Computes a quality level on the GPU, from the camera's colour and conditioned readings of depth to levels.
 
 use crate::session::SessionOptions;
 use crate::session::engine::brightness::BrightnessTracker;
@@ -9,8 +9,8 @@ use phasefront_core::pipeline::{FrameReport, FrameTimes};
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
 use phasefront_gpu::{
-    ChainOptions, Colour, ColourData, Deliver, Depth, Device, DeviceOptions, Frame, GpuError, GpuLevels, GpuReport,
-    InFlight, Job, Renderer,
+    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Frame, GpuError, GpuLevels,
+    GpuReport, InFlight, Job, Renderer,
 };
 use std::sync::Arc;
 
@@ -126,27 +126,45 @@ impl OnGpu {
         brightness: &BrightnessTracker,
         deliver: Deliver,
     ) -> Result<InFlight, Failure> {
-        let planar = Frame::of(input.rgbd);
-        let (colour, frame) = match input.camera {
-            None => (Colour::Planar, planar),
+        let (colour, depth, frame) = Self::frame(input);
+        self.0.expect(colour, depth).await?;
+        let past = brightness.past(input.elapsed);
+        Ok(self.0.submit(past, &frame, deliver).await?)
+    }
+
+    /// Reads a frame without computing its levels, so that the next one has its past.
+    pub(in crate::session) async fn read(&mut self, input: &FrameInput<'_>) -> Result<(), Failure> {
+        let (colour, depth, frame) = Self::frame(input);
+        self.0.expect(colour, depth).await?;
+        Ok(self.0.read(&frame).await?)
+    }
+
+    /// Returns the formats of a frame, and the frame. The camera's colour is read directly.
+    fn frame<'a>(input: &'a FrameInput<'_>) -> (Colour, Depth, Frame<'a>) {
+        let mut frame = Frame::of(input.frame);
+        let colour = match input.camera {
+            None => Colour::Planar,
             Some(camera) => {
                 let (height, width) = camera.colour.shape();
-                let colour = Colour::Camera {
+                frame.colour = ColourData::Camera(camera.colour);
+                Colour::Camera {
                     format: camera.colour.format(),
                     height,
                     width,
                     orientation: camera.orientation,
-                };
-                let frame = Frame {
-                    colour: ColourData::Camera(camera.colour),
-                    ..planar
-                };
-                (colour, frame)
+                }
             }
         };
-        self.0.expect(colour, Depth::F32).await?;
-        let past = brightness.past(input.elapsed);
-        Ok(self.0.submit(past, &frame, deliver).await?)
+        let depth = match &input.undecided {
+            None => Depth::F32,
+            Some(stream) => {
+                let readings = stream.readings();
+                let (height, width) = readings.shape();
+                frame.depth = DepthData::Readings(readings);
+                Depth::Readings { height, width }
+            }
+        };
+        (colour, depth, frame)
     }
 }
 
@@ -166,7 +184,8 @@ fn frame_report(report: GpuReport, stage: Stage) -> FrameReport {
         scale: report.scale,
         times: FrameTimes {
             // Includes the transfers to and from the GPU, and all stages if there are no time stamps.
-            method: stage.end().saturating_sub(times.propagate + times.encode),
+            method: (stage.end()).saturating_sub(times.depth + times.propagate + times.encode),
+            depth: times.depth,
             propagate: times.propagate,
             encode: times.encode,
             ..FrameTimes::default()
@@ -201,12 +220,13 @@ mod tests {
         options.gpu.device.name = Some(software());
         let mut gpu = opened(block_on(OnGpu::new(&options, &options.quality_levels[0], None)));
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
-        let frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
+        let mut frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
         let mut brightness = BrightnessTracker::default();
         let mut first = vec![0; 3 * 21 * 34];
         let mut input = FrameInput {
             camera: None,
-            rgbd: &frame,
+            frame: &mut frame,
+            undecided: None,
             elapsed: None,
         };
         let made = block_on(gpu.process(&input, &mut brightness, &mut first, false));

@@ -30,6 +30,7 @@ const HYSTERESIS: f32 = 0.05;
 
 /// The kind of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
 pub(super) enum Kind {
     /// On a surface: its display pixels are interpolated.
     Inside,

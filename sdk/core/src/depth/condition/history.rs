@@ -6,13 +6,13 @@ use super::lanes::{Lanes, lanes, load, store};
 use rayon::prelude::*;
 
 /// The lead of the surface that the pixel had.
-const KEEP: f32 = 6.0;
+pub(super) const KEEP: f32 = 6.0;
 /// The largest difference of depth to the surface that the pixel had, as a share of the volume.
-const SAME: f32 = 0.06;
+pub(super) const SAME: f32 = 0.06;
 /// The largest difference of amplitudes at which a colour stays.
-const ALIKE: f32 = 0.1;
+pub(super) const ALIKE: f32 = 0.1;
 /// The share of the way to its new depth that a pixel moves in a frame.
-const SHARE: f32 = 0.5;
+pub(super) const SHARE: f32 = 0.5;
 
 /// The last depth of each pixel at an edge, and its colour then.
 pub(super) struct History {
