@@ -263,6 +263,8 @@ fn an_aberration_is_searched_round_by_round() {
         folder.succeeds(&search);
         let here = folder.path("search").join(format!("round_{round}"));
         if round == 0 {
+            // A search that was stopped before it wrote its first trials writes them.
+            fs::remove_file(here.join("trial_02.png")).unwrap();
             let said = folder.fails(&search, 1);
             assert!(said.contains("capture_00.png") && said.contains("missing"), "{said}");
         }

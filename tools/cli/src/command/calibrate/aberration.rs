@@ -99,9 +99,12 @@ impl Aberration {
             false => Vec::new(),
         };
         let mut now = match state.exists() {
-            false => self.begin(&entries, &file.target)?,
+            false => self.begin(&entries, &state, &file.target)?,
             true => {
                 let now = self.read(&state)?;
+                if !(0..TRIALS).all(|i| self.trial(&now, i).is_file()) {
+                    self.write_trials(&now, &file.target)?;
+                }
                 self.take(&now, &file.target.display, capture)?;
                 self.next(now, &file.target)?
             }
@@ -138,7 +141,7 @@ impl Aberration {
     }
 
     /// Begins a search and writes its first trials.
-    fn begin(&self, entries: &[Entry], target: &Target) -> Result<SearchFile> {
+    fn begin(&self, entries: &[Entry], state: &Path, target: &Target) -> Result<SearchFile> {
         let start = self
             .entry(entries)
             .map_or([0.0; 5], |mut e| *e.colour_mut(self.index()));
@@ -157,6 +160,8 @@ impl Aberration {
             at: self.at,
             search: Search::from(start),
         };
+        // The state comes first, because a folder of trials without it is refused as that of something else.
+        write_state(state, &now)?;
         self.write_trials(&now, target)?;
         Ok(now)
     }
@@ -188,10 +193,9 @@ impl Aberration {
     }
 
     fn write_trials(&self, now: &SearchFile, target: &Target) -> Result<()> {
-        let round = self.round(now);
-        output::make_folder(&round)?;
+        output::make_folder(&self.round(now))?;
         for (i, levels) in self.trials(now, target)?.iter().enumerate() {
-            program::write_levels(levels.view(), &round.join(format!("trial_{i:02}.png")))?;
+            program::write_levels(levels.view(), &self.trial(now, i))?;
         }
         Ok(())
     }
@@ -210,7 +214,7 @@ impl Aberration {
             if find_photo(&round, &format!("capture_{i:02}")).is_some() {
                 continue;
             }
-            let trial = Photograph::read(&round.join(format!("trial_{i:02}.png")), 0)?;
+            let trial = Photograph::read(&self.trial(now, i), 0)?;
             let levels = Array2::from_shape_fn((trial.height, trial.width), |(y, x)| {
                 trial.values[y * trial.width + x] as u8
             });
@@ -251,6 +255,10 @@ impl Aberration {
 
     fn round(&self, now: &SearchFile) -> PathBuf {
         self.folder.join(format!("round_{}", now.search.round))
+    }
+
+    fn trial(&self, now: &SearchFile, i: usize) -> PathBuf {
+        self.round(now).join(format!("trial_{i:02}.png"))
     }
 
     /// Returns the entry of this z and place.
