@@ -210,11 +210,10 @@ fn group(slot: u32, column: u32, row: u32) {
             if (round < 2u) { add(slot, nearest, reading); }
             continue;
         }
-        var is_shared = false;
-        if (round == 2u) {
-            is_shared = split(slot, count, k, depth);
+        var is_shared = round == 2u && split(slot, count, k, depth);
+        if (round == 2u && !is_shared) {
             let end = borrowed(slot, count, middle, reading);
-            if (!is_shared && end != sizes.columns * sizes.rows) {
+            if (end != sizes.columns * sizes.rows) {
                 begin_surface(slot, count, end, 9u);
                 count += 1u;
                 is_shared = split(slot, count, k, depth);
