@@ -2,7 +2,8 @@
 
 A data set is a folder with `manifest.json` and one `pair_000123.npz` for each scene:
 `rgb` uint8 (L, H, W, 4), front layer first, alpha 0 where the layer has no hit; `depth` uint16 (L, H, W),
-normalized depth times 65535; `hologram` complex64 (3, H, W), the midpoint hologram without the carrier.
+normalized depth times 65535; `hologram` complex64 (3, H, W), the midpoint hologram without the carrier. A set made with
+sensors also has `sensed` uint16 (S, H, W): the front layer's depth that a session makes of each sensor's reading.
 
 In memory, colour is uint8, and depth and field are float16. The holograms are linear convolutions with black
 surroundings, so samples are crops, flips and transposes, never rolls.
@@ -80,6 +81,11 @@ class Manifest:
         """The kind of the scenes, such as objects or photographs."""
         return self.table.get("look", {}).get("like", "objects")
 
+    @property
+    def sensors(self):
+        """The names of the sensors whose depth the pairs hold."""
+        return tuple(self.table.get("sensors", ()))
+
     def indices(self, split):
         """Returns the scene numbers of a split."""
         if split not in self.table["splits"]:
@@ -90,18 +96,20 @@ class Manifest:
         return self.folder / f"pair_{index:06d}.npz"
 
 
-def read_pair(path, ldi_layers):
-    """Reads a pair as colour uint8 (3·L, H, W), depth float16 (L, H, W) and field float16 (6, H, W).
+def read_pair(path, ldi_layers, sensors=0):
+    """Reads a pair as colour uint8 (3·L, H, W), depth float16 (L, H, W), field float16 (6, H, W) and the depth of S
+    sensors, float16 (S, H, W).
 
     A pixel without a hit gets colour 0 and depth 1. The field is three real parts, then three imaginary parts.
     Raises DataError if the file is damaged or holds fewer than `ldi_layers` layers.
     """
     try:
-        rgba, depth, hologram = _read_arrays(path, ("rgb", "depth", "hologram"))
+        rgba, depth, hologram, *sensed = _read_arrays(path, ("rgb", "depth", "hologram", "sensed")[: 4 if sensors else 3])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise DataError(f"{path}: damaged ({error})") from None
     layers, height, width = depth.shape if depth.ndim == 3 else (0, 0, 0)
-    if rgba.shape != (layers, height, width, 4) or hologram.shape != (3, height, width):
+    sensed = sensed[0] if sensed else np.zeros((0, height, width), np.uint16)
+    if rgba.shape != (layers, height, width, 4) or hologram.shape != (3, height, width) or sensed.shape != (sensors, height, width):
         raise DataError(f"{path}: shapes {rgba.shape}, {depth.shape}, {hologram.shape} do not belong together")
     if layers < ldi_layers:
         raise DataError(f"{path}: {layers} layers, the network's input takes {ldi_layers}")
@@ -111,7 +119,8 @@ def read_pair(path, ldi_layers):
     colour = np.where(hit[..., None], rgba[:ldi_layers, ..., :3], 0).astype(np.uint8)
     depth = np.where(hit, depth[:ldi_layers] / np.float32(65535), 1).astype(np.float16)
     field = np.concatenate([hologram.real, hologram.imag]).astype(np.float16)
-    return colour.transpose(0, 3, 1, 2).reshape(3 * ldi_layers, height, width), depth, field
+    sensed = (sensed / np.float32(65535)).astype(np.float16)
+    return colour.transpose(0, 3, 1, 2).reshape(3 * ldi_layers, height, width), depth, field, sensed
 
 
 class Scenes:
@@ -128,13 +137,14 @@ class Scenes:
         self.origin = {key: manifest.table[key] for key in ("seed", "planes")} | {"like": manifest.like}
         self.origin["volume_depth_mm"] = manifest.table["display"]["volume_depth_mm"]
         self.corrected = bool(manifest.table.get("aberration"))
+        self.sensors = manifest.sensors
         numbers = list(manifest.indices(split))[:limit]
         present = [n for n in numbers if manifest.pair(n).exists()]
         if len(present) < len(numbers):
             print(f"{manifest.folder}: {len(numbers) - len(present)} of {len(numbers)} {split} pairs are not there", file=sys.stderr)
         self.numbers, parts = [], []
         with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:
-            for number, read in zip(present, pool.map(lambda n: _try_read(manifest.pair(n), ldi_layers), present)):
+            for number, read in zip(present, pool.map(lambda n: _try_read(manifest.pair(n), ldi_layers, len(self.sensors)), present)):
                 if isinstance(read, DataError):
                     self.damaged.append(manifest.pair(number))
                     print(f"{read}; skipped", file=sys.stderr)
@@ -146,7 +156,7 @@ class Scenes:
                     parts.append(tuple(map(torch.from_numpy, read)))
         if not parts:
             raise DataError(f"{manifest.folder}: no readable pair in the split '{split}'")
-        self.colour, self.depth, self.target = (_gather(parts, k, device) for k in range(3))
+        self.colour, self.depth, self.target, self.sensed = (_gather(parts, k, device) for k in range(4))
         self.stretches = torch.ones(len(self.numbers))  # to the volume of `display`, about the middle
         self.seeded = seeds is not None
         self.refined = seeds.refined if seeds else 0
@@ -167,7 +177,7 @@ class Scenes:
             return parts[0]
         deepest = max(parts, key=lambda part: part.display.volume_depth_m)
         for part in parts:
-            for what in ("shape", "corrected", "refined", "seeded"):
+            for what in ("shape", "corrected", "refined", "seeded", "sensors"):
                 mine, its = getattr(deepest, what), getattr(part, what)
                 if mine != its:
                     raise DataError(f"data sets that are trained on together must be alike: {what} {mine} and {its}")
@@ -195,6 +205,7 @@ class Scenes:
     def facts(self):
         """The facts about the training data that a checkpoint keeps."""
         facts = {"scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers} | self.origin
+        facts |= {"sensors": list(self.sensors)} if self.sensors else {}
         return facts | ({"sets": self.sets} if self.sets else {})
 
     def scene(self, i):
@@ -223,9 +234,9 @@ def _read_arrays(path, names):
         return [np.lib.format.read_array(io.BytesIO(each)) for each in packed]
 
 
-def _try_read(path, ldi_layers):
+def _try_read(path, ldi_layers, sensors):
     try:
-        return read_pair(path, ldi_layers)
+        return read_pair(path, ldi_layers, sensors)
     except DataError as error:
         return error
 
@@ -294,7 +305,8 @@ class Sampler:
     """Draws batches for networks of one `kind`. Batch `step` of a seed does not depend on earlier draws.
 
     Samples with coordinates, and samples of holograms that correct an aberration, are neither flipped nor transposed,
-    because the aberration does not flip with the scene. In a fraction `dimmed` of the samples the brightness of each
+    because the aberration does not flip with the scene. A fraction `sensor_depth` of the samples has sensor depth: that
+    of one of the data set's sensors, if it has sensors, and else simulated here. In a fraction `dimmed` of the samples the brightness of each
     colour changes. Optics are linear and colours do not interact, so halving the red of a scene exactly halves the red
     of its hologram. (This does not hold for a change of contrast.)
     """
@@ -348,6 +360,8 @@ class Sampler:
             v = int(rng.integers(1, scenes.variant_depth.shape[1])) if from_sensor else 0
             measured = scenes.variant_depth[i, v][window][None].float()
             field = scenes.variant_seed[i, v][window].float() * gains.repeat(2, 1, 1)
+        elif from_sensor and scenes.sensors:
+            measured = scenes.sensed[i][int(rng.integers(len(scenes.sensors)))][window][None].float()
         else:
             measured = simulate_sensor_depth(colour, depth[0], rng)[None] if from_sensor else depth
         # The sensor's errors are a fraction of the scene's own volume, so the stretch follows the measurement.

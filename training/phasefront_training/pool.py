@@ -98,10 +98,10 @@ class Pool(data.Scenes):
             raise data.DataError(f"{folder}: no whole shard there yet; make the pool first (python -m phasefront_training pool)")
         self.known = set()
         first = self._read(found[0], ldi_layers)
-        for name in ("display", "ldi_layers", "corrected", "seeded", "refined"):
+        for name in ("display", "ldi_layers", "corrected", "seeded", "refined", "sensors"):
             setattr(self, name, getattr(first, name))
         self.origin, self.sets, self.damaged, self.numbers = {}, [], [], []
-        self.colour, self.depth, self.target = [], [], []
+        self.colour, self.depth, self.target, self.sensed = [], [], [], []
         self._take(first)
         self.look()
 
@@ -117,7 +117,8 @@ class Pool(data.Scenes):
             known = kinds.setdefault(each["like"], dict(each) | {"scenes": 0, "shards": 0})
             known["scenes"] += each["scenes"]
             known["shards"] += 1
-        return {"pool": True, "scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers, "sets": list(kinds.values())}
+        facts = {"pool": True, "scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers, "sets": list(kinds.values())}
+        return facts | ({"sensors": list(self.sensors)} if self.sensors else {})
 
     def stretch(self, i):
         return 1.0
@@ -145,7 +146,7 @@ class Pool(data.Scenes):
         return data.Scenes(manifest, "train", ldi_layers, self.limit)
 
     def _fits(self, scenes, manifest):
-        for what in ("display", "shape", "corrected"):
+        for what in ("display", "shape", "corrected", "sensors"):
             mine, its = getattr(self, what), getattr(scenes, what)
             if mine != its:
                 raise data.DataError(f"{manifest.folder}: its {what} is {its}, that of the other shards {mine}")
@@ -153,8 +154,8 @@ class Pool(data.Scenes):
     def _take(self, scenes):
         self.sets.append(scenes.facts)
         self.damaged += scenes.damaged
-        for mine, its in ((self.colour, scenes.colour), (self.depth, scenes.depth), (self.target, scenes.target)):
-            mine += list(its)
+        for name in ("colour", "depth", "target", "sensed"):
+            getattr(self, name).extend(getattr(scenes, name))
         # The count changes last, because other threads may draw samples meanwhile.
         self.numbers += scenes.numbers
 

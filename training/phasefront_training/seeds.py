@@ -43,7 +43,7 @@ def make(manifest, output, variants, arguments, command="phasefront-lab"):
 
 
 def _depths(pair, number, variants):
-    colour, depth, _ = read_pair(pair, 1)
+    colour, depth = read_pair(pair, 1)[:2]
     colour, depth = torch.from_numpy(colour).float() / 255, torch.from_numpy(depth[0]).float()
     depths = [depth] + [simulate_sensor_depth(colour, depth, sensor_generator(number, v)) for v in range(variants - 1)]
     return (torch.stack(depths).numpy() * 65535).round().astype(np.uint16)

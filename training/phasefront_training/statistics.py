@@ -72,7 +72,7 @@ def of_data(folder, split, limit=None):
         raise DataError(f"{folder}: no pair of the split '{split}' is there")
     looks = []
     for path in paths:
-        colour, depth, _ = read_pair(path, 1)
+        colour, depth = read_pair(path, 1)[:2]
         looks.append(look(colour / np.float32(255), depth[0].astype(np.float32)))
     return looks
 

@@ -190,6 +190,31 @@ def test_a_network_serves_displays_of_no_more_depth(data_folder):
         served(None, replace(display, corrected=True), half)
 
 
+def with_sensors(folder, to):
+    """Copies a data set and gives it two sensors, which see a quarter and three quarters everywhere."""
+    shutil.copytree(folder, to)
+    table = json.loads((to / "manifest.json").read_text())
+    (to / "manifest.json").write_text(json.dumps(table | {"sensors": ["lidar", "kinect"]}))
+    for path in to.glob("pair_*.npz"):
+        arrays = dict(np.load(path))
+        size = arrays["depth"].shape[1:]
+        sensed = np.stack([np.full(size, 16384, np.uint16), np.full(size, 49151, np.uint16)])
+        np.savez_compressed(path, **arrays, sensed=sensed)
+    return to
+
+
+def test_sensor_depth_is_that_of_the_data_sets_sensors(data_folder, tmp_path):
+    folder = with_sensors(data_folder, tmp_path / "sensed")
+    scenes = Scenes.joined([Scenes(Manifest.read(folder), "train") for _ in range(2)])
+    assert scenes.facts["sensors"] == ["lidar", "kinect"]
+    seen = [Sampler(scenes, 1, 48, 8, sensor_depth=1).draw(step).input[0, 3] + 0.5 for step in range(20)]
+    assert {round(float(depth.mean()), 3) for depth in seen} == {0.25, 0.75} and max(float(depth.std()) for depth in seen) < 1e-3
+    clean = Sampler(scenes, 1, 48, 8).draw(0)
+    assert torch.allclose(clean.input[:, 3] + 0.5, clean.depth, atol=1e-3)
+    with pytest.raises(DataError, match="sensors"):
+        Scenes.joined([Scenes(Manifest.read(each), "train") for each in (folder, data_folder)])
+
+
 def test_data_sets_for_other_displays_are_not_joined(data_folder, tmp_path):
     other = for_another_display(data_folder, tmp_path / "other", pitch_um=6.4)
     with pytest.raises(DataError, match="volume's depth"):

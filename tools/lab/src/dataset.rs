@@ -2,7 +2,9 @@
 //!
 //! A folder holds `manifest.json` and, for each scene, a `pair_000123.npz` with three arrays: `rgb`, uint8 (L, H, W,
 //! 4), RGBA, front first, with alpha 0 at pixels without a hit; `depth`, uint16 (L, H, W), d·65535; and `hologram`,
-//! complex64 (C, H, W), at the midpoint, without the carrier. C is 1 for a display with one laser.
+//! complex64 (C, H, W), at the midpoint, without the carrier. C is 1 for a display with one laser. With sensors there is
+//! also `sensed`, uint16 (S, H, W): the front layer's depth that a session makes of each sensor's reading, and the true
+//! depth where it refuses the reading.
 //!
 //! For a display with an aberration, the holograms come from the correcting variant of SM-LBM. A network trained on
 //! them learns the correction.
@@ -12,13 +14,15 @@
 //! merged by copying.
 
 use crate::scene::{self, Scene, Texture};
-use ndarray::{Array2, Array3, Array4};
+use crate::sensor::Sensor;
+use ndarray::{Array2, Array3, Array4, ArrayView2, Axis};
 use ndarray_npy::NpzWriter;
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront_core::runtime::file;
 use phasefront_exact::corrected::{self, Correction, spatial};
 use phasefront_exact::sm_lbm;
+use phasefront_exact::truth::{visible_depth, visible_rgb};
 use phasefront_io::display::calibration::{self, AberrationFile, Entry};
 use phasefront_io::display::spatial::SpatialAberrations;
 use phasefront_io::input::{self, npy};
@@ -59,6 +63,9 @@ pub struct Manifest {
     /// The display's aberration, which the holograms correct, or empty if they correct none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aberration: Vec<Entry>,
+    /// The sensors whose depth the pairs hold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<Sensor>,
 }
 
 /// The look of a data set's scenes.
@@ -182,6 +189,7 @@ impl Manifest {
                 test: [test, scenes],
             },
             aberration: Vec::new(),
+            sensors: Vec::new(),
         })
     }
 
@@ -196,6 +204,11 @@ impl Manifest {
             aberration: aberration.map_or_else(Vec::new, AberrationFile::entries),
             ..self
         }
+    }
+
+    /// Returns the manifest with depth of `sensors`.
+    pub fn sensed_by(self, sensors: Vec<Sensor>) -> Self {
+        Manifest { sensors, ..self }
     }
 
     /// Reads the manifest of the data set in `dir`.
@@ -298,15 +311,23 @@ pub fn make(
                 GroundTruth::Corrected(correction) => corrected::hologram(&ldi, display, planes, correction, &quiet)?,
                 GroundTruth::Spatial(all) => spatial::hologram(&ldi, display, planes, all, &quiet)?,
             };
-            write_pair(&path, &ldi, &hologram)?;
+            let readings = manifest.sensors.iter().map(|sensor| sensed(&ldi, *sensor, seed));
+            write_pair(&path, &ldi, &hologram, &readings.collect::<Vec<_>>())?;
         }
         made();
         Ok(())
     })
 }
 
-/// Writes one pair.
-fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()> {
+/// Returns the depth of the front layer, (H, W), that a session makes of the sensor's reading.
+fn sensed(ldi: &Ldi, sensor: Sensor, seed: u64) -> Array2<u16> {
+    let truth = visible_depth(ldi);
+    let depth = sensor.read(truth.view(), seed).session_depth(&visible_rgb(ldi));
+    depth.unwrap_or(truth).mapv(|d| (d * 65535.0).round() as u16)
+}
+
+/// Writes one pair with the depth `sensed` by sensors.
+fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>, sensed: &[Array2<u16>]) -> Result<()> {
     let (height, width) = ldi.shape();
     let layers = ldi.layers.len();
     let rgb = Array4::from_shape_fn((layers, height, width, 4), |(l, y, x, c)| {
@@ -330,6 +351,13 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()
         npz.add_array("rgb", &rgb)?;
         npz.add_array("depth", &depth)?;
         npz.add_array("hologram", hologram)?;
+        if !sensed.is_empty() {
+            let views: Vec<ArrayView2<'_, u16>> = sensed.iter().map(|depth| depth.view()).collect();
+            npz.add_array(
+                "sensed",
+                &ndarray::stack(Axis(0), &views).expect("all have the frame's size"),
+            )?;
+        }
         Ok(npz.finish()?.into_inner())
     };
     let bytes = archive().map_err(|e| Error::file(path, e))?;
@@ -465,6 +493,31 @@ mod tests {
         assert!(pair.ldi == scene::render_ldi_reference(&scene, 24, 24, 2).unwrap().quantized());
         let refused = make(&manifest(Look::photographs(&[])), &[], dir.path(), (1, 4), &|| {}).unwrap_err();
         assert!(refused.to_string().contains("other parameters"), "{refused}");
+    }
+
+    #[test]
+    fn a_set_with_sensors_holds_the_depth_that_sessions_make() {
+        let dir = tempfile::tempdir().unwrap();
+        let sensors = vec![Sensor::Noise, Sensor::HalfBilinear];
+        let ours = manifest(Look::varied(&[])).sensed_by(sensors.clone());
+        make(&ours, &[], dir.path(), (1, 4), &|| {}).unwrap();
+        assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
+        let ldi = read_pair(&ours, dir.path(), 1).unwrap().ldi;
+        let file = File::open(Manifest::pair_path(dir.path(), 1)).unwrap();
+        let mut archive = ZipArchive::new(BufReader::new(file)).unwrap();
+        let bytes = array_bytes(&mut archive, "sensed", 2 * 2 * 24 * 24).unwrap();
+        let sensed: Array3<u16> = npy::read(&bytes).unwrap();
+        assert_eq!(sensed.dim(), (2, 24, 24));
+        for (sensor, depth) in sensors.iter().zip(sensed.outer_iter()) {
+            let reading = sensor.read(visible_depth(&ldi).view(), ours.scene_seed(1));
+            let expected = reading.session_depth(&visible_rgb(&ldi)).unwrap();
+            assert!(
+                depth
+                    .iter()
+                    .zip(&expected)
+                    .all(|(a, b)| (f32::from(*a) / 65535.0 - b).abs() < 1e-5)
+            );
+        }
     }
 
     #[test]

@@ -42,7 +42,7 @@ use phasefront::input::{
 use phasefront_core::depth::stream::{DepthOptions, DepthStream};
 use phasefront_io::Result;
 use phasefront_io::dice::Dice;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The width in pixels of the frame that a real sensor's resolution refers to.
 pub const FRAME_WIDTH: f64 = 1024.0;
@@ -54,7 +54,7 @@ pub const FAR_M: f32 = 2.8;
 const EDGE: f32 = 0.1;
 
 /// The simulated depth sensors of the [module](self).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensor {
     /// 4 times coarser, mixed depths at edges, shifted, noisy (judge a)

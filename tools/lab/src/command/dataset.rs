@@ -1,5 +1,6 @@
 //! `phasefront-lab dataset` makes LDI and hologram pairs. It can resume and can run in shards.
 
+use super::sensors::{self, Sensors};
 use clap::{Args, ValueEnum};
 use phasefront_command::flags::DisplayFlags;
 use phasefront_command::terminal::{self, progress_bar};
@@ -39,6 +40,8 @@ pub(crate) struct Dataset {
     /// their fingerprint
     #[arg(long, value_name = "DIR")]
     textures: Option<PathBuf>,
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = sensors::parse, help = format!("Simulated sensors whose depth pairs hold as well, treated as in sessions, separated by commas: {}", sensors::names()))]
+    sensor: Vec<Sensors>,
     /// Make every nth pair only, starting from the ith of 0..n
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<(usize, usize)>,
@@ -98,7 +101,8 @@ impl Dataset {
         };
         let manifest = Manifest::new(self.scenes, self.size, self.planes, self.ldi_layers, self.seed, display)?
             .looking(look)
-            .correcting(file.aberration.as_ref());
+            .correcting(file.aberration.as_ref())
+            .sensed_by(Sensors::all(&self.sensor));
         let shard = self.shard.unwrap_or((0, 1));
         let mine = self.scenes.saturating_sub(shard.0).div_ceil(shard.1);
         let bar = progress_bar(mine as u64, "pairs");
