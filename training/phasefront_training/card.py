@@ -111,19 +111,25 @@ def describe(name, last, figures):
     return "\n".join(lines)
 
 
+def sensors_of(facts):
+    """Returns the flag that gives a data set its sensors, if it has any."""
+    return f" --sensor {','.join(facts['sensors'])}" if facts.get("sensors") else ""
+
+
 def scenes_again(last):
     """Returns lines with the commands that make the training scenes of `last`."""
     data = last.extra["data"]
     if data.get("pool"):
         first = sets(last)[0]
         shares = " ".join(f"{each['like']}={each['shards']}" for each in sets(last))
-        flags = f"--scenes {data['scenes']} --shares {shares} -- --size {first['size']} --planes {first['planes']}"
+        flags = f"--scenes {data['scenes']} --shares {shares} -- --size {first['size']} --planes {first['planes']}{sensors_of(data)}"
         return [f"    python -m phasefront_training pool -o POOL {flags}"]
     lines, seeded = [], any(a.input == "seeded" for a, _ in last.networks.values())
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += f" --scenes-like {each['like']}" if like(each) else ""
         flags += "" if replace(display_of(each, last), corrected=False) == DATASET_DISPLAY else " --display …"
+        flags += sensors_of(each)
         lines.append(f"    python -m phasefront_training data -o {folder} -- {flags}")
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"

@@ -1,5 +1,5 @@
-"""Makes all shipped networks from scratch, and a network at half the resolution to compare with that of 8 layers: data,
-trainings, int8, figures and cards. Completed steps are not repeated."""
+"""Makes all shipped networks from scratch: data, trainings, int8, figures and cards. Completed steps are not
+repeated."""
 
 import json
 import subprocess
@@ -39,7 +39,6 @@ def _pair(offset_mm):
 
 NETWORKS = {
     "rgbd-8": Network(0.15, ("--layers", "8")),
-    "half-8": Network(0.15, ("--layers", "8", "--filters", "48", "--halved", "--rate", "0.0007")),
     "rgbd-15": Network(0.2, ("--layers", "15")),
     "rgbd-30": Network(0.25, ("--layers", "30")),
     "rgbd-15-wide": Network(0.2, ("--layers", "15"), wide=True),

@@ -13,10 +13,9 @@ use std::sync::Arc;
 pub const DEEP: &str = "ddpm-8";
 
 /// The names of the networks in the source tree's `models` folder that are not bundled.
-const FILES: [&str; 8] = [
+const FILES: [&str; 7] = [
     "ddpm-8-12mm",
     "ddpm-8-6mm",
-    "half-8",
     "ldi3-15",
     "rgbd-15-cylinder",
     "rgbd-15-wide",
