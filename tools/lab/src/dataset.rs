@@ -2,9 +2,9 @@
 //!
 //! A folder holds `manifest.json` and, for each scene, a `pair_000123.npz` with three arrays: `rgb`, uint8 (L, H, W,
 //! 4), RGBA, front first, with alpha 0 at pixels without a hit; `depth`, uint16 (L, H, W), d·65535; and `hologram`,
-//! complex64 (C, H, W), at the midpoint, without the carrier. C is 1 for a display with one laser. With sensors there is
-//! also `sensed`, uint16 (S, H, W): the front layer's depth that a session makes of each sensor's reading, and the true
-//! depth where it refuses the reading.
+//! complex64 (C, H, W), at the midpoint, without the carrier. C is 1 for a display with one laser. With sensors there
+//! is also `sensed`, uint16 (S, H, W): the front layer's depth that a session makes of each sensor's reading, or the
+//! true depth if it refuses the reading.
 //!
 //! For a display with an aberration, the holograms come from the correcting variant of SM-LBM. A network trained on
 //! them learns the correction.

@@ -298,8 +298,8 @@ fn held(pixel: u32, colour: vec3f) -> f32 {
     return select(NONE, bitcast<f32>(last.x), same);
 }
 
-// Chooses among the surfaces in `slot`, those around (`column`, `row`), for a pixel. Returns the depths of the first and
-// of the second, and the lead of the first.
+// Chooses among the surfaces in `slot`, those around (`column`, `row`), for a pixel. Returns the depths of the first
+// and of the second, and the lead of the first.
 fn chosen(slot: u32, column: u32, row: u32, at: vec2f, colour: vec3f, held: f32) -> vec3f {
     let count = u32(value(slot, 0u, COUNT));
     var likelihoods = vec4f(-FAR);
