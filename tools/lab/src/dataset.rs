@@ -15,7 +15,7 @@
 
 use crate::scene::{self, Scene, Texture};
 use crate::sensor::Sensor;
-use ndarray::{Array2, Array3, Array4, ArrayView2, Axis};
+use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::NpzWriter;
 use num_complex::Complex32;
 use phasefront::Display;
@@ -311,23 +311,28 @@ pub fn make(
                 GroundTruth::Corrected(correction) => corrected::hologram(&ldi, display, planes, correction, &quiet)?,
                 GroundTruth::Spatial(all) => spatial::hologram(&ldi, display, planes, all, &quiet)?,
             };
-            let readings = manifest.sensors.iter().map(|sensor| sensed(&ldi, *sensor, seed));
-            write_pair(&path, &ldi, &hologram, &readings.collect::<Vec<_>>())?;
+            write_pair(&path, &ldi, &hologram, &sensed(&ldi, &manifest.sensors, seed))?;
         }
         made();
         Ok(())
     })
 }
 
-/// Returns the depth of the front layer, (H, W), that a session makes of the sensor's reading.
-fn sensed(ldi: &Ldi, sensor: Sensor, seed: u64) -> Array2<u16> {
-    let truth = visible_depth(ldi);
-    let depth = sensor.read(truth.view(), seed).session_depth(&visible_rgb(ldi));
-    depth.unwrap_or(truth).mapv(|d| (d * 65535.0).round() as u16)
+/// Returns the depth of the front layer, d·65535, (S, H, W), that a session makes of each sensor's reading.
+fn sensed(ldi: &Ldi, sensors: &[Sensor], seed: u64) -> Array3<u16> {
+    let (rgb, truth) = (visible_rgb(ldi), visible_depth(ldi));
+    let mut depths = Array3::zeros((sensors.len(), truth.nrows(), truth.ncols()));
+    for (sensor, mut plane) in sensors.iter().zip(depths.outer_iter_mut()) {
+        let depth = sensor.read(truth.view(), seed).session_depth(&rgb);
+        plane.zip_mut_with(depth.as_ref().unwrap_or(&truth), |to, d| {
+            *to = (d * 65535.0).round() as u16
+        });
+    }
+    depths
 }
 
-/// Writes one pair with the depth `sensed` by sensors.
-fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>, sensed: &[Array2<u16>]) -> Result<()> {
+/// Writes one pair with the depth `sensed` by sensors, if there are any.
+fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>, sensed: &Array3<u16>) -> Result<()> {
     let (height, width) = ldi.shape();
     let layers = ldi.layers.len();
     let rgb = Array4::from_shape_fn((layers, height, width, 4), |(l, y, x, c)| {
@@ -352,11 +357,7 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>, sensed: &[Ar
         npz.add_array("depth", &depth)?;
         npz.add_array("hologram", hologram)?;
         if !sensed.is_empty() {
-            let views: Vec<ArrayView2<'_, u16>> = sensed.iter().map(|depth| depth.view()).collect();
-            npz.add_array(
-                "sensed",
-                &ndarray::stack(Axis(0), &views).expect("all have the frame's size"),
-            )?;
+            npz.add_array("sensed", sensed)?;
         }
         Ok(npz.finish()?.into_inner())
     };

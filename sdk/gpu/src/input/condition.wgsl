@@ -312,23 +312,25 @@ fn chosen(slot: u32, column: u32, row: u32, at: vec2f, colour: vec3f, held: f32)
     }
     let most = max(max(likelihoods.x, likelihoods.y), max(likelihoods.z, likelihoods.w));
     // The two rows of readings around the pixel begin at 0 or at 3 of the 3×3.
-    let begin = select(3u, 0u, at.y < 0.0);
-    let above = depths(column, row, begin);
-    let below = depths(column, row, begin + 3u);
+    let upper = select(3u, 0u, at.y < 0.0);
+    let lower = upper + 3u;
+    let above = depths(column, row, upper);
+    let below = depths(column, row, lower);
     // The depth and the score.
     var first = vec2f(0.0, -FAR);
     var second = vec2f(0.0, -FAR);
     for (var s = 0u; s < count; s++) {
         let depth = value(slot, s, DEPTH);
-        let covers = array<vec3f, 2>(shares(slot, s, begin), shares(slot, s, begin + 3u));
-        let has_above = select(vec3f(0), vec3f(1), covers[0] >= vec3f(1));
-        let has_below = select(vec3f(0), vec3f(1), covers[1] >= vec3f(1));
+        let covers_above = shares(slot, s, upper);
+        let covers_below = shares(slot, s, lower);
+        let has_above = select(vec3f(0), vec3f(1), covers_above >= vec3f(1));
+        let has_below = select(vec3f(0), vec3f(1), covers_below >= vec3f(1));
         let known = interpolated(has_above, has_below, at);
         let slope = interpolated(has_above * (above - depth), has_below * (below - depth), at);
         let apart = abs(depth - held);
         let lead = select(0.0, KEEP, apart <= SAME && apart <= nearest);
         let evidence = max(likelihoods[s] - most, -MOST_EVIDENCE);
-        let score = PLACE * interpolated(covers[0], covers[1], at) + evidence + lead;
+        let score = PLACE * interpolated(covers_above, covers_below, at) + evidence + lead;
         let own = vec2f(clamp(depth + select(0.0, slope / known, known > 0.05), 0.0, 1.0), score);
         if (score > first.y) {
             second = first;
