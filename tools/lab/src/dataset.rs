@@ -90,8 +90,8 @@ pub enum Look {
     },
     /// Scenes that are hard for every method: [`scene::hard_scene`].
     Hard,
-    /// Rooms with furniture in perspective: [`scene::room_scene`].
-    Rooms,
+    /// Furnished interiors in perspective: [`scene::interior_scene`].
+    Interiors,
 }
 
 impl Look {
@@ -114,7 +114,7 @@ impl Look {
     /// Checks whether `textures` are the photographs that this look names.
     fn names(&self, textures: &[Texture]) -> bool {
         match self {
-            Self::Objects | Self::Hard | Self::Rooms => textures.is_empty(),
+            Self::Objects | Self::Hard | Self::Interiors => textures.is_empty(),
             Self::Photographs { textures: named } | Self::Varied { textures: named } => *named == fingerprint(textures),
         }
     }
@@ -126,7 +126,7 @@ impl Look {
             Self::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
             Self::Varied { .. } => scene::varied_scene(seed, size, size, textures),
             Self::Hard => scene::hard_scene(seed, size, size),
-            Self::Rooms => scene::room_scene(seed, size, size),
+            Self::Interiors => scene::interior_scene(seed, size, size),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Scenes of textured triangle meshes, and their rendering to layered depth images.
 //!
 //! * [`Scene`], [`Mesh`] and [`Texture`] describe a scene.
-//! * [`random_scene`], [`natural_scene`] (photograph-like), [`varied_scene`], [`hard_scene`] and [`room_scene`] make the
-//!   scenes of data sets.
+//! * [`random_scene`], [`natural_scene`] (photograph-like), [`varied_scene`], [`hard_scene`] and [`interior_scene`]
+//!   make the scenes of data sets.
 //! * [`read_model`] reads glTF, GLB and OBJ files.
 //! * [`render_ldi_reference`] renders exactly on the CPU; [`DepthPeeler`] renders on a GPU.
 //!
@@ -23,7 +23,9 @@ use phasefront_io::{Error, Result};
 use std::sync::Arc;
 
 pub use model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, read_model};
-pub use random::{fingerprint, hard_scene, natural_scene, random_scene, read_photographs, room_scene, varied_scene};
+pub use random::{
+    fingerprint, hard_scene, interior_scene, natural_scene, random_scene, read_photographs, varied_scene,
+};
 pub use render::{DepthPeeler, render_ldi_reference};
 pub use texture::Texture;
 

@@ -62,8 +62,8 @@ enum Like {
     Varied,
     /// About forty overlapping, tilted objects with textures from white noise to flat, of medium brightness
     Hard,
-    /// Rooms with furniture in perspective, of any brightness
-    Rooms,
+    /// Furnished interiors in perspective, of any brightness
+    Interiors,
 }
 
 fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
@@ -87,7 +87,7 @@ impl Dataset {
             ));
         }
         let textures = match &self.textures {
-            Some(_) if matches!(self.scenes_like, Like::Objects | Like::Hard | Like::Rooms) => {
+            Some(_) if matches!(self.scenes_like, Like::Objects | Like::Hard | Like::Interiors) => {
                 return Err(Error::Input(
                     "--textures is for --scenes-like photographs and varied".into(),
                 ));
@@ -100,7 +100,7 @@ impl Dataset {
             Like::Photographs => Look::photographs(&textures),
             Like::Varied => Look::varied(&textures),
             Like::Hard => Look::Hard,
-            Like::Rooms => Look::Rooms,
+            Like::Interiors => Look::Interiors,
         };
         let manifest = Manifest::new(self.scenes, self.size, self.planes, self.ldi_layers, self.seed, display)?
             .looking(look)

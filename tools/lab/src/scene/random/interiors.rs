@@ -21,7 +21,7 @@ const HALF: f64 = 0.52;
 
 /// Makes a random room for a frame of `height` x `width` pixels. The same arguments give the same scene on every
 /// machine.
-pub fn room_scene(seed: u64, height: usize, width: usize) -> Scene {
+pub fn interior_scene(seed: u64, height: usize, width: usize) -> Scene {
     let mut dice = Dice::new(seed);
     let view = View::new(&mut dice, height as f64, width as f64);
     let mut maker = Maker {
@@ -298,17 +298,17 @@ mod tests {
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         let of = |seed| {
-            let ldi = render_ldi_reference(&room_scene(seed, 96, 96), 96, 96, 5).unwrap();
+            let ldi = render_ldi_reference(&interior_scene(seed, 96, 96), 96, 96, 5).unwrap();
             format!("{:016x}", fingerprint(&ldi))
         };
         assert_eq!([of(3), of(4)], ["e35d03b1462c6b75", "0aa52a2c2f5072db"]);
     }
 
     #[test]
-    fn rooms_of_any_size_lie_in_the_volume() {
+    fn interiors_of_any_size_lie_in_the_volume() {
         for (height, width) in [(1, 1), (3, 200), (61, 47), (40, 270)] {
             for seed in 0..8 {
-                let scene = room_scene(seed, height, width);
+                let scene = interior_scene(seed, height, width);
                 let inside = |mesh: &Mesh| mesh.positions.iter().all(|p| p[2].abs() <= 0.5);
                 assert!(scene.meshes.iter().all(inside), "{seed}: a part is outside the volume");
                 render_ldi_reference(&scene, height, width, 5).unwrap();
@@ -320,7 +320,7 @@ mod tests {
     fn walls_fill_the_frame_and_furniture_hides_them() {
         let (mut nearest, mut farthest, mut hidden) = (1.0f32, 0.0f32, 0);
         for seed in 0..16 {
-            let ldi = render_ldi_reference(&room_scene(seed, 128, 128), 128, 128, 3).unwrap();
+            let ldi = render_ldi_reference(&interior_scene(seed, 128, 128), 128, 128, 3).unwrap();
             let depth = &ldi.layers[0].depth;
             assert!(depth.iter().all(|d| !d.is_nan()), "{seed}: a hole");
             nearest = depth.iter().copied().fold(nearest, f32::min);
