@@ -13,8 +13,10 @@ use crate::scene::{Mesh, Scene, Texture};
 use phasefront_io::dice::Dice;
 use std::sync::Arc;
 
-/// The number of pieces of a wall along its depth, and of a block along each side.
+/// The number of pieces of a wall along each side. Textures are linear in a piece, so more pieces follow the perspective
+/// better.
 const WALL_PIECES: usize = 16;
+/// The number of pieces of a block's face along each side.
 const BLOCK_PIECES: usize = 3;
 /// The half size of a room's front over the size of the frame, which it exceeds a little.
 const HALF: f64 = 0.52;
@@ -84,6 +86,17 @@ impl View {
     }
 }
 
+/// What a surface is made of, which chooses its pattern.
+#[derive(Clone, Copy)]
+enum Material {
+    Wallpaper,
+    Tiles,
+    Plaster,
+    Wood,
+    Print,
+    Cloth,
+}
+
 /// A scene under construction.
 struct Maker {
     dice: Dice,
@@ -99,7 +112,8 @@ struct Maker {
 impl Maker {
     /// Adds the back wall, the side walls, the floor and the ceiling.
     fn walls(&mut self) {
-        let [paper, tiles, plaster] = [0, 1, 2].map(|kind| self.texture(kind, 192));
+        let [paper, tiles, plaster] =
+            [Material::Wallpaper, Material::Tiles, Material::Plaster].map(|kind| self.texture(kind, 192));
         let n = WALL_PIECES;
         self.face(n, |a, b| [a, b, 1.0], &paper);
         self.face(n, |a, b| [0.0, b, a], &paper);
@@ -128,7 +142,7 @@ impl Maker {
 
     /// Adds a table with four legs, and some things on it.
     fn table(&mut self) {
-        let wood = self.texture(3, 96);
+        let wood = self.texture(Material::Wood, 96);
         let (u, w) = (self.span(0.2, 0.5), self.span(0.15, 0.4));
         let top = self.dice.range(0.2, 0.4);
         self.block(u, [top - 0.025, top], w, &wood);
@@ -151,7 +165,7 @@ impl Maker {
 
     /// Adds a shelf of boards with books, in front of the back wall.
     fn shelf(&mut self) {
-        let wood = self.texture(3, 96);
+        let wood = self.texture(Material::Wood, 96);
         let u = self.span(0.2, 0.6);
         let front = self.dice.range(0.8, 0.93);
         let boards = self.dice.integer(2, 6);
@@ -246,32 +260,34 @@ impl Maker {
 
     /// Makes a texture of any kind.
     fn any_texture(&mut self, side: usize) -> Arc<Texture> {
-        let kind = self.dice.integer(0, 5);
-        self.texture(kind, side)
+        use Material::{Cloth, Plaster, Print, Tiles, Wallpaper, Wood};
+        let all = [Wallpaper, Tiles, Plaster, Wood, Print, Cloth];
+        let material = all[self.dice.integer(0, all.len() - 1)];
+        self.texture(material, side)
     }
 
-    /// Makes a texture of one kind: wallpaper, tiles, plaster, wood, print or cloth.
-    fn texture(&mut self, kind: usize, side: usize) -> Arc<Texture> {
+    /// Makes a texture of `side` x `side` texels in two colours of this room.
+    fn texture(&mut self, material: Material, side: usize) -> Arc<Texture> {
         let (size, dice) = ((side, side), &mut self.dice);
         let fine = side / 4;
-        let pattern = match kind {
-            0 => {
+        let pattern = match material {
+            Material::Wallpaper => {
                 let stripes = dice.integer(2, fine.min(24));
                 let spots = Pattern::spots(size, dice.integer(2, fine.min(16)), 0.3, dice);
                 Pattern::stripes(size, (stripes as i32, 0), 0.0, 0.5, dice).mixed(&spots, dice.unit() as f32)
             }
-            1 => {
+            Material::Tiles => {
                 let tiles = 2 * dice.integer(1, fine.min(10));
                 let stone = Pattern::noise(size, (4, 4), 5, 0.7, dice);
                 Pattern::checks(size, (tiles, tiles)).mixed(&stone, dice.range(0.1, 0.7) as f32)
             }
-            2 => Pattern::noise(size, (fine.min(24), fine.min(24)), 3, 0.8, dice),
-            3 => {
+            Material::Plaster => Pattern::noise(size, (fine.min(24), fine.min(24)), 3, 0.8, dice),
+            Material::Wood => {
                 let grain = Pattern::noise(size, (2, fine.min(16)), 4, 0.7, dice);
                 Pattern::rings(size, dice.range(2.0, 9.0) as f32, 2.0, 0.8, dice).mixed(&grain, 0.5)
             }
-            4 => Pattern::strokes(size, dice.integer(1, (side / 8).min(12)), 0.2, dice),
-            _ => Pattern::slanted_checks(size, dice.log_range(1.5, fine as f64), dice.range(0.0, 0.8)),
+            Material::Print => Pattern::strokes(size, dice.integer(1, (side / 8).min(12)), 0.2, dice),
+            Material::Cloth => Pattern::slanted_checks(size, dice.log_range(1.5, fine as f64), dice.range(0.0, 0.8)),
         };
         let [dark, bright] = [self.colour(), self.colour()];
         let middle = std::array::from_fn(|c| 0.5 * (dark[c] + bright[c]));
