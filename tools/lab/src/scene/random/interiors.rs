@@ -13,8 +13,8 @@ use crate::scene::{Mesh, Scene, Texture};
 use phasefront_io::dice::Dice;
 use std::sync::Arc;
 
-/// The number of pieces of a wall along each side. Textures are linear in a piece, so more pieces follow the perspective
-/// better.
+/// The number of pieces of a wall along each side. Textures are linear in a piece, so more pieces follow the
+/// perspective better.
 const WALL_PIECES: usize = 16;
 /// The number of pieces of a block's face along each side.
 const BLOCK_PIECES: usize = 3;
