@@ -19,7 +19,7 @@ const MEASURED: usize = 480;
 /// The share of a window's change that a sharp edge makes in one step.
 const ONE_STEP: f32 = 0.75;
 /// The least share of sharp edges in depth that is not soft.
-const SHARP: f32 = 0.45;
+const SHARP: f32 = 0.5;
 /// The distance from [`SHARP`] within which a video frame stays what the previous frame was.
 const HYSTERESIS: f32 = 0.05;
 /// The number of lines in a thread's unit of work.
@@ -37,7 +37,8 @@ pub fn is_soft(sharp_edges: f32, was: Option<bool>) -> bool {
 }
 
 /// Returns the share of the edges in the depth of `frame`, along rows and columns, that are sharp: one step makes most
-/// of the change around it. Returns 1 for a frame without edges. An even slope is no edge.
+/// of the change around it. Returns 1 for a frame without edges. A slope is no edge, and neither is the crease where two
+/// slopes meet without a step.
 ///
 /// Runs on the current thread pool. Does not allocate.
 pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
@@ -67,28 +68,28 @@ fn edges(
     for line in lines {
         let at = |i: usize| depth[line * next + i * step];
         let change = |i: usize| (at(i + 1) - at(i)).abs();
-        for start in 0..length.saturating_sub(window) {
+        // The slope beside an edge is no part of it, and neither is the crease where a steep surface meets another. So
+        // half a window on either side must be in the frame.
+        let beside = window.div_ceil(2);
+        for start in beside..length.saturating_sub(window + beside) {
             let end = start + window;
             let change_of_window = at(end) - at(start);
             if change_of_window.abs() <= EDGE {
                 continue;
             }
-            // The slope on both sides of an edge is no part of it. Beside the border one side is enough.
-            let (left, right) = (start.min(window), (length - 1 - end).min(window));
             let slope = |from: usize, steps: usize| {
                 let step = (at(from + steps) - at(from)) / steps as f32 * change_of_window.signum();
                 step.max(0.0) * window as f32
             };
-            let before = (2 * left >= window).then(|| slope(start - left, left));
-            let after = (2 * right >= window).then(|| slope(end, right));
-            let around = before.into_iter().chain(after).reduce(f32::min);
-            let whole = change_of_window.abs() - around.unwrap_or(0.0);
+            let (left, right) = (start.min(window), (length - 1 - end).min(window));
+            let whole = change_of_window.abs() - slope(start - left, left).max(slope(end, right));
             if whole <= EDGE {
                 continue;
             }
-            // Each edge is counted once, where its largest step is in the middle.
-            let middle = change(start + window / 2);
-            if (start..end).any(|i| change(i) > middle) {
+            // Each edge is counted once, where the first of its largest steps is in the middle.
+            let at_middle = start + window / 2;
+            let middle = change(at_middle);
+            if (start..at_middle).any(|i| change(i) >= middle) || (at_middle + 1..end).any(|i| change(i) > middle) {
                 continue;
             }
             all += 1;
@@ -145,6 +146,20 @@ mod tests {
             }
         }
         assert!(!is_soft(1.0, None) && !is_soft(1.0, Some(true)));
+    }
+
+    #[test]
+    fn creases_of_an_interior_are_not_soft() {
+        let (height, width) = (240, 320);
+        // Side walls, floor and ceiling, which meet a far wall without a step.
+        let walls = Array2::from_shape_fn((height, width), |(y, x)| {
+            let border = x.min(width - 1 - x).min(y).min(height - 1 - y) as f32;
+            (0.012 * border).min(0.7)
+        });
+        assert_eq!(sharp_edges(&frame(walls.clone())), 1.0);
+        let mut with_box = walls;
+        with_box.slice_mut(ndarray::s![90..170, 120..180]).fill(0.3);
+        assert!(sharp_edges(&frame(with_box)) > 0.9);
     }
 
     #[test]
