@@ -1,8 +1,9 @@
 """Seeds: the plane sweep's field of each scene, on clean and on simulated sensor depth, the inputs of seeded networks.
 
 The seeds of a data set are a folder that `python -m phasefront_training seeds` makes. This package writes the depths,
-`depth_000123.npy`, uint16 (V, H, W), d·65535. Variant 0 is the clean depth of the visible layer. The others are
-simulated sensor depth (sensor_depth.py), and `evaluate` uses the first of them. `phasefront-lab seeds` can add R depths
+`depth_000123.npy`, uint16 (V, H, W), d·65535. Variant 0 is the clean depth of the visible layer. The others are the
+depth of the data set's sensors, in turn, or, if it has none, simulated sensor depth (sensor_depth.py). `evaluate` uses
+the first of them. `phasefront-lab seeds` can add R depths
 that are read by a sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W). It adds the fields of all
 depths, which the SDK computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the
 scale in `seeds.json`.
@@ -32,7 +33,7 @@ def make(manifest, output, variants, arguments, command="phasefront-lab"):
         path = output / f"depth_{number:06d}.npy"
         if manifest.pair(number).exists() and not path.exists():
             with replacing(path) as temporary, open(temporary, "wb") as file:
-                np.save(file, _depths(manifest.pair(number), number, variants))
+                np.save(file, _depths(manifest, number, variants))
     call = [command, "seeds", str(manifest.folder), "-o", str(output), *arguments]
     try:
         status = subprocess.run(call, check=False).returncode
@@ -42,11 +43,16 @@ def make(manifest, output, variants, arguments, command="phasefront-lab"):
         raise DataError(f"'{' '.join(call)}' ended with status {status}")
 
 
-def _depths(pair, number, variants):
-    colour, depth = read_pair(pair, 1)[:2]
+def _depths(manifest, number, variants):
+    sensors = len(manifest.sensors)
+    colour, depth, _, sensed = read_pair(manifest.pair(number), 1, sensors)
     colour, depth = torch.from_numpy(colour).float() / 255, torch.from_numpy(depth[0]).float()
-    depths = [depth] + [simulate_sensor_depth(colour, depth, sensor_generator(number, v)) for v in range(variants - 1)]
-    return (torch.stack(depths).numpy() * 65535).round().astype(np.uint16)
+    others = range(variants - 1)
+    if sensors:
+        others = [torch.from_numpy(sensed[(number * len(others) + v) % sensors]).float() for v in others]
+    else:
+        others = [simulate_sensor_depth(colour, depth, sensor_generator(number, v)) for v in others]
+    return (torch.stack([depth, *others]).numpy() * 65535).round().astype(np.uint16)
 
 
 @dataclass(frozen=True)

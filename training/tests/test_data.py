@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from phasefront_training import data
+from phasefront_training import data, seeds
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes, network_input, read_pair
 from phasefront_training.sensor_depth import fill_nearest, simulate_sensor_depth
 from phasefront_training.evaluate import scene_as_seen, served, visible_layers
@@ -213,6 +213,15 @@ def test_sensor_depth_is_that_of_the_data_sets_sensors(data_folder, tmp_path):
     assert torch.allclose(clean.input[:, 3] + 0.5, clean.depth, atol=1e-3)
     with pytest.raises(DataError, match="sensors"):
         Scenes.joined([Scenes(Manifest.read(each), "train") for each in (folder, data_folder)])
+
+
+def test_seeds_are_made_on_the_depth_of_the_data_sets_sensors(data_folder, tmp_path):
+    folder = with_sensors(data_folder, tmp_path / "sensed")
+    seeds.make(Manifest.read(folder), tmp_path / "seeds", 3, [], "true")
+    for number in range(2):
+        clean, *sensed = np.load(tmp_path / "seeds" / f"depth_{number:06d}.npy")
+        assert np.abs(clean / 65535 - read_pair(folder / f"pair_{number:06d}.npz", 1)[1][0]).max() < 1e-3
+        assert [round(float(each.mean() / 65535), 2) for each in sensed] == [0.25, 0.75]
 
 
 def test_data_sets_for_other_displays_are_not_joined(data_folder, tmp_path):
