@@ -81,21 +81,17 @@ pub struct DeepPair {
     pub prefilter: Arc<Network>,
 }
 
-/// Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
+/// Returns the bundled int8 pair for a modulator in the middle of the volume and the default display's pitch, colours
+/// and volume. A network without a pre-filter displays more, at any offset.
 ///
 /// # Errors
-/// Returns an error for other offsets, and if the library was built without networks.
+/// Returns an error if the library was built without networks.
 #[uniffi::export]
-pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
+pub fn built_in_pair() -> Result<DeepPair, PhasefrontError> {
     guard(|| {
-        let display = phasefront::Display::default().with_offset_m(offset_mm * 1e-3)?;
-        let pair = built_in::pair(&display).ok_or_else(|| {
-            PhasefrontError::Network(format!(
-                "network: no pair for an offset of {offset_mm} mm is built in; {}, or take a network without a pre-filter",
-                built_in::offsets()
-            ))
-        })?;
-        Ok(pair)
+        built_in::pair().ok_or_else(|| {
+            PhasefrontError::Network("network: no pair is built in; the feature built-in-network has one".into())
+        })
     })
 }
 
@@ -116,14 +112,8 @@ mod built_in {
         names.join(", ")
     }
 
-    /// Returns a list of the offsets that have a pair.
-    pub(super) fn offsets() -> String {
-        let offsets = phasefront::models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
-        format!("there are pairs for {} mm", offsets.collect::<Vec<_>>().join(", "))
-    }
-
-    pub(super) fn pair(display: &phasefront::Display) -> Option<DeepPair> {
-        let pair = phasefront::models::pair_for(display, Int8)?;
+    pub(super) fn pair() -> Option<DeepPair> {
+        let pair = phasefront::models::PAIR.networks(Int8)?;
         let of = |core| Arc::new(Network { core });
         Some(DeepPair {
             hologram: of(pair.hologram),
@@ -143,11 +133,7 @@ mod built_in {
         "none is"
     }
 
-    pub(super) fn offsets() -> String {
-        "the feature built-in-network has them".into()
-    }
-
-    pub(super) fn pair(_: &phasefront::Display) -> Option<super::DeepPair> {
+    pub(super) fn pair() -> Option<super::DeepPair> {
         None
     }
 }

@@ -735,7 +735,8 @@ RustBuffer uniffi_phasefront_ffi_fn_func_modulator_names(RustCallStatus *_Nonnul
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_BUILT_IN_PAIR
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_BUILT_IN_PAIR
-RustBuffer uniffi_phasefront_ffi_fn_func_built_in_pair(double offset_mm, RustCallStatus *_Nonnull out_status
+RustBuffer uniffi_phasefront_ffi_fn_func_built_in_pair(RustCallStatus *_Nonnull out_status
+    
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_PHONE_OPTIONS

@@ -87,41 +87,21 @@ pub fn network(name: &str, precision: Precision) -> Option<Arc<Network>> {
     model.network(precision)
 }
 
-/// A hologram network and the pre-filter that was trained with it, for modulators at one offset.
+/// A hologram network and the pre-filter that was trained with it.
 #[derive(Debug)]
 pub struct Pair {
     /// The name, which is also that of its card.
     pub name: &'static str,
-    /// The z of the modulator in millimetres.
-    pub offset_mm: f64,
     hologram: Files,
     prefilter: Files,
 }
 
-/// Embeds the files of the pair `$name`.
-macro_rules! pair {
-    ($offset_mm:literal, $name:literal) => {
-        Pair {
-            name: $name,
-            offset_mm: $offset_mm,
-            hologram: files!($name),
-            prefilter: Files {
-                int8: include_bytes!(concat!("../", $name, "-prefilter-int8.onnx")),
-                #[cfg(feature = "float32")]
-                float32: Some(include_bytes!(concat!("../", $name, "-prefilter.onnx"))),
-                #[cfg(not(feature = "float32"))]
-                float32: None,
-            },
-        }
-    };
-}
-
-/// The pairs for the deep double phase method.
-pub const PAIRS: &[Pair] = &[
-    pair!(0.0, "ddpm-8"),
-    pair!(6.0, "ddpm-8-6mm"),
-    pair!(12.0, "ddpm-8-12mm"),
-];
+/// The pair for the deep double phase method and a modulator in the middle of the volume.
+pub const PAIR: &Pair = &Pair {
+    name: "ddpm-8",
+    hologram: files!("ddpm-8"),
+    prefilter: files!("ddpm-8-prefilter"),
+};
 
 /// The two networks of a [`Pair`].
 #[derive(Debug, Clone)]
@@ -142,10 +122,10 @@ impl Pair {
     }
 }
 
-/// Returns the pair that was trained for `display`, if there is one.
+/// Returns [`PAIR`], or `None` if it was not trained for `display` or `precision` is not compiled in.
 pub fn pair_for(display: &Display, precision: Precision) -> Option<DeepPair> {
-    let mut pairs = PAIRS.iter().filter_map(|pair| pair.networks(precision));
-    pairs.find(|pair| pair.prefilter.check_prefilter(display).is_ok())
+    let pair = PAIR.networks(precision)?;
+    pair.prefilter.check_prefilter(display).is_ok().then_some(pair)
 }
 
 /// Returns the default network for `display` (8 layers, int8), or `None` if it was not trained for that display.
@@ -170,11 +150,8 @@ mod tests {
                 let network = model.network(precision).unwrap();
                 network.check_display(&Display::default()).unwrap();
             }
-            for pair in PAIRS {
-                let display = Display::default().with_offset_m(pair.offset_mm * 1e-3);
-                let networks = pair.networks(precision).unwrap();
-                networks.prefilter.check_prefilter(&display.unwrap()).unwrap();
-            }
+            let pair = PAIR.networks(precision).unwrap();
+            pair.prefilter.check_prefilter(&Display::default()).unwrap();
         }
     }
 
@@ -182,7 +159,6 @@ mod tests {
     fn a_display_gets_only_networks_that_were_trained_for_it() {
         for (display, trained, paired) in [
             ("offset_mm = 0", true, true),
-            ("offset_mm = 6", true, true),
             ("offset_mm = 3", true, false),
             ("pitch_um = 3.74", false, false),
         ] {

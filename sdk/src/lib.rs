@@ -43,7 +43,7 @@
 //! # Features
 //!
 //! - `tract`, on by default: runs networks that the kernels do not support on tract. Without it they are refused.
-//! - `models`: the bundled networks in int8, 0.3 MB.
+//! - `models`: the bundled networks in int8, 0.2 MB.
 //! - `gpu`: computes whole frames on Vulkan, Metal or DirectX 12. Select it with
 //!   [`SessionOptions::backend`](session::SessionOptions::backend).
 //!

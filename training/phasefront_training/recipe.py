@@ -33,19 +33,13 @@ class Network:
         return "seeded" in self.flags
 
 
-def _pair(offset_mm):
-    return Network(0.1, ("--offset-mm", str(offset_mm)), after="rgbd-8")
-
-
 NETWORKS = {
     "rgbd-8": Network(0.15, ("--layers", "8")),
     "rgbd-15": Network(0.2, ("--layers", "15")),
     "rgbd-30": Network(0.25, ("--layers", "30")),
     "rgbd-15-wide": Network(0.2, ("--layers", "15"), wide=True),
     "seeded-8-80": Network(0.1, ("--layers", "8", "--input", "seeded")),
-    "ddpm-8": _pair(0),
-    "ddpm-8-6mm": _pair(6),
-    "ddpm-8-12mm": _pair(12),
+    "ddpm-8": Network(0.1, (), after="rgbd-8"),
 }
 
 

@@ -825,10 +825,11 @@ class Statistics:
     listener_failures: int
     def __init__(self, *, submitted: int, processed: int, failed: int, refused: int, dropped: Drops, pending: int, rate_hz: float, times: FrameTimes, backend: str, backend_why: str, quality_level: int, listener_failures: int) -> None: ...
 
-def built_in_pair(offset_mm: float) -> DeepPair:
-    """Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
+def built_in_pair() -> DeepPair:
+    """Returns the bundled int8 pair for a modulator in the middle of the volume and the default display's pitch, colours
+    and volume. A network without a pre-filter displays more, at any offset.
 
-    Errors: Returns an error for other offsets, and if the library was built without networks.
+    Errors: Returns an error if the library was built without networks.
     """
 
 def display_from_toml(text: str) -> Display:

@@ -464,8 +464,8 @@ def test_the_network_that_is_built_in_is_the_default():
 
 
 def test_the_pair_that_is_built_in_can_be_taken():
-    pair = phasefront.built_in_pair(6)
-    display = phasefront.Display(width=64, height=48, offset_mm=6)
+    pair = phasefront.built_in_pair()
+    display = phasefront.Display(width=64, height=48)
     options = session_options(pair.hologram, display, encoding=Encoding.deep(prefilter=pair.prefilter))
     with Session(options) as session:
         assert session.process(still()).levels.shape == (3, 48, 64)
@@ -491,8 +491,6 @@ def test_without_a_network_the_sweep_is_the_default():
     assert isinstance(options.quality_levels[0].method, Method.sweep)
     with Session(options) as session:
         assert session.process(still()).levels.shape == (3, 48, 64)
-    with pytest.raises(NetworkError, match="pairs for 0, 6, 12 mm"):
-        phasefront.built_in_pair(3)
 
 
 def test_targets_that_cannot_be_are_named(display, tmp_path):

@@ -43,24 +43,14 @@ impl RawNetwork {
         Ok(RawNetwork { core })
     }
 
-    /// Returns the hologram network and the pre-filter of the pair for a modulator at `offset_mm`.
+    /// Returns the hologram network and the pre-filter of the pair for a modulator in the middle of the volume.
     ///
     /// # Errors
-    /// Throws an error of kind `display` if the offset is invalid, or of kind `network` if no pair was trained for it.
+    /// Throws an error of kind `network` if no pair is built in.
     #[wasm_bindgen(js_name = builtInPair)]
-    pub fn built_in_pair(offset_mm: f64) -> Answer<Vec<RawNetwork>> {
-        let display = Display::default().with_offset_m(offset_mm * 1e-3).map_err(of_core)?;
-        let pair = phasefront::models::pair_for(&display, Int8).ok_or_else(|| {
-            let offsets = phasefront::models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
-            let offsets = offsets.collect::<Vec<_>>().join(", ");
-            error(
-                "network",
-                &format!(
-                    "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for {offsets} mm, \
-                     or take a network without a pre-filter"
-                ),
-            )
-        })?;
+    pub fn built_in_pair() -> Answer<Vec<RawNetwork>> {
+        let pair = phasefront::models::PAIR.networks(Int8);
+        let pair = pair.ok_or_else(|| error("network", "network: no pair is built in"))?;
         Ok(vec![
             RawNetwork { core: pair.hologram },
             RawNetwork { core: pair.prefilter },

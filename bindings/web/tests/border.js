@@ -35,7 +35,6 @@ export async function run() {
   refused("setting", "look-up table has 3 levels", () => Target.withLookUpTable({}, bytes(3)));
   refused("network", "", () => Network.fromBytes(bytes(100)));
   refused("network", "no 'rgbd-9' is built in", () => Network.builtIn("rgbd-9"));
-  refused("network", "no pair", () => Network.builtInPair(3));
   refused("setting", "no mode 'live'", () => new Session({ target }, "live"));
   refused("setting", "no mode 'film'", () => new Session({ target }, "film"));
   refused("setting", "no method 'magic'", () => new Session({ target, method: { kind: "magic" } }));
@@ -100,9 +99,9 @@ export async function run() {
   refused("session", "hologram is closed", () => hologram.levels);
   session.close();
   refused("session", "closed", () => session.process(new Frame(colour(), depth())));
-  const pair = Network.builtInPair(6);
+  const pair = Network.builtInPair();
   const deep = new Session({
-    target: { ...target, offsetMm: 6 },
+    target,
     method: { kind: "trained", network: pair.hologram },
     encoding: { kind: "deep", prefilter: pair.prefilter },
   });

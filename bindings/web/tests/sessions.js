@@ -135,11 +135,10 @@ export async function run() {
   (await images.process(moved, { transfer: [moved.colour.data.buffer] })).close();
   if (moved.colour.data.length !== 0) throw new Error("the frame was copied");
   images.close();
-  const part = (part) => ({ pairMm: 6, part });
   const deep = await WorkerSession.open({
-    target: { ...target, offsetMm: 6 },
-    method: { kind: "trained", network: part("hologram") },
-    encoding: { kind: "deep", prefilter: part("prefilter") },
+    target,
+    method: { kind: "trained", network: { pair: "hologram" } },
+    encoding: { kind: "deep", prefilter: { pair: "prefilter" } },
   });
   (await deep.process(frame())).close();
   deep.close();

@@ -35,7 +35,7 @@ const SHALLOW = { volumeDepthMm: 1.5 };
 /** Returns the cases: size, options, mode, and the bound that the native tests of the GPU state. */
 async function cases() {
   const trained = (network) => ({ kind: "trained", network });
-  const pair = Network.builtInPair(6);
+  const pair = Network.builtInPair();
   const sweep = { kind: "sweep" };
   const [maximal, anti] = [{ kind: "frame-max" }, { kind: "anti-alias" }];
   const plain = { localSteps: 0, darkThreshold: 0 };
@@ -69,13 +69,12 @@ async function cases() {
       "image",
       0.002,
     ],
-    "pair with its pre-filter, 6 mm away": [
+    "pair with its pre-filter": [
       61,
       47,
       {
         method: trained(pair.hologram),
         encoding: { kind: "deep", prefilter: pair.prefilter },
-        display: { offsetMm: 6 },
       },
       "image",
       0.02,

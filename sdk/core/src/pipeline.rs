@@ -266,11 +266,12 @@ mod tests {
     fn a_frame_that_is_given_up_is_left_as_it_is() {
         let (height, width) = (19, 33);
         let display = Display::from_toml("width = 33\nheight = 19\noffset_mm = 6").unwrap();
-        let target = Target::from(display.clone());
+        let target = &Target::from(display.clone());
+        let in_the_middle = &Target::from(display.clone().with_offset_m(0.0).unwrap());
         let seeded = network(include_bytes!("../../../models/seeded-8-80.onnx"));
         let int8 = network(include_bytes!("../../../models/rgbd-8-int8.onnx"));
         let sweep = Sweep::of_planes(&display, 8);
-        let deep = network(include_bytes!("../../../models/ddpm-8-6mm-prefilter.onnx"));
+        let deep = network(include_bytes!("../../../models/ddpm-8-prefilter.onnx"));
         let steps = EncoderOptions {
             midpoint_steps: 1,
             ..EncoderOptions::default()
@@ -283,14 +284,14 @@ mod tests {
         let (amplitude, depth) = frame.planes_mut();
         (amplitude.iter_mut().enumerate()).for_each(|(i, a)| *a = (i % 7) as f32 / 7.0);
         (depth.iter_mut().enumerate()).for_each(|(i, d)| *d = (i % 5) as f32 / 5.0);
-        for (method, options) in [
-            (Method::Network(int8.clone()), EncoderOptions::default()),
-            (Method::Network(int8.clone()), deep),
-            (Method::Seeded(seeded), EncoderOptions::default()),
-            (Method::Sweep(sweep), steps),
-            (Method::Auto(sweep, int8), EncoderOptions::default()),
+        for (method, target, options) in [
+            (Method::Network(int8.clone()), target, EncoderOptions::default()),
+            (Method::Network(int8.clone()), in_the_middle, deep),
+            (Method::Seeded(seeded), target, EncoderOptions::default()),
+            (Method::Sweep(sweep), target, steps),
+            (Method::Auto(sweep, int8), target, EncoderOptions::default()),
         ] {
-            let pipeline = Pipeline::new((height, width), method, &target, &options).unwrap();
+            let pipeline = Pipeline::new((height, width), method, target, &options).unwrap();
             let values = 3 * height * width;
             let untouched = Complex32::new(1.5, -2.5);
             let run = |scratch: &mut PipelineScratch| {

@@ -8,20 +8,11 @@ pub use phasefront_models::Precision;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The name of the bundled pairs of a network and its pre-filter for the deep double phase method. The display's offset
-/// selects the pair.
+/// The name of the bundled pair of a network and its pre-filter for the deep double phase method.
 pub const DEEP: &str = "ddpm-8";
 
 /// The names of the networks in the source tree's `models` folder that are not bundled.
-const FILES: [&str; 7] = [
-    "ddpm-8-12mm",
-    "ddpm-8-6mm",
-    "ldi3-15",
-    "rgbd-15-cylinder",
-    "rgbd-15-wide",
-    "rgbd-30",
-    "seeded-8-80",
-];
+const FILES: [&str; 5] = ["ldi3-15", "rgbd-15-cylinder", "rgbd-15-wide", "rgbd-30", "seeded-8-80"];
 
 /// Returns the full name for `name`, which may be short.
 fn full_name(name: &str) -> String {

@@ -44,13 +44,11 @@ export class Network {
   }
 
   /**
-   * Returns the hologram network and the pre-filter that was trained with it, for a modulator at `offsetMm`: 0, 6 or
-   * 12.
-   *
-   * @throws PhasefrontError `network`: no pair was trained for the offset.
+   * Returns the hologram network and the pre-filter that was trained with it, for a modulator in the middle of the
+   * volume. A network without a pre-filter displays more, at any offset.
    */
-  static builtInPair(offsetMm: number): DeepPair {
-    const [hologram, prefilter] = guard(() => RawNetwork.builtInPair(offsetMm)).map((raw) => new Network(raw));
+  static builtInPair(): DeepPair {
+    const [hologram, prefilter] = guard(() => RawNetwork.builtInPair()).map((raw) => new Network(raw));
     return { hologram: hologram!, prefilter: prefilter! };
   }
 

@@ -47,7 +47,7 @@ function canvasOf({ canvas, moved }: PageCanvas): OffscreenCanvas {
 
 function network(source: NetworkSource): Network {
   if (typeof source === "string") return Network.builtIn(source);
-  return "pairMm" in source ? Network.builtInPair(source.pairMm)[source.part] : Network.fromBytes(source);
+  return "pair" in source ? Network.builtInPair()[source.pair] : Network.fromBytes(source);
 }
 
 function target(source: TargetSource): Target | Display {

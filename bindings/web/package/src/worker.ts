@@ -46,10 +46,10 @@ export type { Display } from "./target.js";
 export type Bytes = ArrayBuffer | ArrayBufferView;
 
 /**
- * A network of a worker's session: the name of a built-in one, the bytes of an `.onnx` file, or one of the two that were
- * trained for a modulator at `pairMm`.
+ * A network of a worker's session: the name of a built-in one, the bytes of an `.onnx` file, or one of the built-in
+ * pair.
  */
-export type NetworkSource = string | Bytes | { readonly pairMm: number; readonly part: "hologram" | "prefilter" };
+export type NetworkSource = string | Bytes | { readonly pair: "hologram" | "prefilter" };
 
 /**
  * A target of a worker's session: a display or its TOML, alone or with the modulator's look-up table, the bytes of a

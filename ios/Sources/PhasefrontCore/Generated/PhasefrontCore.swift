@@ -8310,16 +8310,16 @@ public func modulatorNames() -> [String]  {
 })
 }
 /**
- * Returns the bundled int8 pair for a modulator at `offset_mm` and the default display's pitch, colours and volume.
+ * Returns the bundled int8 pair for a modulator in the middle of the volume and the default display's pitch, colours
+ * and volume. A network without a pre-filter displays more, at any offset.
  *
  * # Errors
- * Returns an error for other offsets, and if the library was built without networks.
+ * Returns an error if the library was built without networks.
  */
-public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
+public func builtInPair()throws  -> DeepPair  {
     return try  FfiConverterTypeDeepPair_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_func_built_in_pair(
-        FfiConverterDouble.lower(offsetMm),uniffiCallStatus
+    uniffi_phasefront_ffi_fn_func_built_in_pair(uniffiCallStatus
     )
 })
 }
@@ -8394,7 +8394,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_modulator_names() != 60502) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 22076) {
+    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 39950) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_phone_options() != 23382) {

@@ -3,6 +3,7 @@ use crate::network_models;
 
 use network_models::{Model, frame, int, ints};
 use num_complex::Complex32;
+use phasefront_core::display::Display;
 use phasefront_core::method::network::Network;
 use phasefront_core::method::network::{Head, InputKind, Isa, Precision, Source, reference};
 use prost::Message;
@@ -417,6 +418,18 @@ fn a_network_at_half_the_resolution_tells_so() {
     let prefilter = Model::prefilter("0").halved();
     let why = Network::from_onnx(&prefilter.bytes()).unwrap_err().to_string();
     assert!(why.contains("whole resolution"), "{why}");
+}
+
+#[test]
+fn a_prefilter_serves_displays_whose_light_spreads_as_much() {
+    let prefilter = Network::from_onnx(&Model::prefilter("6").bytes()).unwrap();
+    let at = |toml: &str| prefilter.check_prefilter(&Display::from_toml(toml).unwrap());
+    at("offset_mm = 6").unwrap();
+    let fine = "pitch_um = 4\nvolume_depth_mm = 1.5\noffset_mm = ";
+    at(&format!("{fine}1.5")).unwrap();
+    let why = at(&format!("{fine}6")).unwrap_err().to_string();
+    assert!(why.contains("1.500 mm on this display"), "{why}");
+    assert!(at("offset_mm = 6.05").is_err());
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! `phasefront networks`: lists the names that --network takes.
 
 use clap::Args;
-use phasefront_command::networks::{self, Precision};
+use phasefront_command::networks::Precision;
 use phasefront_command::terminal;
 use phasefront_io::{Error, Result};
-use phasefront_models::{NETWORKS, PAIRS};
+use phasefront_models::{NETWORKS, PAIR};
 use serde_json::json;
 
 /// List the bundled networks
@@ -20,13 +20,9 @@ impl Networks {
             let (layers, input) = (network.layers(), network.input().to_string());
             rows.push((model.name, layers, input, "any offset".to_owned()));
         }
-        // All pairs have the same name. The display's offset selects the pair.
-        if let Some(first) = PAIRS.first() {
-            let network = first.networks(Precision::Int8).ok_or_else(missing)?.hologram;
-            let offsets: Vec<_> = PAIRS.iter().map(|pair| pair.offset_mm.to_string()).collect();
-            let offsets = format!("{} mm, a pair with its pre-filter for each", offsets.join(", "));
-            rows.push((networks::DEEP, network.layers(), network.input().to_string(), offsets));
-        }
+        let network = PAIR.networks(Precision::Int8).ok_or_else(missing)?.hologram;
+        let offset = "0 mm, with its pre-filter".to_owned();
+        rows.push((PAIR.name, network.layers(), network.input().to_string(), offset));
         let values: Vec<_> = (rows.iter())
             .map(|(name, layers, input, offset)| {
                 json!({"name": name, "layers": layers, "input": input, "offset": offset})

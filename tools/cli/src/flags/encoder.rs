@@ -125,11 +125,9 @@ impl EncoderFlags {
         let deep = self.is_deep() || (by_name && self.encoder.is_none());
         if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
             let Some(pair) = phasefront_models::pair_for(display, precision.unwrap_or_default()) else {
-                let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
-                return Err(Error::Input(format!(
-                    "networks for the deep encoder are bundled for offsets of {} mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias",
-                    offsets.collect::<Vec<_>>().join(", ")
-                )));
+                return Err(Error::Input(
+                    "the networks for the deep encoder that are bundled are for an offset of 0 mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias, which displays more".into(),
+                ));
             };
             let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::DEEP);
             return Ok((pair.hologram, encoder));

@@ -9,7 +9,7 @@ use phasefront_core::optics::metrics;
 use phasefront_exact::sm_lbm;
 use phasefront_io::ldi::Ldi;
 use phasefront_lab::scene;
-use phasefront_models::{DeepPair, NETWORKS, PAIRS, Precision, pair_for};
+use phasefront_models::{DeepPair, NETWORKS, Precision, pair_for};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -38,25 +38,22 @@ fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
 }
 
 #[test]
-fn pairs_are_for_their_offset_and_display() {
-    for pair in PAIRS {
-        let display = Display::default().with_offset_m(pair.offset_mm * 1e-3).unwrap();
-        for precision in PRECISIONS {
-            let DeepPair { hologram, prefilter } = pair_for(&display, precision).unwrap();
-            assert_eq!(hologram.precision(), numbers(precision));
-            assert_eq!(prefilter.precision(), numbers(precision));
-            assert!((prefilter.display().offset_m - display.offset_m()).abs() < 1e-9);
-            let plan = hologram.plan(40, 64).unwrap();
-            assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
-            let plan = prefilter.filter_plan(40, 64).unwrap();
-            assert!(plan.engine().isa.is_some());
-        }
+fn the_pair_is_for_its_offset_and_display() {
+    for precision in PRECISIONS {
+        let DeepPair { hologram, prefilter } = pair_for(&Display::default(), precision).unwrap();
+        assert_eq!(hologram.precision(), numbers(precision));
+        assert_eq!(prefilter.precision(), numbers(precision));
+        assert_eq!(prefilter.display().offset_m, 0.0);
+        let plan = hologram.plan(40, 64).unwrap();
+        assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
+        let plan = prefilter.filter_plan(40, 64).unwrap();
+        assert!(plan.engine().isa.is_some());
     }
     let none = |display: Display| pair_for(&display, Precision::Int8).is_none();
     assert!(none(Display::default().with_offset_m(3e-3).unwrap()));
     // The encoder would refuse its pre-filter here.
-    assert!(none(Display::default().with_offset_m(6.05e-3).unwrap()));
-    assert!(none(Display::from_toml("pitch_um = 6.4").unwrap()));
+    assert!(none(Display::default().with_offset_m(5e-5).unwrap()));
+    assert!(none(Display::from_toml("wavelengths_nm = [660, 520, 450]").unwrap()));
 }
 
 /// Runs `network` on the fast path and on stock tract, at an odd size and an even one.
@@ -184,12 +181,4 @@ fn displays_beyond_what_was_trained_are_refused() {
     cylinder.check_display(&Display::default()).unwrap();
     let why = cylinder.check_display(&Display::from_toml("volume_depth_mm = 3").unwrap());
     assert!(why.unwrap_err().to_string().contains("of one display"));
-    // A pre-filter also serves all displays with the same λ·offset/p².
-    let pair = pair_for(&Display::default().with_offset_m(6e-3).unwrap(), Precision::Int8).unwrap();
-    let fine = Display::from_toml("pitch_um = 4\nvolume_depth_mm = 1.5").unwrap();
-    pair.prefilter
-        .check_prefilter(&fine.clone().with_offset_m(1.5e-3).unwrap())
-        .unwrap();
-    let why = pair.prefilter.check_prefilter(&fine.with_offset_m(6e-3).unwrap());
-    assert!(why.unwrap_err().to_string().contains("1.500 mm on this display"));
 }
