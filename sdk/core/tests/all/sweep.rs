@@ -284,12 +284,12 @@ fn a_seeded_network_corrects_the_sweep() {
 
 #[test]
 fn auto_gives_each_frame_what_suits_its_depth() {
-    let (height, width) = (40, 60);
+    let (height, width) = (80, 100);
     // A modulator to which a sweep alone would continue.
     let display = Display::default().with_offset_m(2e-3).unwrap();
     let network = Arc::new(Network::from_onnx(&Model::new(4, 8).bytes()).unwrap());
     let default = Sweep::for_display(&display);
-    let square = |y: usize, x: usize| (10..30).contains(&y) && (15..40).contains(&x);
+    let square = |y: usize, x: usize| (25..55).contains(&y) && (30..70).contains(&x);
     let frame = |ramp: usize| {
         let rgb = Array3::from_shape_fn((3, height, width), |(_, y, x)| 0.2 + 0.6 * f32::from(square(y, x)));
         let depth = Array2::from_shape_fn((height, width), |(y, x)| {

@@ -290,7 +290,7 @@ fn names_of_networks_are_listed_and_a_deep_field_is_told() {
             "{list}"
         );
     }
-    assert!(list.contains("0, 6, 12 mm"), "{list}");
+    assert!(list.contains("0 mm, with its pre-filter"), "{list}");
     let warned = |network| {
         let output = folder.run(&made(&["--network", network, "--complex", "f.npy"]));
         assert!(output.status.success());

@@ -53,7 +53,7 @@ fn the_pair_is_for_its_offset_and_display() {
     assert!(none(Display::default().with_offset_m(3e-3).unwrap()));
     // The encoder would refuse its pre-filter here.
     assert!(none(Display::default().with_offset_m(5e-5).unwrap()));
-    assert!(none(Display::from_toml("wavelengths_nm = [660, 520, 450]").unwrap()));
+    assert!(none(Display::from_toml("pitch_um = 3.74").unwrap()));
 }
 
 /// Runs `network` on the fast path and on stock tract, at an odd size and an even one.
