@@ -21,6 +21,7 @@ from .stage2 import Identity, Stage2, prefilter_network
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
 BEGINNING_SCENES = 4  # for finding units that never fire, and for fitting a grown last layer
 VALIDATION_SCENES = 8  # for the curve; `evaluate` uses all
+NEEDS_SEEDS = "a seeded network reads the sweep's fields: --seeds FOLDER"
 
 
 def parser():
@@ -55,10 +56,12 @@ def parser():
     p.add_argument("--phasefront-lab", default="phasefront-lab", metavar="FILE", help="path of the command phasefront-lab (default: the one on the PATH)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="for example: -- --size 256 --planes 200 --threads 1")
 
-    p = add("seeds", run_seeds, "Make the seeds of a data set with `phasefront-lab seeds`, which receives the arguments after --.")
-    p.add_argument("--data", required=True, help="folder of the data set")
+    p = add("seeds", run_seeds, "Make the seeds of a data set or a pool with `phasefront-lab seeds`, which receives the arguments after --.")
+    scenes = p.add_mutually_exclusive_group(required=True)
+    scenes.add_argument("--data", help="folder of the data set")
+    scenes.add_argument("--pool", metavar="DIR", help="folder of the pool")
     p.add_argument("-o", "--output", required=True, help="folder of the seeds")
-    p.add_argument("--variants", type=int, default=4, help="number of depths per scene: the clean one, and simulated sensor depths (default 4)")
+    p.add_argument("--variants", type=int, default=4, help="number of depths per scene: the clean one, and those of the data set's sensors or, if it has none, simulated ones (default 4)")
     p.add_argument("--phasefront-lab", default="phasefront-lab", metavar="FILE", help="path of the command phasefront-lab (default: the one on the PATH)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="for example: -- --planes 32")
 
@@ -155,7 +158,7 @@ def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e
     scenes = p.add_mutually_exclusive_group(required=True)
     scenes.add_argument("--data", nargs="+", help="folder of the data set, or folders of several data sets to train on together")
     scenes.add_argument("--pool", metavar="DIR", help="folder of a pool of scenes, which may grow meanwhile")
-    p.add_argument("--seeds", nargs="+", help="folder of the seeds of each data set, for seeded networks and to add refined depth to simulated sensor depth")
+    p.add_argument("--seeds", nargs="+", help="folder of the seeds of each data set or of the pool, for seeded networks and to add refined depth to simulated sensor depth")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall time, including earlier runs that are resumed")
@@ -195,7 +198,12 @@ def run_pool(args):
 def run_seeds(args):
     if args.variants < 2:
         raise ValueError("seeds need at least 2 variants a scene: clean and simulated sensor depth")
-    seeds.make(data.Manifest.read(args.data), args.output, args.variants, passed_on(args), args.phasefront_lab)
+    if args.pool:
+        sets = [(each, Path(args.output) / each.folder.name) for each in pool.shards(args.pool)]
+    else:
+        sets = [(data.Manifest.read(args.data), args.output)]
+    for manifest, output in sets:
+        seeds.make(manifest, output, args.variants, passed_on(args), args.phasefront_lab)
 
 
 def run_recipe(args):
@@ -299,10 +307,13 @@ def sampling(args):
 def load(args, architecture):
     """Returns the training scenes, and a few scenes for the curve's validation."""
     if args.pool:
-        if args.seeds or architecture.input == "seeded":
-            raise ValueError("a pool has no seeds; seeded networks train on --data with --seeds")
-        train = pool.Pool(args.pool, architecture.ldi_layers, args.scenes)
-        return train, pool.validation(args.pool, architecture.ldi_layers, VALIDATION_SCENES)
+        if architecture.input == "seeded" and not args.seeds:
+            raise ValueError(NEEDS_SEEDS)
+        if args.seeds and len(args.seeds) > 1:
+            raise ValueError("a pool's seeds are in one folder, which `seeds --pool` makes")
+        of_pool = args.seeds[0] if args.seeds else None
+        train = pool.Pool(args.pool, architecture.ldi_layers, args.scenes, of_pool)
+        return train, pool.validation(args.pool, architecture.ldi_layers, VALIDATION_SCENES, of_pool)
     folders, inputs = args.data, {architecture.input}
     of_seeds = args.seeds or [None] * len(folders)
     if len(of_seeds) != len(folders):
@@ -317,7 +328,7 @@ def load(args, architecture):
 def scenes_for(folder, folder_of_seeds, split, inputs, limit):
     """Returns scenes with the data that networks with these inputs read."""
     if "seeded" in inputs and not folder_of_seeds:
-        raise ValueError("a seeded network reads the sweep's fields: --seeds FOLDER")
+        raise ValueError(NEEDS_SEEDS)
     layers = {networks.Architecture(3, input=each).ldi_layers for each in inputs}
     if len(layers) > 1:
         raise ValueError("networks for different inputs are evaluated one call each")

@@ -21,17 +21,22 @@ def sets(last):
 
 
 def names(name, last):
-    """Returns the folder name of each data set: DATA, or DATA1 and DATA2, or POOL for a pool."""
+    """Returns the folder name of each data set: DATA, or DATA1 and DATA2. A pool has one folder."""
     if last.extra["data"].get("pool"):
-        return ["POOL"]
+        return [name]
     count = len(sets(last))
     return [name] if count == 1 else [f"{name}{k + 1}" for k in range(count)]
+
+
+def scenes_of(last):
+    """Returns the flag that names the training scenes, with its values."""
+    return ["--pool", "POOL"] if last.extra["data"].get("pool") else ["--data", *names("DATA", last)]
 
 
 def command(last, init):
     """Returns the command that reproduces the checkpoint `last`."""
     architecture, _ = last.networks["hologram"]
-    parts = ["python", "-m", "phasefront_training", last.kind, "--pool" if last.extra["data"].get("pool") else "--data", *names("DATA", last), "-o", "OUT"]
+    parts = ["python", "-m", "phasefront_training", last.kind, *scenes_of(last), "-o", "OUT"]
     if last.kind == "stage1":
         parts += ["--layers", architecture.layers, "--filters", architecture.filters, "--input", architecture.input, "--head", architecture.head]
         parts += ["--halved"] if architecture.halved else []
@@ -116,15 +121,22 @@ def sensors_of(facts):
     return f" --sensor {','.join(facts['sensors'])}" if facts.get("sensors") else ""
 
 
+def seeds_again(scenes, folder, facts):
+    """Returns the line with the command that makes seeds in `folder`. scenes: the flag of the training scenes."""
+    refined = f" --refined {facts['refined']}" if facts["refined"] else ""
+    return f"    python -m phasefront_training seeds {scenes} -o {folder} --variants {facts['variants']} -- --planes {facts['seed_planes']}{refined}"
+
+
 def scenes_again(last):
     """Returns lines with the commands that make the training scenes of `last`."""
     data = last.extra["data"]
+    seeded = any(a.input == "seeded" for a, _ in last.networks.values())
     if data.get("pool"):
         first = sets(last)[0]
         shares = " ".join(f"{each['like']}={each['shards']}" for each in sets(last))
         flags = f"--scenes {data['scenes']} --shares {shares} -- --size {first['size']} --planes {first['planes']}{sensors_of(data)}"
-        return [f"    python -m phasefront_training pool -o POOL {flags}"]
-    lines, seeded = [], any(a.input == "seeded" for a, _ in last.networks.values())
+        return [f"    python -m phasefront_training pool -o POOL {flags}", *([seeds_again("--pool POOL", "SEEDS", first)] if seeded else [])]
+    lines = []
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += f" --scenes-like {each['like']}" if like(each) else ""
@@ -132,8 +144,7 @@ def scenes_again(last):
         flags += sensors_of(each)
         lines.append(f"    python -m phasefront_training data -o {folder} -- {flags}")
         if seeded:
-            refined = f"--planes {each['seed_planes']} --refined {each['refined']}"
-            lines.append(f"    python -m phasefront_training seeds --data {folder} -o {seeds} -- {refined}")
+            lines.append(seeds_again(f"--data {folder}", seeds, each))
     return lines
 
 

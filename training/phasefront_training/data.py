@@ -164,6 +164,7 @@ class Scenes:
             self.origin |= {"seed_planes": seeds.planes, "refined": seeds.refined}
         if self.seeded:
             parts = [tuple(map(torch.from_numpy, seeds.of(number))) for number in self.numbers]
+            self.origin["variants"] = len(parts[0][0]) - seeds.refined
             self.variant_depth, self.variant_seed = (_gather(parts, k, device) for k in range(2))
 
     @classmethod
@@ -222,7 +223,7 @@ class Scenes:
     def variant(self, i, v):
         """Returns depth (1, H, W), normalized to its own set's volume, and seed (6, H, W) of variant v of scene i. v =
         0 is clean, and the last `refined` variants are refined."""
-        return self.variant_depth[i, v][None].float(), self.variant_seed[i, v].float()
+        return self.variant_depth[i][v][None].float(), self.variant_seed[i][v].float()
 
 
 def _read_arrays(path, names):
@@ -357,9 +358,9 @@ class Sampler:
         from_sensor = rng.random() < self.sensor_depth
         field = None
         if scenes.seeded:
-            v = int(rng.integers(1, scenes.variant_depth.shape[1])) if from_sensor else 0
-            measured = scenes.variant_depth[i, v][window][None].float()
-            field = scenes.variant_seed[i, v][window].float() * gains.repeat(2, 1, 1)
+            v = int(rng.integers(1, len(scenes.variant_depth[i]))) if from_sensor else 0
+            measured = scenes.variant_depth[i][v][window][None].float()
+            field = scenes.variant_seed[i][v][window].float() * gains.repeat(2, 1, 1)
         elif from_sensor and scenes.sensors:
             measured = scenes.sensed[i][int(rng.integers(len(scenes.sensors)))][window][None].float()
         else:

@@ -14,12 +14,15 @@ import sys
 from pathlib import Path
 
 from . import data
+from .seeds import Seeds
 
 FIRST_SEED = 1000  # lower seeds are for other data sets, some of them for tests
 KINDS = ("objects", "photographs", "varied")
 SHARES = {"objects": 1.0, "photographs": 1.0, "varied": 2.0}
 SHARD_SCENES = 40  # one of them for validation and one for tests
 PART = ".part"  # suffix of an incomplete shard
+TENSORS = ("colour", "depth", "target", "sensed")  # of each scene
+SEEDED = ("variant_depth", "variant_seed")  # of each scene with seeds
 
 
 def kind_of(shard, shares):
@@ -82,17 +85,26 @@ def shards(folder):
     return [data.Manifest.read(path) for path in found]
 
 
-def validation(folder, ldi_layers, scenes):
-    """Returns one validation scene of each of the first `scenes` shards."""
+def seeds_of(folder, manifest):
+    """Returns the seeds of a shard in the folder of a pool's seeds, or None without such a folder."""
+    return Seeds.read(Path(folder) / manifest.folder.name) if folder else None
+
+
+def validation(folder, ldi_layers, scenes, seeds=None):
+    """Returns one validation scene of each of the first `scenes` shards. seeds: the folder of the pool's seeds."""
     first = shards(folder)[:scenes]
-    return data.Scenes.joined([data.Scenes(manifest, "validation", ldi_layers, 1) for manifest in first])
+    parts = [data.Scenes(manifest, "validation", ldi_layers, 1, seeds=seeds_of(seeds, manifest)) for manifest in first]
+    return data.Scenes.joined(parts)
 
 
 class Pool(data.Scenes):
-    """The training scenes of a pool in memory. Each scene is a separate tensor, so that more scenes can be added."""
+    """The training scenes of a pool in memory. Each scene is a separate tensor, so that more scenes can be added.
 
-    def __init__(self, folder, ldi_layers=1, limit=None):
-        self.folder, self.limit = Path(folder), limit
+    seeds: the folder of the pool's seeds, which holds those of each shard in a folder of the shard's name.
+    """
+
+    def __init__(self, folder, ldi_layers=1, limit=None, seeds=None):
+        self.folder, self.limit, self.seeds = Path(folder), limit, seeds
         found = shards(folder)
         if not found:
             raise data.DataError(f"{folder}: no whole shard there yet; make the pool first (python -m phasefront_training pool)")
@@ -101,7 +113,9 @@ class Pool(data.Scenes):
         for name in ("display", "ldi_layers", "corrected", "seeded", "refined", "sensors"):
             setattr(self, name, getattr(first, name))
         self.origin, self.sets, self.damaged, self.numbers = {}, [], [], []
-        self.colour, self.depth, self.target, self.sensed = [], [], [], []
+        self.tensors = TENSORS + (SEEDED if self.seeded else ())
+        for name in self.tensors:
+            setattr(self, name, [])
         self._take(first)
         self.look()
 
@@ -143,10 +157,10 @@ class Pool(data.Scenes):
 
     def _read(self, manifest, ldi_layers):
         self.known.add(manifest.folder.name)
-        return data.Scenes(manifest, "train", ldi_layers, self.limit)
+        return data.Scenes(manifest, "train", ldi_layers, self.limit, seeds=seeds_of(self.seeds, manifest))
 
     def _fits(self, scenes, manifest):
-        for what in ("display", "shape", "corrected", "sensors"):
+        for what in ("display", "shape", "corrected", "refined", "sensors"):
             mine, its = getattr(self, what), getattr(scenes, what)
             if mine != its:
                 raise data.DataError(f"{manifest.folder}: its {what} is {its}, that of the other shards {mine}")
@@ -154,7 +168,7 @@ class Pool(data.Scenes):
     def _take(self, scenes):
         self.sets.append(scenes.facts)
         self.damaged += scenes.damaged
-        for name in ("colour", "depth", "target", "sensed"):
+        for name in self.tensors:
             getattr(self, name).extend(getattr(scenes, name))
         # The count changes last, because other threads may draw samples meanwhile.
         self.numbers += scenes.numbers

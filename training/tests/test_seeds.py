@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -90,6 +91,29 @@ def test_a_seeded_network_is_trained_quantized_and_judged(data_folder, seeds_fol
         assert read_description(file)["seed_planes"] == "3"
     assert main(["evaluate", checkpoint, "--data", str(data_folder)]) == 1
     assert "--seeds" in capsys.readouterr().err
+
+
+def test_a_seeded_network_trains_on_a_pool(data_folder, seeds_folder, tmp_path, capsys):
+    pool, seeds, out = (tmp_path / name for name in ("pool", "of-pool", "out"))
+    shards = ["shard_0000", "shard_0001"]
+    for shard in shards:
+        shutil.copytree(data_folder, pool / shard)
+    make = ["seeds", "--pool", str(pool), "-o", str(seeds), "--variants", "3", "--phasefront-lab", "true"]
+    assert main(make) == 0
+    for shard in shards:
+        assert np.load(seeds / shard / "depth_000000.npy").shape == (3, 64, 64)
+        shutil.copytree(seeds_folder, seeds / shard, dirs_exist_ok=True)
+    train = ["stage1", "--pool", str(pool), "-o", str(out), "--input", "seeded", "--layers", "4", "--filters", "8"]
+    train += ["--steps", "3", "--crop", "48", "--sensor-depth", "0.5", "--f32"]
+    assert main(train) == 1 and "--seeds" in capsys.readouterr().err
+    assert main([*train, "--seeds", str(seeds)]) == 0
+    figures, card = tmp_path / "figures.json", tmp_path / "card.md"
+    common = ["--data", str(data_folder), "--seeds", str(seeds_folder)]
+    assert main(["evaluate", str(out / "checkpoint.pt"), *common, "--json", str(figures)]) == 0
+    assert main(["card", str(out / "checkpoint.pt"), str(figures), "-o", str(card)]) == 0
+    told = card.read_text()
+    assert "seeds --pool POOL -o SEEDS --variants 3 -- --planes 3 --refined 1" in told
+    assert "--pool POOL" in told and "--seeds SEEDS" in told
 
 
 def test_seeds_that_do_not_fit_are_named(data_folder, seeds_folder, tmp_path):
