@@ -37,8 +37,8 @@ pub fn is_soft(sharp_edges: f32, was: Option<bool>) -> bool {
 }
 
 /// Returns the share of the edges in the depth of `frame`, along rows and columns, that are sharp: one step makes most
-/// of the change around it. Returns 1 for a frame without edges. A slope is no edge, and neither is the crease where two
-/// slopes meet without a step.
+/// of the change around it. Returns 1 for a frame without edges. A slope is no edge, and neither is the crease where
+/// two slopes meet without a step.
 ///
 /// Runs on the current thread pool. Does not allocate.
 pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
