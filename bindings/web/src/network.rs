@@ -2,7 +2,7 @@
 
 use crate::error::{Answer, error, object, of_core};
 use phasefront::models::Precision::Int8;
-use phasefront::{Display, Network};
+use phasefront::Network;
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
 
