@@ -104,6 +104,7 @@ def parser():
     p = add("export", run_export, "Write a checkpoint's network as float32 ONNX.")
     p.add_argument("checkpoint")
     p.add_argument("--network", default="hologram", choices=("hologram", "prefilter"), help="network to take from a stage 2 checkpoint (default %(default)s)")
+    p.add_argument("--shrink", type=float, default=1.0, metavar="FACTOR", help="factor of the correction that a seeded network adds to its seed: below 1 it leaves good seeds alone (default 1)")
     p.add_argument("-o", "--output", required=True, help="the .onnx file")
 
     p = add("evaluate", run_evaluate, "Evaluate networks on held-out scenes by PSNR and SSIM, and compare them with the RGB image as the field.")
@@ -442,7 +443,12 @@ def run_export(args):
     if args.network not in last.networks:
         raise ValueError(f"{args.checkpoint}: no {args.network}, only {', '.join(last.networks)}")
     offset_m, seed_planes = last.extra.get("offset_m", 0.0), last.extra["data"].get("seed_planes")
-    export.write(export.float_model(last.network(args.network), last.display, offset_m, seed_planes), args.output)
+    network = last.network(args.network)
+    if args.shrink != 1:
+        if network.architecture.input != "seeded":
+            raise ValueError("--shrink is for seeded networks, whose output is a correction")
+        networks.scale_output(network, args.shrink)
+    export.write(export.float_model(network, last.display, offset_m, seed_planes), args.output)
 
 
 def run_evaluate(args):

@@ -165,6 +165,13 @@ class Chain(nn.Module):
         return head_field(self.architecture, self(x), x)
 
 
+@torch.no_grad()
+def scale_output(chain, factor):
+    """Multiplies the six channels of a Chain's last layer by a factor."""
+    chain.convs[-1].weight *= factor
+    chain.convs[-1].bias *= factor
+
+
 def unshuffle(x):
     """Converts (N, C, 2·H, 2·W) to (N, 4·C, H, W): 2x2 squares, pixel by pixel (SpaceToDepth of ONNX)."""
     n, c, h, w = x.shape

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from phasefront_training.__main__ import main
+from phasefront_training.checkpoint import load_network
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes
 from phasefront_training.sensor_depth import simulate_sensor_depth
 from phasefront_training.evaluate import depths, evaluate, scene_as_seen, seed_as_field, sensor_generator, torch_predictor
@@ -89,6 +90,11 @@ def test_a_seeded_network_is_trained_quantized_and_judged(data_folder, seeds_fol
     assert main(["export", checkpoint, "-o", str(tmp_path / "small-f32.onnx")]) == 0
     for file in (onnx, tmp_path / "small-f32.onnx"):
         assert read_description(file)["seed_planes"] == "3"
+    half = tmp_path / "half.onnx"
+    assert main(["export", checkpoint, "--shrink", "0.5", "-o", str(half)]) == 0
+    whole, half = (load_network(path)[0] for path in (tmp_path / "small-f32.onnx", half))
+    x = torch.rand(1, 10, 9, 13)
+    assert torch.allclose(0.5 * whole(x), half(x), atol=1e-6)
     assert main(["evaluate", checkpoint, "--data", str(data_folder)]) == 1
     assert "--seeds" in capsys.readouterr().err
 
