@@ -1,8 +1,8 @@
 //! Networks, loaded from bytes or built in.
 
 use crate::error::{Answer, error, object, of_core};
-use phasefront::models::Precision::Int8;
 use phasefront::Network;
+use phasefront::models::Precision::Int8;
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
 

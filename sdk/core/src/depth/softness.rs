@@ -68,8 +68,8 @@ fn edges(
     for line in lines {
         let at = |i: usize| depth[line * next + i * step];
         let change = |i: usize| (at(i + 1) - at(i)).abs();
-        // The slope beside an edge is no part of it, and neither is the crease where a steep surface meets another. So
-        // half a window on either side must be in the frame.
+        // The steeper slope beside an edge is no part of it, so the crease where two surfaces meet is no edge. To know
+        // both slopes, half a window on either side must be in the frame.
         let beside = window.div_ceil(2);
         for start in beside..length.saturating_sub(window + beside) {
             let end = start + window;

@@ -126,7 +126,7 @@ impl EncoderFlags {
         if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
             let Some(pair) = phasefront_models::pair_for(display, precision.unwrap_or_default()) else {
                 return Err(Error::Input(
-                    "the networks for the deep encoder that are bundled are for an offset of 0 mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias, which displays more".into(),
+                    "the bundled networks for the deep encoder are for an offset of 0 mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias, which displays more".into(),
                 ));
             };
             let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::DEEP);
