@@ -1,12 +1,11 @@
-"""Seeds: the plane sweep's field of each scene, on clean and on simulated sensor depth, the inputs of seeded networks.
+"""Seeds: the plane sweep's field of each scene, on clean depth and on that of sensors, the inputs of seeded networks.
 
 The seeds of a data set are a folder that `python -m phasefront_training seeds` makes. This package writes the depths,
 `depth_000123.npy`, uint16 (V, H, W), d·65535. Variant 0 is the clean depth of the visible layer. The others are the
 depth of the data set's sensors, in turn, or, if it has none, simulated sensor depth (sensor_depth.py). `evaluate` uses
-the first of them. `phasefront-lab seeds` can add R depths
-that are read by a sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W). It adds the fields of all
-depths, which the SDK computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the
-scale in `seeds.json`.
+the first of them. `phasefront-lab seeds` can add R depths that are read by a sensor and refined by the core,
+`refined_000123.npy`, uint16 (R, H, W). It adds the fields of all depths, which the SDK computes, `seed_000123.npy`,
+int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale in `seeds.json`.
 """
 
 import json
@@ -47,11 +46,11 @@ def _depths(manifest, number, variants):
     sensors = len(manifest.sensors)
     colour, depth, _, sensed = read_pair(manifest.pair(number), 1, sensors)
     colour, depth = torch.from_numpy(colour).float() / 255, torch.from_numpy(depth[0]).float()
-    others = range(variants - 1)
+    count = variants - 1
     if sensors:
-        others = [torch.from_numpy(sensed[(number * len(others) + v) % sensors]).float() for v in others]
+        others = [torch.from_numpy(sensed[(number * count + v) % sensors]).float() for v in range(count)]
     else:
-        others = [simulate_sensor_depth(colour, depth, sensor_generator(number, v)) for v in others]
+        others = [simulate_sensor_depth(colour, depth, sensor_generator(number, v)) for v in range(count)]
     return (torch.stack([depth, *others]).numpy() * 65535).round().astype(np.uint16)
 
 

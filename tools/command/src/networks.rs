@@ -3,13 +3,13 @@
 use phasefront::Network;
 use phasefront_core::runtime::file;
 use phasefront_io::{Error, Result, output};
-use phasefront_models::NETWORKS;
 pub use phasefront_models::Precision;
+use phasefront_models::{NETWORKS, PAIR};
 use std::path::Path;
 use std::sync::Arc;
 
 /// The name of the bundled pair of a network and its pre-filter for the deep double phase method.
-pub const DEEP: &str = "ddpm-8";
+pub const DEEP: &str = PAIR.name;
 
 /// The names of the networks in the source tree's `models` folder that are not bundled.
 const FILES: [&str; 5] = ["ldi3-15", "rgbd-15-cylinder", "rgbd-15-wide", "rgbd-30", "seeded-8-80"];
