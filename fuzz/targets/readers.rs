@@ -21,7 +21,7 @@ fuzz_target!(|data: &[u8]| {
         }
     };
     let model = |path: &Path| scene::read_model(path, 8, 8, None).map(|_| ());
-    match kind % 8 {
+    match kind % 12 {
         0 => told(picture::read_rgb(&write("a.png")).map(|_| ())),
         1 => told(picture::depth_map::read_depth(&write("a.npy"), false).map(|_| ())),
         2 => told(hologram::read_hologram(&write("a.png")).map(|_| ())),
@@ -34,10 +34,22 @@ fuzz_target!(|data: &[u8]| {
             std::fs::write(&obj, [b"mtllib a.mtl\n", file].concat()).expect("a file");
             told(model(&obj));
         }
-        _ => {
+        7 => {
             write("layer_0.png");
             write("depth_0.png");
             told(ldi::Ldi::read(&folder).map(|_| ()));
+        }
+        8 => {
+            std::fs::write(folder.join("a.json"), r#"{"display": {}}"#).expect("a file");
+            told(hologram::read_hologram(&write("a.npy")).map(|_| ()));
+        }
+        9 => told(picture::photo::read(&write("a.jpg")).map(|_| ())),
+        10 => told(picture::depth_map::read_depth(&write("a.exr"), false).map(|_| ())),
+        _ => {
+            write("a.lut");
+            let path = folder.join("lut.toml");
+            std::fs::write(&path, "lut = \"a.lut\"").expect("a file");
+            told(display::read_display(&path).map(|_| ()));
         }
     }
 });

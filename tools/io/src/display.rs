@@ -251,21 +251,25 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     })
 }
 
-/// Reads a look-up table for `display`: a text file of 256 levels, or of two columns, the numbers 0 to 255 and their
-/// levels (a Meadowlark `.lut`).
+/// Reads a look-up table for `display`: a text file of 256 levels, or of two columns, the numbers 0 to 255 in any order
+/// and their levels (a Meadowlark `.lut`).
 fn read_lut(path: &Path, display: &Display) -> Result<[u8; 256]> {
     let text = input::text(path)?;
-    let numbers: std::result::Result<Vec<u16>, _> = text.split_whitespace().map(str::parse).collect();
+    let refuse = |why: String| Err(Error::file(path, why));
+    // Editors on Windows write a byte-order mark.
+    let numbers = text.trim_start_matches('\u{feff}').split_whitespace();
+    let numbers: std::result::Result<Vec<u16>, _> = numbers.map(str::parse).collect();
     let mut numbers = numbers.map_err(|e| Error::file(path, format!("holds what is no level of 0..=255: {e}")))?;
-    let is_indexed = numbers.chunks(2).map(|pair| usize::from(pair[0])).eq(0..256);
-    if numbers.len() == 512 && is_indexed {
-        numbers = numbers.chunks(2).map(|pair| pair[1]).collect();
+    if numbers.len() == 512 {
+        let mut pairs: Vec<_> = numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect();
+        pairs.sort();
+        if !pairs.iter().map(|(step, _)| usize::from(*step)).eq(0..256) {
+            return refuse("has 512 numbers; in two columns, the first holds each of 0 to 255 once".into());
+        }
+        numbers = pairs.into_iter().map(|(_, level)| level).collect();
         if let Some(voltage) = numbers.iter().find(|number| **number > 255) {
-            return Err(Error::file(
-                path,
-                format!(
-                    "holds the driver's voltage {voltage}, and images hold levels up to 255; load the file into the modulator's driver and leave lut out"
-                ),
+            return refuse(format!(
+                "holds the driver's voltage {voltage}, and images hold levels up to 255; load the file into the modulator's driver and leave lut out"
             ));
         }
     }
@@ -274,12 +278,9 @@ fn read_lut(path: &Path, display: &Display) -> Result<[u8; 256]> {
     let lut = lut_of(&levels).map_err(|e| Error::file(path, e))?;
     let most = lut.into_iter().max().unwrap_or_default();
     if u32::from(most) >> display.bits() != 0 {
-        return Err(Error::file(
-            path,
-            format!(
-                "holds a level of {most}, over the {} bits of the display",
-                display.bits()
-            ),
+        return refuse(format!(
+            "holds a level of {most}, over the {} bits of the display",
+            display.bits()
         ));
     }
     Ok(lut)
@@ -288,12 +289,19 @@ fn read_lut(path: &Path, display: &Display) -> Result<[u8; 256]> {
 /// Converts levels to a look-up table.
 ///
 /// # Errors
-/// Returns an error if there are not exactly 256 entries.
+/// Returns an error if there are not exactly 256 entries, or if all are equal.
 pub(crate) fn lut_of(levels: &[u8]) -> Result<[u8; 256]> {
-    levels.try_into().map_err(|_| {
+    let table: [u8; 256] = levels.try_into().map_err(|_| {
         Error::Input(format!(
             "the look-up table has {} entries; it must have 256",
             levels.len()
         ))
-    })
+    })?;
+    if table == [table[0]; 256] {
+        return Err(Error::Input(format!(
+            "the look-up table gives the level {} for every phase; a modulator that shows phases has more",
+            table[0]
+        )));
+    }
+    Ok(table)
 }

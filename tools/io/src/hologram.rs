@@ -6,7 +6,7 @@ mod views;
 pub use views::AberratedOptics;
 
 use crate::display::{DisplayFile, lut_of};
-use crate::input::{self, MOST_ARRAY, MOST_PICTURE, npy};
+use crate::input::{self, MOST_PICTURE, npy};
 use crate::output::{self, Pending, has_extension};
 use crate::picture::{PngShape, interleaved, open_image, write_png_of};
 use crate::{Error, Result};
@@ -283,7 +283,7 @@ fn beside(path: &Path) -> Result<PathBuf> {
 /// Returns an error if the file is missing, truncated or of another type, or if the field does not have a plane for
 /// each laser.
 pub fn read_field(path: &Path, display: &DisplayFile) -> Result<Array3<Complex32>> {
-    let field = npy::read_field(&input::bytes(path, MOST_ARRAY)?).map_err(|why| Error::file(path, why))?;
+    let field = npy::read_field(npy::open(path)?).map_err(|why| Error::file(path, why))?;
     match (field.dim().0, display.target.display.colours()) {
         (theirs, ours) if theirs == ours => Ok(field),
         (theirs, 1) => Err(Error::file(
@@ -305,8 +305,7 @@ pub fn read_field(path: &Path, display: &DisplayFile) -> Result<Array3<Complex32
 /// Returns an error if the file is missing, truncated, or not a hologram.
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
-        let field = npy::read::<Complex32, Ix3>(&input::bytes(path, MOST_ARRAY)?)
-            .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (C, H, W): {e}")))?;
+        let field = npy::read_field(npy::open(path)?).map_err(|why| Error::file(path, why))?;
         let beside = path.with_extension("json");
         output::reading(&beside)?;
         let text = file::read_text(&beside)
@@ -320,7 +319,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
                 format!("has shape {:?}; it must be ({colours}, H, W)", field.dim()),
             ));
         }
-        return Ok(Hologram::Complex(field.as_standard_layout().into_owned(), info));
+        return Ok(Hologram::Complex(field, info));
     }
     let info = read_info(path)?.ok_or_else(|| {
         Error::file(
@@ -394,7 +393,9 @@ pub fn read_made_of(path: &Path) -> Result<Option<(String, Option<f32>)>> {
 /// Returns the text chunk called `name` of a PNG, or `None` if there is no such chunk or the file is not a PNG.
 fn read_text(path: &Path, name: &str) -> Result<Option<String>> {
     let file = input::open(path, MOST_PICTURE)?;
-    let Ok(reader) = png::Decoder::new(file).read_info() else {
+    let mut decoder = png::Decoder::new(file);
+    decoder.set_ignore_iccp_chunk(true);
+    let Ok(reader) = decoder.read_info() else {
         return Ok(None);
     };
     let chunks = &reader.info().uncompressed_latin1_text;

@@ -1,6 +1,7 @@
 //! Reading of files. All input is opened here or in [`decode`], which accept only regular files up to a maximum size.
 
 pub mod decode;
+mod jpeg;
 pub mod npy;
 pub mod quiet;
 

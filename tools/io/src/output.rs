@@ -203,9 +203,13 @@ impl Pending {
         synced.map_err(|e| cannot_write(&self.path, &e)).map(|()| self)
     }
 
-    /// Renames the file to its final path.
+    /// Renames the file to its final path. A file that is replaced passes on its permissions.
     pub(crate) fn place(self) -> Result<()> {
         let Self { path, real, file } = self;
+        if let Ok(before) = std::fs::metadata(&real) {
+            // Some file systems, such as FAT, have no permissions.
+            let _ = file.as_file().set_permissions(before.permissions());
+        }
         file.persist(real).map_err(|e| cannot_write(&path, &e.error))?;
         Ok(())
     }

@@ -522,6 +522,13 @@ fn it_lives_with_the_system_around_it() {
         let about = fs::metadata(folder.path("out.png")).unwrap();
         assert_eq!(about.permissions().mode() & 0o777, mode, "umask {mask}");
     }
+    // What is replaced keeps its permissions.
+    for mode in [0o600, 0o640, 0o444] {
+        fs::set_permissions(folder.path("out.png"), fs::Permissions::from_mode(mode)).unwrap();
+        ends(command(), 0, "");
+        let about = fs::metadata(folder.path("out.png")).unwrap();
+        assert_eq!(about.permissions().mode() & 0o777, mode);
+    }
 }
 
 #[test]

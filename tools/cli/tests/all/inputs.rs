@@ -13,7 +13,7 @@ use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_core::depth::DepthUnit;
 use phasefront_io::frame::{self, DepthOptions};
 use phasefront_io::hologram::{self, Hologram, HologramInfo, Levels};
-use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
+use phasefront_io::input::decode::{self, COLOUR_FORMATS, DEPTH_FORMATS, Reading};
 use phasefront_io::picture::{self, depth_map};
 use std::fs;
 use std::io::Cursor;
@@ -437,6 +437,55 @@ fn large() -> Vec<(&'static str, Vec<u8>)> {
     vec![("png", png), ("bmp", bmp), ("tif", tiff), ("webp", webp)]
 }
 
+/// Returns the header of an OpenEXR file of 8192×8192 pixels and `channels` channels of 32 bits, in tiles of `tile` or
+/// in lines.
+fn large_exr(channels: usize, tile: Option<u32>) -> Vec<u8> {
+    let attribute = |name: &str, kind: &str, value: &[u8]| {
+        [
+            name.as_bytes(),
+            b"\0",
+            kind.as_bytes(),
+            b"\0",
+            &(value.len() as u32).to_le_bytes(),
+            value,
+        ]
+        .concat()
+    };
+    let list: Vec<u8> = (0..channels)
+        .flat_map(|i| {
+            let name = if i == 0 { "Z".to_owned() } else { format!("a{i:03}") };
+            [
+                name.as_bytes(),
+                b"\0",
+                &[2, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0],
+            ]
+            .concat()
+        })
+        .collect();
+    let window: Vec<u8> = [0u32, 0, 8191, 8191]
+        .iter()
+        .flat_map(|side| side.to_le_bytes())
+        .collect();
+    let tiles = tile.map(|side| [&side.to_le_bytes()[..], &side.to_le_bytes(), &[0]].concat());
+    [
+        b"\x76\x2f\x31\x01\x02".to_vec(),
+        vec![if tile.is_some() { 2 } else { 0 }, 0, 0],
+        attribute("channels", "chlist", &[list, vec![0]].concat()),
+        attribute("compression", "compression", &[3]),
+        attribute("dataWindow", "box2i", &window),
+        attribute("displayWindow", "box2i", &window),
+        attribute("lineOrder", "lineOrder", &[0]),
+        attribute("pixelAspectRatio", "float", &1f32.to_le_bytes()),
+        attribute("screenWindowCenter", "v2f", &[0; 8]),
+        attribute("screenWindowWidth", "float", &1f32.to_le_bytes()),
+        tiles
+            .map(|tiles| attribute("tiles", "tiledesc", &tiles))
+            .unwrap_or_default(),
+        vec![0; 64],
+    ]
+    .concat()
+}
+
 #[test]
 fn large_pictures_are_refused_before_memory_is_taken() {
     let folder = Folder::new();
@@ -451,6 +500,48 @@ fn large_pictures_are_refused_before_memory_is_taken() {
             assert!(why.contains("pixels; 67108864 in all are the most"), "{name}: {why}");
         }
     }
+}
+
+/// All channels of an OpenEXR file are decoded, whichever is read, and a tile is decoded whole.
+#[test]
+fn large_layers_and_tiles_of_openexr_are_refused_before_memory_is_taken() {
+    let folder = Folder::new();
+    for (channels, tile) in [
+        (9, None),
+        (9, Some(64)),
+        (2, Some(8192)),
+        (1, Some(u32::MAX >> 1)),
+        (5, Some(4096)),
+    ] {
+        let path = folder.path("large.exr");
+        fs::write(&path, large_exr(channels, tile)).unwrap();
+        let why = depth_map::read_depth(&path, false).unwrap_err().to_string();
+        let is_large = (channels, tile) != (1, Some(u32::MAX >> 1));
+        assert_eq!(
+            why.contains("268435456 are the most: save depth alone"),
+            is_large,
+            "{why}"
+        );
+    }
+}
+
+/// A colour profile of a few bytes may unpack to gigabytes.
+#[test]
+fn colour_profiles_are_bounded() {
+    let folder = Folder::new();
+    let mut info = png::Info::with_size(2, 1);
+    info.color_type = png::ColorType::Rgb;
+    info.icc_profile = Some(vec![0; 1 << 27].into());
+    let mut bytes = Vec::new();
+    let mut writer = png::Encoder::with_info(&mut bytes, info)
+        .unwrap()
+        .write_header()
+        .unwrap();
+    writer.write_image_data(&[1, 2, 3, 4, 5, 6]).unwrap();
+    writer.finish().unwrap();
+    fs::write(folder.path("profile.png"), bytes).unwrap();
+    let (image, _) = decode::open_picture(&folder.path("profile.png"), Reading::AS_STORED).unwrap();
+    assert_eq!(image.as_bytes(), [1, 2, 3, 4, 5, 6]);
 }
 
 /// Calls that name files that are not regular.

@@ -187,6 +187,30 @@ fn a_photo_and_its_depth_are_turned_upright_together() {
 }
 
 #[test]
+fn photos_that_would_take_gigabytes_or_hours_get_one_line() {
+    let folder = Folder::new();
+    // 700 kB of it would decode to 512 MiB.
+    let mut words = Vec::new();
+    let mut encoder = png::Encoder::new(&mut words, 8192, 8192);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    drop(encoder.write_header().unwrap());
+    words.truncate(33);
+    words.extend(b"\0\0\0\x04IDAT\0\0\0\0\0\0\0\0");
+    let words = jpeg(&[app1(&gdepth(&format!(r#"GDepth:Data="{}""#, STANDARD.encode(words))))]);
+    let segments = jpeg(&vec![app1(b""); 9000]);
+    for (name, bytes, word) in [
+        ("words.jpg", words, "8192×8192 pixels; 16777216 in all are the most"),
+        ("segments.jpg", segments, "over 8192 segments"),
+    ] {
+        fs::write(folder.path(name), bytes).unwrap();
+        let errors = folder.fails(&["hologram", "--photo", name, "-o", "h.png"], 1);
+        assert_eq!(errors.lines().count(), 1, "{name}: {errors}");
+        assert!(errors.contains(name) && errors.contains(word), "{name}: {errors}");
+    }
+}
+
+#[test]
 fn photos_that_cannot_be_used_get_one_line() {
     let folder = Folder::new();
     let extended = app1(&gdepth(&format!(r#"xmpNote:HasExtendedXMP="{GUID}""#)));
@@ -224,7 +248,7 @@ fn photos_that_cannot_be_used_get_one_line() {
             broken(&STANDARD.encode(gif)),
             "the depth inside is not a picture",
         ),
-        ("png.jpg", broken(&STANDARD.encode(png)), "67108864 in all are the most"),
+        ("png.jpg", broken(&STANDARD.encode(png)), "16777216 in all are the most"),
         (
             "long.jpg",
             jpeg(&[extended.clone(), long]),

@@ -1,10 +1,11 @@
 //! Decoding of pictures and depth maps. All of them pass through `decode`, which limits their pixels, turns them
 //! upright according to their Exif data, and converts a decoder's panic to an error.
 
-use crate::input::{self, MOST_PICTURE, quiet};
+use crate::input::{self, MOST_PICTURE, jpeg, quiet};
 use crate::{Error, Result};
-use exr::meta::MetaData;
 use exr::meta::header::Header;
+use exr::meta::{BlockDescription, MetaData};
+use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
 use ndarray::{Array2, Axis};
@@ -22,6 +23,12 @@ pub const DEPTH_FORMATS: &str =
 
 /// The maximum number of pixels of an image, 8192²: more than two 8K frames.
 pub const MOST_PIXELS: u64 = 1 << 26;
+
+/// The maximum number of bytes of a PNG's colour profile, other metadata and a row of its pixels.
+const MOST_PNG_DATA: u64 = 1 << 25;
+/// The maximum number of bytes of all channels of an OpenEXR layer, and of one of its blocks, which is decoded whole.
+const MOST_LAYER: u64 = 1 << 31;
+const MOST_BLOCK: u64 = 1 << 28;
 
 /// Advice for HEIC and AVIF files, for which no maintained Rust decoder exists.
 const HEIC: &str = "is HEIC, which is not read; `heif-convert --with-aux photo.heic photo.jpg` of libheif writes the photo and its disparity as two pictures: give these to --rgb and --depth with --invert";
@@ -167,19 +174,35 @@ fn broken(why: &dyn std::fmt::Display) -> String {
 }
 
 /// Checks the number of pixels, because a small file may hold a large image.
-fn check(width: u64, height: u64, most: u64) -> Said<()> {
+pub(super) fn check(width: u64, height: u64, most: u64) -> Said<()> {
     if width.saturating_mul(height) > most {
         return Err(format!("has {width}×{height} pixels; {most} in all are the most"));
     }
     Ok(())
 }
 
-fn image<R: BufRead + Seek>(from: R, format: ImageFormat, how: Reading) -> Said<Decoded> {
-    let mut reader = ImageReader::with_format(from, format);
+fn image<R: BufRead + Seek>(mut from: R, format: ImageFormat, how: Reading) -> Said<Decoded> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(8 * how.most_pixels);
+    match format {
+        ImageFormat::Png => {
+            let mut data = limits.clone();
+            data.max_alloc = Some(MOST_PNG_DATA);
+            let decoder = PngDecoder::with_limits(from, data);
+            return decoded(decoder.map_err(|e| broken(&e))?, limits, how);
+        }
+        ImageFormat::Jpeg => {
+            jpeg::check(&mut from)?;
+            from.rewind().map_err(|e| format!("cannot be read: {e}"))?;
+        }
+        _ => {}
+    }
+    let mut reader = ImageReader::with_format(from, format);
     reader.limits(limits.clone());
-    let mut decoder = reader.into_decoder().map_err(|e| broken(&e))?;
+    decoded(reader.into_decoder().map_err(|e| broken(&e))?, limits, how)
+}
+
+fn decoded(mut decoder: impl ImageDecoder, limits: image::Limits, how: Reading) -> Said<Decoded> {
     let (width, height) = decoder.dimensions();
     check(width.into(), height.into(), how.most_pixels)?;
     decoder.set_limits(limits).map_err(|e| broken(&e))?;
@@ -253,8 +276,7 @@ fn exr<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
     let broken = |e: exr::error::Error| broken(&e);
     let about = MetaData::read_from_buffered(&mut from, false).map_err(broken)?;
     for header in &about.headers {
-        let exr::math::Vec2(width, height) = header.layer_size;
-        check(width as u64, height as u64, how.most_pixels)?;
+        check_layer(header, how.most_pixels)?;
     }
     let names = exr_channels(&about.headers)?;
     let mut planes = names.iter().map(|name| exr_plane(&mut from, name));
@@ -270,6 +292,27 @@ fn exr<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
         pixels: Pixels::Plane(Plane { values, most: None }),
         orientation: Orientation::NoTransforms,
     })
+}
+
+/// Checks the number of pixels of an OpenEXR layer and the bytes of all its channels, which are decoded together.
+fn check_layer(header: &Header, most_pixels: u64) -> Said<()> {
+    let exr::math::Vec2(width, height) = header.layer_size;
+    check(width as u64, height as u64, most_pixels)?;
+    let bytes = |width: usize, height: usize| {
+        (width as u64 * height as u64).saturating_mul(header.channels.bytes_per_pixel as u64)
+    };
+    let block = match header.blocks {
+        BlockDescription::ScanLines => bytes(width, header.compression.scan_lines_per_block().min(height)),
+        BlockDescription::Tiles(tiles) => bytes(tiles.tile_size.0.min(width), tiles.tile_size.1.min(height)),
+    };
+    if bytes(width, height) > MOST_LAYER || block > MOST_BLOCK {
+        return Err(format!(
+            "is OpenEXR with {} channels of {width}×{height} pixels, {} bytes in blocks of {block}; {MOST_LAYER} in blocks of {MOST_BLOCK} are the most: save depth alone",
+            header.channels.list.len(),
+            bytes(width, height),
+        ));
+    }
+    Ok(())
 }
 
 /// Reads one channel of an OpenEXR file.

@@ -1,156 +1,333 @@
-//! Arrays in `.npy` files. Memory is allocated for the bytes present, not for the shape in the header, which may be
-//! false.
+//! Arrays in `.npy` files of any supported number type.
+//!
+//! The header of a file may say anything. Its shape is compared with the bytes that are there before memory is
+//! allocated for the values, and its text is read in one pass, without nesting.
 
-use crate::input::decode::Plane;
-use ndarray::{Array, Array2, Array3, ArrayD, ArrayView, Dimension};
-use ndarray_npy::{ViewElement, ViewNpyError, ViewNpyExt};
-use num_complex::{Complex32, Complex64};
+use crate::input::decode::{self, MOST_PIXELS, Plane};
+use crate::input::{self, MOST_ARRAY};
+use crate::{Error, Result};
+use half::f16;
+use ndarray::{Array, Array3, ArrayD, Dimension};
+use num_complex::{Complex, Complex32, Complex64};
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
 
-/// The largest alignment of an element type.
-const ALIGNMENT: usize = 16;
+type Said<T> = std::result::Result<T, String>;
+
+/// The maximum length of a header, in bytes. NumPy writes up to 10,000.
+const MOST_HEADER: usize = 1 << 16;
+/// The maximum number of axes, as in NumPy.
+const MOST_AXES: usize = 64;
+/// The bytes that are read at one time.
+const BUFFER: usize = 1 << 16;
+
+/// A type of number, with its name in NumPy without the byte order.
+pub trait Number: Copy {
+    /// The name, such as `f4`.
+    const NAME: &'static str;
+
+    /// Returns the number in `bytes`, of which there are as many as the type has.
+    fn of_bytes(bytes: &[u8], is_big_endian: bool) -> Self;
+}
+
+macro_rules! number {
+    ($($type:ty: $name:literal),*) => {$(
+        impl Number for $type {
+            const NAME: &'static str = $name;
+
+            fn of_bytes(bytes: &[u8], is_big_endian: bool) -> Self {
+                let bytes = bytes.try_into().expect("as many bytes as the type has");
+                if is_big_endian {
+                    <$type>::from_be_bytes(bytes)
+                } else {
+                    <$type>::from_le_bytes(bytes)
+                }
+            }
+        }
+    )*};
+}
+
+number!(u8: "u1", u16: "u2", u32: "u4", i8: "i1", i16: "i2", i32: "i4", f16: "f2", f32: "f4", f64: "f8");
+
+macro_rules! complex {
+    ($($part:ty: $name:literal),*) => {$(
+        impl Number for Complex<$part> {
+            const NAME: &'static str = $name;
+
+            fn of_bytes(bytes: &[u8], is_big_endian: bool) -> Self {
+                let (re, im) = bytes.split_at(size_of::<$part>());
+                Complex::new(<$part>::of_bytes(re, is_big_endian), <$part>::of_bytes(im, is_big_endian))
+            }
+        }
+    )*};
+}
+
+complex!(f32: "c8", f64: "c16");
+
+/// The array of a `.npy` file whose values are not read yet.
+pub struct Npy<R> {
+    header: Header,
+    from: R,
+}
+
+/// The contents of a header.
+#[derive(Debug, PartialEq)]
+struct Header {
+    /// The number type as in the file, such as `<f4`.
+    descr: String,
+    is_column_major: bool,
+    shape: Vec<usize>,
+}
+
+/// Opens the `.npy` file at `path`.
+///
+/// # Errors
+/// Returns an error if the file cannot be read, or if its header does not fit its length.
+pub fn open(path: &Path) -> Result<Npy<BufReader<File>>> {
+    let file = input::open(path, MOST_ARRAY)?;
+    let length = file.get_ref().metadata().map_err(|e| Error::file(path, e))?.len();
+    Npy::new(file, length).map_err(|why| Error::file(path, why))
+}
 
 /// Reads the array of a whole `.npy` file.
 ///
 /// # Errors
-/// Returns an error if the type or the number of dimensions differs or if there are fewer or more bytes than the header
+/// Returns an error if the type or the number of axes differs, or if there are fewer or more bytes than the header
 /// says.
-pub fn read<T: ViewElement + Clone, D: Dimension>(file: &[u8]) -> Result<Array<T, D>, ViewNpyError> {
-    // The values follow the header, whose length has 2 bytes in version 1 and 4 bytes in later versions.
-    let values = match file {
-        [_, _, _, _, _, _, 1, _, a, b, ..] => 10 + usize::from(u16::from_le_bytes([*a, *b])),
-        [_, _, _, _, _, _, _, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize).saturating_add(12),
-        _ => 0,
-    };
-    let is_aligned = |file: &[u8]| (file.as_ptr() as usize).wrapping_add(values).is_multiple_of(ALIGNMENT);
-    if is_aligned(file) {
-        return view(file);
-    }
-    let mut moved = Vec::with_capacity(file.len() + ALIGNMENT);
-    while !is_aligned(&moved[moved.len()..]) {
-        moved.push(0);
-    }
-    let start = moved.len();
-    moved.extend_from_slice(file);
-    view(&moved[start..])
+pub fn read<T: Number, D: Dimension>(file: &[u8]) -> Said<Array<T, D>> {
+    Npy::new(file, file.len() as u64)?.array()
 }
 
-fn view<T: ViewElement + Clone, D: Dimension>(file: &[u8]) -> Result<Array<T, D>, ViewNpyError> {
-    ArrayView::<T, D>::view_npy(file).map(|view| view.to_owned())
+impl<R: Read> Npy<R> {
+    /// Reads the header of the file `from`, which has `length` bytes.
+    ///
+    /// # Errors
+    /// Returns an error if it is no header, or if the file has fewer or more bytes than the header says.
+    pub fn new(mut from: R, length: u64) -> Said<Self> {
+        const MAGIC: &[u8] = b"\x93NUMPY";
+        let cut = |e: std::io::Error| format!("is not a whole .npy: {e}");
+        let mut head = [0; 8];
+        from.read_exact(&mut head).map_err(cut)?;
+        if !head.starts_with(MAGIC) {
+            return Err("is not a whole .npy: it does not begin as one".into());
+        }
+        // The length of the header has 2 bytes in version 1 and 4 bytes in later versions.
+        let mut said = [0; 4];
+        let bytes = if head[6] == 1 { 2 } else { 4 };
+        from.read_exact(&mut said[..bytes]).map_err(cut)?;
+        let said = u32::from_le_bytes(said) as usize;
+        if said > MOST_HEADER {
+            return Err(format!(
+                "is not a whole .npy: its header has {said} bytes; {MOST_HEADER} are the most"
+            ));
+        }
+        let mut text = vec![0; said];
+        from.read_exact(&mut text).map_err(cut)?;
+        let header = std::str::from_utf8(&text).ok().and_then(Header::parse);
+        let header =
+            header.ok_or("is not a whole .npy: its header is no dictionary of descr, fortran_order and shape")?;
+        let values = length.saturating_sub((head.len() + bytes + said) as u64);
+        header.check(values)?;
+        Ok(Npy { header, from })
+    }
+
+    /// Returns the shape.
+    pub(crate) fn shape(&self) -> &[usize] {
+        &self.header.shape
+    }
+
+    /// Returns the name of the number type, without the byte order.
+    fn kind(&self) -> &str {
+        &self.header.descr[1..]
+    }
+
+    /// Reads the values.
+    ///
+    /// # Errors
+    /// Returns an error if the type or the number of axes differs, or if the file ends early.
+    pub fn array<T: Number, D: Dimension>(self) -> Said<Array<T, D>> {
+        self.converted(|value: T| value)
+    }
+
+    /// Reads the values, each converted by `to`.
+    fn converted<T: Number, U: Clone, D: Dimension>(mut self, to: impl Fn(T) -> U) -> Said<Array<U, D>> {
+        let Header {
+            descr,
+            is_column_major,
+            mut shape,
+        } = self.header;
+        let order = descr.as_bytes()[0];
+        if descr[1..] != *T::NAME {
+            return Err(format!("holds numbers of the type {descr}; {} is needed", T::NAME));
+        }
+        let is_big_endian = order == b'>' || order == b'=' && cfg!(target_endian = "big");
+        let count: usize = shape.iter().product();
+        let mut values = Vec::with_capacity(count);
+        let mut buffer = vec![0; BUFFER.min(count * size_of::<T>())];
+        while values.len() < count {
+            let bytes = buffer.len().min((count - values.len()) * size_of::<T>());
+            let read = &mut buffer[..bytes];
+            (self.from.read_exact(read)).map_err(|e| format!("is not a whole .npy: {e}"))?;
+            values.extend(
+                read.chunks_exact(size_of::<T>())
+                    .map(|bytes| to(T::of_bytes(bytes, is_big_endian))),
+            );
+        }
+        if is_column_major {
+            shape.reverse();
+        }
+        let array = Array::from_shape_vec(shape, values).map_err(|e| e.to_string())?;
+        let array = if is_column_major { array.reversed_axes() } else { array };
+        let shape = array.shape().to_owned();
+        let array = array.into_dimensionality::<D>();
+        let array = array.map_err(|_| format!("has shape {shape:?}; {} axes are needed", D::NDIM.unwrap_or(0)))?;
+        Ok(if array.is_standard_layout() {
+            array
+        } else {
+            array.as_standard_layout().into_owned()
+        })
+    }
 }
 
-/// Reads the complex field of a whole `.npy` file of complex64 or complex128, as (C, H, W). (H, W) is one colour.
+impl Header {
+    /// Parses the text of a header, a dictionary of three entries.
+    fn parse(text: &str) -> Option<Self> {
+        let mut rest = text.trim().strip_prefix('{')?.trim_start();
+        let (mut descr, mut is_column_major, mut shape) = (None, None, None);
+        while let Some((key, after)) = quoted(rest) {
+            let value = after.trim_start().strip_prefix(':')?.trim_start();
+            rest = match key {
+                "descr" => {
+                    let (name, after) = quoted(value)?;
+                    descr = Some(name.to_owned());
+                    after
+                }
+                "fortran_order" => {
+                    let word = |word: &str| value.strip_prefix(word);
+                    is_column_major = Some(word("True").is_some());
+                    word("True").or_else(|| word("False"))?
+                }
+                "shape" => {
+                    let (sides, after) = value.strip_prefix('(')?.split_once(')')?;
+                    let sides = sides.trim().trim_end_matches(',').split(',').map(str::trim);
+                    let sides: Option<Vec<usize>> = sides.take(MOST_AXES + 1).map(|side| side.parse().ok()).collect();
+                    shape = Some(sides.filter(|sides| sides.len() <= MOST_AXES)?);
+                    after
+                }
+                _ => return None,
+            };
+            rest = rest.trim_start();
+            rest = rest.strip_prefix(',').unwrap_or(rest).trim_start();
+        }
+        (rest == "}").then_some(Header {
+            descr: descr?,
+            is_column_major: is_column_major?,
+            shape: shape?,
+        })
+    }
+
+    /// Checks that the values take `bytes` bytes.
+    fn check(&self, bytes: u64) -> Said<()> {
+        let Header { descr, shape, .. } = self;
+        let mut kind = descr.chars();
+        // `|` marks types of one byte, and `=` the machine's own byte order.
+        let is_known = kind.next().is_some_and(|order| "<>=|".contains(order))
+            && kind.next().is_some_and(|letter| "uifc".contains(letter));
+        let size = descr.get(2..).and_then(|size| size.parse().ok());
+        let Some(size) = size.filter(|size| is_known && (1u64..=16).contains(size)) else {
+            return Err(format!(
+                "holds {descr:?}, which is no type of number that is read: whole numbers, floating point or complex"
+            ));
+        };
+        let said = shape
+            .iter()
+            .try_fold(size, |bytes, side| bytes.checked_mul(*side as u64));
+        match said {
+            Some(0) => Err(format!("has shape {shape:?}, which holds no value")),
+            Some(said) if said == bytes => Ok(()),
+            _ => Err(format!(
+                "is not a whole .npy: its header says {shape:?} of {descr}, and {bytes} bytes follow"
+            )),
+        }
+    }
+}
+
+/// Returns the text between the quotation marks at the beginning of `text`, and what follows.
+fn quoted(text: &str) -> Option<(&str, &str)> {
+    let mark = text.chars().next().filter(|mark| "'\"".contains(*mark))?;
+    text[1..].split_once(mark)
+}
+
+/// Reads a complex field, complex64 or complex128, as (C, H, W). (H, W) is one colour.
 ///
 /// # Errors
-/// Returns an error if the type or the number of axes differs or if there are fewer or more bytes than the header says.
-pub(crate) fn read_field(file: &[u8]) -> Result<Array3<Complex32>, String> {
-    let double = || read(file).map(|array: ArrayD<Complex64>| array.mapv(|v| Complex32::new(v.re as f32, v.im as f32)));
-    let array: ArrayD<Complex32> = match read(file) {
-        Err(ViewNpyError::WrongDescriptor(_)) => double(),
-        read => read,
-    }
-    .map_err(|e| match e {
-        ViewNpyError::WrongDescriptor(kind) => {
-            format!("holds {kind}; a field is complex: field.astype(numpy.complex64) makes it so")
-        }
-        e => format!("is not a whole complex64 or complex128 .npy: {e}"),
-    })?;
-    let shape = match *array.shape() {
+/// Returns an error if the type or the number of axes differs, if the planes have too many pixels, or if the file ends
+/// early.
+pub(crate) fn read_field<R: Read>(npy: Npy<R>) -> Said<Array3<Complex32>> {
+    let shape = match *npy.shape() {
         [height, width] => (1, height, width),
         [colours, height, width] => (colours, height, width),
-        _ => {
-            return Err(format!("has shape {:?}; a field is (H, W) or (C, H, W)", array.shape()));
-        }
+        _ => return Err(format!("has shape {:?}; a field is (H, W) or (C, H, W)", npy.shape())),
     };
-    let array = array.as_standard_layout().into_owned().into_shape_with_order(shape);
-    array.map_err(|e| e.to_string())
+    let (_, height, width) = shape;
+    decode::check(width as u64, height as u64, MOST_PIXELS)?;
+    let field: ArrayD<Complex32> = match npy.kind() {
+        Complex32::NAME => npy.array(),
+        Complex64::NAME => npy.converted(|v: Complex64| Complex32::new(v.re as f32, v.im as f32)),
+        _ => {
+            return Err(format!(
+                "holds numbers of the type {}; a field is complex: field.astype(numpy.complex64) makes it so",
+                npy.header.descr
+            ));
+        }
+    }?;
+    (field.into_shape_with_order(shape)).map_err(|e| e.to_string())
 }
 
-/// The requirement for the `.npy` of a depth map.
-const WANTED: &str = "is not a whole .npy of shape (H, W), (H, W, 1) or (1, H, W) and float16, float32, float64 or whole numbers of 8 to 32 bits";
-
-/// Reads the single plane of a whole `.npy` file of any supported number type. If there are more than two axes, those
-/// of length 1 are dropped.
+/// Reads the single plane of an array. If there are more than two axes, those of length 1 are dropped.
 ///
 /// # Errors
-/// Returns an error if the shape or type differs or if there are fewer or more bytes than the header says.
-pub(crate) fn read_plane(file: &[u8]) -> Result<Plane, String> {
-    plane(file).ok_or_else(|| WANTED.to_owned())
-}
-
-fn plane(file: &[u8]) -> Option<Plane> {
-    let rest = file.strip_prefix(b"\x93NUMPY")?;
-    let (version, rest) = rest.split_first_chunk::<2>()?;
-    let (length, rest) = match version[0] {
-        1 => {
-            let (length, rest) = rest.split_first_chunk()?;
-            (usize::from(u16::from_le_bytes(*length)), rest)
-        }
-        _ => {
-            let (length, rest) = rest.split_first_chunk()?;
-            (u32::from_le_bytes(*length) as usize, rest)
-        }
-    };
-    let (header, values) = rest.split_at_checked(length)?;
-    let header = std::str::from_utf8(header).ok()?;
-    let after = |key: &str| {
-        let (_, rest) = header.split_once(&format!("'{key}'"))?;
-        Some(rest.trim_start().strip_prefix(':')?.trim_start())
-    };
-    let is_columns = after("fortran_order")?.starts_with("True");
-    let (shape, _) = after("shape")?.strip_prefix('(')?.split_once(')')?;
-    let sides = shape.split(',').map(str::trim).filter(|side| !side.is_empty());
-    let sides: Vec<usize> = sides.map(|side| side.parse().ok()).collect::<Option<_>>()?;
-    let (height, width) = match sides[..] {
+/// Returns an error if the shape or type differs, if the plane has too many pixels, or if the file ends early.
+pub(crate) fn read_plane<R: Read>(npy: Npy<R>) -> Said<Plane> {
+    let shape @ (height, width) = match *npy.shape() {
         [height, width] | [height, width, 1] | [1, height, width] => (height, width),
-        _ => return None,
+        _ => {
+            return Err(format!(
+                "has shape {:?}; a depth map is (H, W), (H, W, 1) or (1, H, W)",
+                npy.shape()
+            ));
+        }
     };
-    let (kind, _) = after("descr")?.strip_prefix('\'')?.split_once('\'')?;
-    let (values, most) = numbers(kind, values, height.checked_mul(width)?)?;
-    let values = if is_columns {
-        let columns = Array2::from_shape_vec((width, height), values).ok()?;
-        columns.reversed_axes().as_standard_layout().into_owned()
-    } else {
-        Array2::from_shape_vec((height, width), values).ok()?
-    };
-    Some(Plane { values, most })
+    decode::check(width as u64, height as u64, MOST_PIXELS)?;
+    let (values, most) = numbers(npy)?;
+    let values = values.into_shape_with_order(shape).map_err(|e| e.to_string())?;
+    Ok(Plane { values, most })
 }
 
-/// Converts `count` numbers of the NumPy type `kind`. For integers, also returns the largest value of the type.
-fn numbers(kind: &str, bytes: &[u8], count: usize) -> Option<(Vec<f32>, Option<f32>)> {
-    let (order, kind) = kind.split_at_checked(1)?;
-    // `|` marks types of one byte and `=` the machine's own byte order.
-    let is_big = match order {
-        ">" => true,
-        "=" => cfg!(target_endian = "big"),
-        "<" | "|" => false,
-        _ => return None,
-    };
-    macro_rules! of {
-        ($type:ty, $number:expr) => {{
-            let (values, rest) = bytes.as_chunks::<{ size_of::<$type>() }>();
-            if values.len() != count || !rest.is_empty() {
-                return None;
-            }
-            let value = |bytes: &[u8; size_of::<$type>()]| {
-                $number(match is_big {
-                    true => <$type>::from_be_bytes(*bytes),
-                    false => <$type>::from_le_bytes(*bytes),
-                })
-            };
-            values.iter().map(value).collect()
-        }};
+/// Reads numbers as f32. For integers, also returns the largest value of their type.
+fn numbers<R: Read>(npy: Npy<R>) -> Said<(ArrayD<f32>, Option<f32>)> {
+    macro_rules! whole {
+        ($type:ty) => {
+            (npy.converted(|v: $type| v as f32)?, Some(<$type>::MAX as f32))
+        };
     }
-    Some(match kind {
-        "f2" => (of!(half::f16, f32::from), None),
-        "f4" => (of!(f32, |v| v), None),
-        "f8" => (of!(f64, |v| v as f32), None),
-        "u1" => (of!(u8, f32::from), Some(f32::from(u8::MAX))),
-        "u2" => (of!(u16, f32::from), Some(f32::from(u16::MAX))),
-        "u4" => (of!(u32, |v| v as f32), Some(u32::MAX as f32)),
-        "i1" => (of!(i8, f32::from), Some(f32::from(i8::MAX))),
-        "i2" => (of!(i16, f32::from), Some(f32::from(i16::MAX))),
-        "i4" => (of!(i32, |v| v as f32), Some(i32::MAX as f32)),
-        _ => return None,
+    Ok(match npy.kind() {
+        "f2" => (npy.converted(f16::to_f32)?, None),
+        "f4" => (npy.array()?, None),
+        "f8" => (npy.converted(|v: f64| v as f32)?, None),
+        "u1" => whole!(u8),
+        "u2" => whole!(u16),
+        "u4" => whole!(u32),
+        "i1" => whole!(i8),
+        "i2" => whole!(i16),
+        "i4" => whole!(i32),
+        _ => {
+            return Err(format!(
+                "holds numbers of the type {}; a depth map has float16, float32, float64 or whole numbers of 8 to 32 bits: depth.astype(numpy.float32) makes it so",
+                npy.header.descr
+            ));
+        }
     })
 }
 
@@ -160,7 +337,10 @@ mod tests {
     use super::*;
     use ndarray::{Array2, Ix2, Ix3};
     use ndarray_npy::WriteNpyExt;
-    use num_complex::Complex32;
+
+    fn plane(file: &[u8]) -> Said<Plane> {
+        read_plane(Npy::new(file, file.len() as u64)?)
+    }
 
     fn file(header: &str, values: &[u8]) -> Vec<u8> {
         let mut file = b"\x93NUMPY\x01\x00".to_vec();
@@ -171,24 +351,77 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_wherever_it_lies_in_memory() {
+    fn what_numpy_and_other_programs_write_is_read() {
         let want = Array2::from_shape_fn((3, 5), |(y, x)| (y * 5 + x) as f64);
         let mut bytes = Vec::new();
         want.write_npy(&mut bytes).unwrap();
-        for shift in 0..ALIGNMENT {
-            let memory = [vec![0; shift], bytes.clone()].concat();
-            assert_eq!(read::<f64, Ix2>(&memory[shift..]).unwrap(), want);
-        }
-        // Other programs write headers of any length.
-        for spaces in 0..9 {
-            let header = format!(
-                "{{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }}{}\n",
-                " ".repeat(spaces)
-            );
-            let values: Vec<u8> = [1.5f32, -2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
-            let got = read::<f32, Ix2>(&file(&header, &values)).unwrap();
+        assert_eq!(read::<f64, Ix2>(&bytes).unwrap(), want);
+        let mut bytes = Vec::new();
+        want.t().write_npy(&mut bytes).unwrap();
+        assert_eq!(read::<f64, Ix2>(&bytes).unwrap(), want.t());
+        let values: Vec<u8> = [1.5f32, -2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        for header in [
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }",
+            "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }     \n",
+            "{\"shape\":(1,2),\"fortran_order\":False,\"descr\":\"<f4\"}",
+        ] {
+            let got = read::<f32, Ix2>(&file(header, &values)).unwrap();
             assert_eq!(got.into_raw_vec_and_offset().0, [1.5, -2.0]);
         }
+        // A large array is read in several parts.
+        let want = Array2::from_shape_fn((300, 500), |(y, x)| (y * 500 + x) as u32);
+        let mut bytes = Vec::new();
+        want.write_npy(&mut bytes).unwrap();
+        assert_eq!(read::<u32, Ix2>(&bytes).unwrap(), want);
+    }
+
+    /// A header that nests takes no time, and none panics, whatever shape it says.
+    #[test]
+    fn headers_that_no_array_has_are_refused_at_once() {
+        let (open, close) = ("{1:".repeat(2000), "}".repeat(2000));
+        let tuples = format!("{}1{}", "(".repeat(2000), ")".repeat(2000));
+        for (descr, shape) in [
+            (format!("{open}1{close}"), "(1, 1)".to_owned()),
+            (tuples.clone(), "(1, 1)".to_owned()),
+            ("'<f4'".to_owned(), tuples),
+            ("[('x', '<f4'), ('y', '<f4')]".to_owned(), "(1,)".to_owned()),
+            ("'<f4'".to_owned(), format!("({})", "1, ".repeat(100))),
+            ("'<f4'".to_owned(), "(3, 0, 4000000000000000000)".to_owned()),
+            ("'<f4'".to_owned(), "(4000000000000000000, 0, 3)".to_owned()),
+            ("'<f4'".to_owned(), "(0,)".to_owned()),
+            ("'<f4'".to_owned(), "(4294967296, 4294967296, 2)".to_owned()),
+            ("'<f4'".to_owned(), "(18446744073709551616, 1)".to_owned()),
+            ("'<f4'".to_owned(), "(-1, -1)".to_owned()),
+            ("'<f4'".to_owned(), "(1, 1".to_owned()),
+            ("''".to_owned(), "(1, 1)".to_owned()),
+            ("'é4'".to_owned(), "(1, 1)".to_owned()),
+            ("'<f99999999999999999999'".to_owned(), "(1, 1)".to_owned()),
+            ("'|O'".to_owned(), "(1, 1)".to_owned()),
+            ("'<U1'".to_owned(), "(1, 1)".to_owned()),
+        ] {
+            let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}");
+            let bytes = file(&header, &[0; 4]);
+            assert!(Npy::new(&bytes[..], bytes.len() as u64).is_err(), "{header}");
+        }
+        let mut long = file("{}", &[]);
+        long[6] = 2;
+        long[8..].copy_from_slice(&u32::MAX.to_le_bytes());
+        long.extend([0xFF; 16]);
+        assert!(Npy::new(&long[..], long.len() as u64).is_err_and(|why| why.contains("its header has")));
+    }
+
+    #[test]
+    fn a_field_is_complex_and_has_two_or_three_axes() {
+        let field = |kind: &str, shape: &str, bytes: usize| {
+            let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+            let file = file(&header, &vec![0; bytes]);
+            read_field(Npy::new(&file[..], file.len() as u64)?).map(|field| field.dim())
+        };
+        assert_eq!(field("<c8", "(2, 3)", 48), Ok((1, 2, 3)));
+        assert_eq!(field(">c16", "(3, 1, 2)", 96), Ok((3, 1, 2)));
+        assert!(field("<f8", "(2, 3)", 48).is_err_and(|why| why.contains("numpy.complex64")));
+        assert!(field("<c8", "(1, 1, 2, 3)", 48).is_err_and(|why| why.contains("[1, 1, 2, 3]")));
+        assert!(field("<c8", "(2, 3)", 40).is_err_and(|why| why.contains("40 bytes follow")));
     }
 
     #[test]
@@ -232,25 +465,25 @@ mod tests {
             let be: Vec<u8> = le(kind).chunks(size).flat_map(|v| v.iter().rev().copied()).collect();
             for shape in ["(2, 3)", "(2, 3, 1)", "(1, 2, 3)"] {
                 let little = file(&header("<", "False", shape), &le(kind));
-                assert_eq!(read_plane(&little).unwrap().values, want, "{kind} {shape}");
+                assert_eq!(plane(&little).unwrap().values, want, "{kind} {shape}");
                 let big = file(&header(">", "False", shape), &be);
-                assert_eq!(read_plane(&big).unwrap().values, want, "{kind} {shape}");
+                assert_eq!(plane(&big).unwrap().values, want, "{kind} {shape}");
             }
             let columns = file(&header("<", "True", "(3, 2)"), &le(kind));
-            assert_eq!(read_plane(&columns).unwrap().values, want.t(), "{kind}");
-            assert_eq!(read_plane(&columns).unwrap().most.is_none(), kind.starts_with('f'));
+            assert_eq!(plane(&columns).unwrap().values, want.t(), "{kind}");
+            assert_eq!(plane(&columns).unwrap().most.is_none(), kind.starts_with('f'));
             for shape in ["(6,)", "(2, 3, 2)", "(2, 4)", "(2, 2)", "(1, 2, 3, 1)", "(-2, 3)"] {
                 assert!(
-                    read_plane(&file(&header("<", "False", shape), &le(kind))).is_err(),
+                    plane(&file(&header("<", "False", shape), &le(kind))).is_err(),
                     "{shape}"
                 );
             }
             for end in 0..columns.len() {
-                assert!(read_plane(&columns[..end]).is_err());
+                assert!(plane(&columns[..end]).is_err());
             }
         }
         assert!(
-            read_plane(&file(
+            plane(&file(
                 "{'descr': '<c8', 'fortran_order': False, 'shape': (2, 3), }",
                 &[0; 48]
             ))

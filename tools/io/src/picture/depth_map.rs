@@ -1,7 +1,7 @@
 //! Depth maps in files of any supported kind: one number for each pixel.
 
 use crate::input::decode::{self, DEPTH_FORMATS, Pixels, Plane, Reading};
-use crate::input::{self, MOST_ARRAY, MOST_PICTURE, npy};
+use crate::input::{self, MOST_PICTURE, npy};
 use crate::output::has_extension;
 use crate::{Error, Result};
 use image::metadata::Orientation;
@@ -29,8 +29,10 @@ pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
     let refuse = |why: String| Error::file(path, why);
     let (plane, orientation) = if has_extension(path, "npy") {
-        let file = input::bytes(path, MOST_ARRAY)?;
-        (npy::read_plane(&file).map_err(refuse)?, Orientation::NoTransforms)
+        (
+            npy::read_plane(npy::open(path)?).map_err(refuse)?,
+            Orientation::NoTransforms,
+        )
     } else {
         let file = input::open(path, MOST_PICTURE)?;
         let decoded = decode::decode(file, Reading::UPRIGHT).map_err(refuse)?;

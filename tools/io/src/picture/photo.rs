@@ -26,6 +26,8 @@ const XMP: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
 const EXTENDED_XMP: &[u8] = b"http://ns.adobe.com/xmp/extension/\0";
 /// The length of the header of each part of extended XMP: a GUID, the total length, and the offset of the part.
 const EXTENDED_HEAD: usize = 32 + 4 + 4;
+/// The maximum number of pixels of the depth image, 4096²: more than phones photograph.
+const MOST_DEPTH_PIXELS: u64 = 1 << 24;
 /// The maximum number of marks (`<`, `"`, `'`) in XMP. Elements and attributes take far more memory than their
 /// characters.
 const MOST_MARKS: usize = 1 << 15;
@@ -86,7 +88,11 @@ fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
     let (colour, orientation) = decode::picture_of(bytes, Reading::UPRIGHT)?;
     let found = Xmp::read(bytes)?.depth(bytes)?;
     // The depth image has the orientation of the stored photo, whatever its own metadata say.
-    let depth = decode::picture_of(&found.image, Reading::AS_STORED);
+    let how = Reading {
+        most_pixels: MOST_DEPTH_PIXELS,
+        ..Reading::AS_STORED
+    };
+    let depth = decode::picture_of(&found.image, how);
     let (mut depth, _) = depth.map_err(|why| format!("the depth inside {why}"))?;
     depth.apply_orientation(orientation);
     let grey = depth.into_luma16();
