@@ -12,6 +12,7 @@ use picture::Picture;
 use std::fmt::{Debug, Formatter};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
 
 /// The scaling that a network expects for colour values from 0 to 1.
@@ -51,7 +52,7 @@ impl DepthNetwork {
     /// # Errors
     /// Returns [`Error::Network`] if tract does not read the file, or if it has too many parts.
     pub fn from_onnx(file: &[u8]) -> Result<Self> {
-        Self::read(file, None)
+        Self::of_messages(flat(caught(|| bounds::messages(file, None)))?, None)
     }
 
     /// Reads the ONNX file at `path`, whose weights may lie in other files of the same folder. See [`Self::from_onnx`].
@@ -61,13 +62,15 @@ impl DepthNetwork {
     pub fn open(path: &Path) -> Result<Self> {
         let bytes =
             file::read(path, MOST_DEPTH_NETWORK).map_err(|why| Error::Network(format!("cannot be read: {why}")))?;
-        Self::read(&bytes, Some(path))
+        let proto = flat(caught(|| bounds::messages(&bytes, Some(path))))?;
+        // The messages hold copies of the weights.
+        drop(bytes);
+        Self::of_messages(proto, Some(path))
     }
 
-    fn read(file: &[u8], path: Option<&Path>) -> Result<Self> {
+    fn of_messages(proto: ModelProto, path: Option<&Path>) -> Result<Self> {
         // tract panics on files that it does not expect.
         let read = caught(|| {
-            let proto = bounds::messages(file, path)?;
             let folder = path.and_then(Path::parent).and_then(Path::to_str);
             let parsed = (tract_onnx::onnx().parse(&proto, folder))
                 .map_err(|why| format!("is no ONNX file that tract reads: {}", one_line(&why)))?;

@@ -253,7 +253,7 @@ fn networks_that_cannot_be_run_are_refused_before_memory_is_taken() {
 }
 
 #[test]
-fn branches_and_weights_elsewhere_are_refused() {
+fn branches_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("n.onnx");
     let body = AttributeProto {
@@ -266,43 +266,131 @@ fn branches_and_weights_elsewhere_are_refused() {
     std::fs::write(&path, file("out", vec![branch], vec![])).unwrap();
     let why = run(&path).unwrap_err().to_string();
     assert!(why.contains("branch") && why.contains("node of out"), "{why}");
-    for (location, word) in [
-        ("../../../../../../../../etc/passwd", ""),
-        ("/dev/zero", "regular"),
-        ("none.bin", "none.bin"),
-    ] {
-        let entry = |key: &str, value: &str| StringStringEntryProto {
-            key: key.into(),
-            value: value.into(),
-        };
-        let elsewhere = TensorProto {
-            name: "more".into(),
-            data_type: FLOAT,
-            dims: vec![1],
-            data_location: Some(tensor_proto::DataLocation::External as i32),
-            external_data: vec![entry("location", location), entry("length", "4")],
-            ..Default::default()
-        };
-        let add = node("Add", &["seen", "more"], "out", vec![]);
-        std::fs::write(&path, file("out", vec![add], vec![elsewhere])).unwrap();
-        let why = run(&path).unwrap_err().to_string();
-        assert!(!why.contains('\n') && why.contains(word), "{why}");
-    }
-    let add = node("Add", &["seen", "more"], "out", vec![]);
-    let beside = TensorProto {
-        name: "more".into(),
-        data_type: FLOAT,
-        dims: vec![1],
-        data_location: Some(tensor_proto::DataLocation::External as i32),
-        external_data: vec![StringStringEntryProto {
-            key: "location".into(),
-            value: "weights.bin".into(),
-        }],
-        ..Default::default()
+}
+
+/// Returns a tensor called `name` whose weights lie in another file, as `external` says.
+fn elsewhere(name: &str, dims: &[i64], external: &[(&str, &str)]) -> TensorProto {
+    let entry = |(key, value): &(&str, &str)| StringStringEntryProto {
+        key: (*key).into(),
+        value: (*value).into(),
     };
-    std::fs::write(folder.path().join("weights.bin"), 0.5f32.to_le_bytes()).unwrap();
-    std::fs::write(&path, file("out", vec![add], vec![beside])).unwrap();
-    assert_eq!(run(&path).unwrap(), (16, 24));
+    TensorProto {
+        name: name.into(),
+        data_type: FLOAT,
+        dims: dims.into(),
+        data_location: Some(tensor_proto::DataLocation::External as i32),
+        external_data: external.iter().map(entry).collect(),
+        ..Default::default()
+    }
+}
+
+/// The shape of a tensor, where it lies, and words of the refusal.
+type Case<'a> = (&'a [i64], &'a [(&'a str, &'a str)], &'a str);
+
+#[test]
+fn weights_in_other_files_are_as_large_as_their_shapes_and_lie_beside() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().join("model");
+    std::fs::create_dir(&inside).unwrap();
+    let path = inside.join("n.onnx");
+    std::fs::write(
+        inside.join("weights.bin"),
+        [0.5f32.to_le_bytes(), 0.25f32.to_le_bytes()].concat(),
+    )
+    .unwrap();
+    std::fs::write(folder.path().join("outside.bin"), 0.5f32.to_le_bytes()).unwrap();
+    #[cfg(unix)]
+    for (to, name) in [
+        ("weights.bin", "link.bin"),
+        ("../outside.bin", "out.bin"),
+        ("..", "up"),
+        ("/dev/zero", "zero.bin"),
+    ] {
+        std::os::unix::fs::symlink(to, inside.join(name)).unwrap();
+    }
+    let try_one = |dims: &[i64], external: &[(&str, &str)]| {
+        let add = node("Add", &["seen", "more"], "out", vec![]);
+        std::fs::write(&path, file("out", vec![add], vec![elsewhere("more", dims, external)])).unwrap();
+        run(&path)
+    };
+    let at = |location, offset, length| [("location", location), ("offset", offset), ("length", length)];
+    assert_eq!(try_one(&[1], &at("weights.bin", "4", "4")).unwrap(), (16, 24));
+    assert_eq!(try_one(&[1], &at("weights.bin", "4", "4")[..2]).unwrap(), (16, 24));
+    #[cfg(unix)]
+    assert_eq!(try_one(&[1], &at("./link.bin", "0", "4")).unwrap(), (16, 24));
+    let cases: &[Case] = &[
+        (&[1], &at("../outside.bin", "0", "4"), "in the folder of the network"),
+        (&[1], &at("/dev/zero", "0", "4"), "in the folder of the network"),
+        (&[1], &at("none.bin", "0", "4"), "none.bin"),
+        (&[1], &at(".", "0", "4"), "not a regular file"),
+        (&[1], &at("weights.bin", "0", "-4"), "length: invalid digit"),
+        (&[1], &at("weights.bin", "-4", "4"), "offset: invalid digit"),
+        (&[1], &at("weights.bin", "9", "4"), "the offset is 9"),
+        (&[1], &at("weights.bin", "8", "4"), "would end at byte 12"),
+        (
+            &[1],
+            &at("weights.bin", "8", "18446744073709551615"),
+            "would end at byte 18446744073709551623",
+        ),
+        (
+            &[1],
+            &at("weights.bin", "18446744073709551616", "4"),
+            "offset: number too large",
+        ),
+        (
+            &[1],
+            &[("location", "weights.bin")],
+            "they have 8 bytes; their shape needs 4",
+        ),
+        (
+            &[3],
+            &at("weights.bin", "0", "8"),
+            "they have 8 bytes; their shape needs 12",
+        ),
+        (&[-1], &at("weights.bin", "0", "8"), "no type or shape"),
+        (&[1 << 62, 4], &at("weights.bin", "0", "8"), "no type or shape"),
+    ];
+    let links: &[Case] = &[
+        (&[1], &at("out.bin", "0", "4"), "in the folder of the network"),
+        (&[1], &at("up/outside.bin", "0", "4"), "in the folder of the network"),
+        (&[1], &at("zero.bin", "0", "4"), "in the folder of the network"),
+    ];
+    for (dims, external, words) in cases.iter().chain(links.iter().filter(|_| cfg!(unix))) {
+        let why = try_one(dims, external).unwrap_err().to_string();
+        assert!(why.contains(words) && why.lines().count() == 1, "{external:?}: {why}");
+    }
+    let bytes = file(
+        "seen",
+        vec![],
+        vec![elsewhere("more", &[1], &at("weights.bin", "0", "4"))],
+    );
+    let why = DepthNetwork::from_onnx(&bytes).unwrap_err().to_string();
+    assert!(why.contains("must hold its weights itself"), "{why}");
+}
+
+/// Many tensors may share one sparse file, which takes no space on the disk.
+#[test]
+fn weights_in_other_files_are_bounded_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("n.onnx");
+    let sparse = std::fs::File::create(folder.path().join("big.bin")).unwrap();
+    sparse.set_len((1 << 30) + 4).unwrap();
+    let weights = |count: usize, floats: i64, offset: &str| -> Vec<TensorProto> {
+        let external = [("location", "big.bin"), ("offset", offset)];
+        (0..count)
+            .map(|i| elsewhere(&format!("more {i}"), &[floats], &external))
+            .collect()
+    };
+    for (initializers, words) in [
+        (weights(5, 1 << 28, "4"), "over 4294967296 bytes"),
+        (weights(1, (1 << 28) + 1, "0"), "1073741824 are the most"),
+    ] {
+        std::fs::write(&path, file("seen", vec![], initializers)).unwrap();
+        let why = run(&path).unwrap_err().to_string();
+        assert!(why.contains(words), "{why}");
+    }
+    #[cfg(target_os = "linux")]
+    assert!(peak() < 1 << 31, "{} bytes were held", peak());
 }
 
 #[test]

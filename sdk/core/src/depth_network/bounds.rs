@@ -2,8 +2,8 @@
 //! bytes may name a tensor of any size.
 
 use crate::method::network::bounds;
-use std::path::Path;
-use tract_onnx::pb::ModelProto;
+use std::path::{Component, Path};
+use tract_onnx::pb::{ModelProto, TensorProto, tensor_proto};
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::internal::Cost;
 use tract_onnx::tract_hir::infer::{Factoid, InferenceOp};
@@ -23,12 +23,12 @@ const MOST_PRODUCTS: u64 = 1 << 44;
 /// more pass is enough.
 const MOST_PASSES: usize = 8;
 
-/// Decodes the messages of `file`, if there are not too many, and checks that its external data lies in the folder of
-/// `path`.
+/// Decodes the messages of `file`, if there are not too many, and checks that its external weights lie in the folder of
+/// `path` and are as large as their shapes say.
 ///
 /// # Errors
-/// Returns an error if there are too many parts or nodes, if there are branches or loops, or if other files cannot be
-/// read.
+/// Returns an error if there are too many parts or nodes, if there are branches or loops, or if external weights are
+/// missing, elsewhere, or too large.
 pub(super) fn messages(file: &[u8], path: Option<&Path>) -> std::result::Result<ModelProto, String> {
     bounds::check_parts(file).map_err(|why| why.to_string())?;
     let proto: ModelProto = prost_message(file)?;
@@ -50,33 +50,82 @@ pub(super) fn messages(file: &[u8], path: Option<&Path>) -> std::result::Result<
     let attributes = graph.node.iter().flat_map(|node| &node.attribute);
     let tensors = attributes.flat_map(|a| a.t.iter().chain(&a.tensors));
     let mut total = 0;
-    for entry in (graph.initializer.iter().chain(tensors)).flat_map(|tensor| &tensor.external_data) {
-        if entry.key == "location" {
-            let Some(path) = path else {
-                return Err(format!(
-                    "its weights are in {}; a network from memory must hold its weights itself",
-                    entry.value
-                ));
-            };
-            let beside = path.with_file_name(&entry.value);
-            let about = beside
-                .metadata()
-                .map_err(|e| format!("its weights are in {}: {e}", beside.display()))?;
-            if !about.is_file() {
-                return Err(format!(
-                    "its weights are in {}, which is not a regular file",
-                    beside.display()
-                ));
-            }
-        }
-        if entry.key == "length" {
-            total += entry.value.parse::<u64>().unwrap_or(u64::MAX).min(MOST_LIVE + 1);
-        }
+    for tensor in graph.initializer.iter().chain(tensors) {
+        total += external_bytes(tensor, path)?;
         if total > MOST_LIVE {
             return Err(format!("its weights have over {MOST_LIVE} bytes"));
         }
     }
     Ok(proto)
+}
+
+/// Returns the number of bytes of `tensor` that lie in another file.
+fn external_bytes(tensor: &TensorProto, path: Option<&Path>) -> std::result::Result<u64, String> {
+    let said = |key: &str| tensor.external_data.iter().find(|entry| entry.key == key);
+    let Some(location) = said("location").map(|entry| entry.value.as_str()) else {
+        return Ok(0);
+    };
+    let Some(path) = path else {
+        return Err(format!(
+            "its weights are in {location}; a network from memory must hold its weights itself"
+        ));
+    };
+    let refuse = |why: &dyn std::fmt::Display| format!("its weights {} are in {location}: {why}", tensor.name);
+    let there = length_of(path, location).map_err(|why| refuse(&why))?;
+    let number = |key: &str| match said(key).map(|entry| entry.value.parse::<u64>()) {
+        None => Ok(None),
+        Some(Ok(number)) => Ok(Some(number)),
+        Some(Err(e)) => Err(refuse(&format_args!("{key}: {e}"))),
+    };
+    let offset = number("offset")?.unwrap_or(0);
+    let rest = (there.checked_sub(offset))
+        .ok_or_else(|| refuse(&format_args!("it has {there} bytes, and the offset is {offset}")))?;
+    let length = number("length")?.unwrap_or(rest);
+    if length > rest {
+        return Err(refuse(&format_args!(
+            "it has {there} bytes; the weights would end at byte {}",
+            u128::from(offset) + u128::from(length)
+        )));
+    }
+    let needed = bytes_of(tensor).ok_or_else(|| refuse(&"they have no type or shape that is read"))?;
+    if length != needed {
+        return Err(refuse(&format_args!(
+            "they have {length} bytes; their shape needs {needed}"
+        )));
+    }
+    if length > MOST_TENSOR {
+        return Err(refuse(&format_args!(
+            "they have {length} bytes; {MOST_TENSOR} are the most"
+        )));
+    }
+    Ok(length)
+}
+
+/// Returns the length of the file at `location`, which must lie in the folder of the network at `path`, links included.
+fn length_of(path: &Path, location: &str) -> std::result::Result<u64, String> {
+    let is_below = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder
+        .unwrap_or(Path::new("."))
+        .canonicalize()
+        .map_err(|e| e.to_string())?;
+    let real = folder.join(location).canonicalize().map_err(|e| e.to_string())?;
+    if !Path::new(location).components().all(is_below) || !real.starts_with(&folder) {
+        return Err("it must lie in the folder of the network".into());
+    }
+    let about = real.metadata().map_err(|e| e.to_string())?;
+    if !about.is_file() {
+        return Err("it is not a regular file".into());
+    }
+    Ok(about.len())
+}
+
+/// Returns the number of bytes that the shape and type of `tensor` need.
+fn bytes_of(tensor: &TensorProto) -> Option<u64> {
+    let kind = tensor_proto::DataType::try_from(tensor.data_type).ok()?;
+    let size = DatumType::try_from(kind).ok()?.size_of() as u64;
+    let mut sides = tensor.dims.iter();
+    sides.try_fold(size, |bytes, side| bytes.checked_mul(u64::try_from(*side).ok()?))
 }
 
 fn prost_message(file: &[u8]) -> std::result::Result<ModelProto, String> {
