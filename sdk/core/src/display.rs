@@ -14,6 +14,9 @@ use crate::runtime::error::{Error, Result};
 use crate::runtime::keys;
 use serde::{Deserialize, Serialize};
 
+/// The largest number of pixels of a modulator, 8192²: twice as many as the largest modulators have.
+const MOST_PIXELS: usize = 1 << 26;
+
 /// A spatial light modulator, its lasers, and the display volume.
 ///
 /// z points toward the viewer. The midpoint hologram lies at z = 0, the volume spans z ∈ \[−V/2, V/2\], and the
@@ -137,6 +140,12 @@ impl Display {
                 self.width, self.height
             ));
         }
+        if self.width * self.height > MOST_PIXELS {
+            return refuse(format!(
+                "width and height are {}×{}; {MOST_PIXELS} pixels in all are the most",
+                self.width, self.height
+            ));
+        }
         if !(0.1e-6..=1e-3).contains(&self.pitch_m) {
             return refuse(format!("pitch_um is {}; it must lie in 0.1..=1000", self.pitch_m * 1e6));
         }
@@ -256,7 +265,7 @@ impl Display {
     /// Returns this display with (`height`, `width`) pixels.
     ///
     /// # Errors
-    /// Returns an error if a side lies outside 1..=65536.
+    /// Returns an error if a side lies outside 1..=65536, or if there are over 2²⁶ pixels.
     pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
         let display = Display { height, width, ..self };
         display.check()?;
@@ -311,6 +320,11 @@ mod tests {
     fn impossible_displays_are_named() {
         for (text, word) in [
             ("width = 0", "width"),
+            ("width = 65536\nheight = 65536", "67108864 pixels in all"),
+            ("width = 65536\nheight = 1025", "67108864 pixels in all"),
+            ("width = 3.5", "expected a whole number from 0"),
+            ("pitch_um = \"8\"", "expected a number"),
+            ("wavelengths_nm = 532", "expected a list"),
             ("pitch_um = nan", "pitch_um"),
             ("pitch_um = 0.2", "wavelength"),
             ("wavelengths_nm = [638, 520, -450]", "wavelength"),
@@ -331,6 +345,7 @@ mod tests {
             assert!(message.contains(word), "{text}: {message}");
             assert!(!message.contains('\n'), "{message}");
         }
+        assert!(Display::from_toml("width = 65536\nheight = 1024").is_ok());
         // The three lasers may have the same wavelength.
         assert!(Display::from_toml("wavelengths_nm = [532, 532, 532]").is_ok());
     }

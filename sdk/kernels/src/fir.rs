@@ -107,6 +107,9 @@ impl Taps {
 }
 
 /// A register of pixels, with the operations that the filter needs.
+///
+/// # Safety
+/// The caller of each operation must have detected the instruction set of the register.
 trait Lanes: Copy {
     const LANES: usize;
     /// The sums of products for the pixels of a register.
@@ -118,13 +121,25 @@ trait Lanes: Copy {
     /// The caller must ensure that `LANES` pixels can be written.
     unsafe fn store(self, to: *mut Pixel);
     /// Returns the sum.
-    fn add(self, other: Self) -> Self;
+    ///
+    /// # Safety
+    /// See [`Lanes`].
+    unsafe fn add(self, other: Self) -> Self;
     /// Returns sums of `start`.
-    fn sums(start: i32) -> Self::Sums;
+    ///
+    /// # Safety
+    /// See [`Lanes`].
+    unsafe fn sums(start: i32) -> Self::Sums;
     /// Adds the products of these pixels and `tap`.
-    fn multiply(self, tap: &Tap, sums: Self::Sums) -> Self::Sums;
+    ///
+    /// # Safety
+    /// See [`Lanes`].
+    unsafe fn multiply(self, tap: &Tap, sums: Self::Sums) -> Self::Sums;
     /// Shifts sums to the right by `shift` bits and saturates them, to [`LEAST`] and [`MOST`].
-    fn narrow(sums: Self::Sums, shift: u32) -> Self;
+    ///
+    /// # Safety
+    /// See [`Lanes`].
+    unsafe fn narrow(sums: Self::Sums, shift: u32) -> Self;
 }
 
 /// The arguments of a kernel. The pixels of the taps are in `slots` slots, `pitch` pixels apart: the centre's in slot
@@ -262,7 +277,8 @@ fn run<const ROWS: usize>(
     let slots = 2 * taps.radius() + 2;
     let length = out[0].len();
     assert!(length.is_multiple_of(RUN) && out.iter().all(|out| out.len() == length));
-    assert!(centre < slots && slots * pitch <= ring.len() && from + length <= pitch);
+    assert!(centre < slots && slots.checked_mul(pitch).is_some_and(|pixels| pixels <= ring.len()));
+    assert!(from.checked_add(length).is_some_and(|end| end <= pitch));
     Run {
         source: ring[from..].as_ptr(),
         pitch,
@@ -466,6 +482,20 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn runs_outside_the_ring_are_refused() {
+        let taps = taps(1, 0.1);
+        let ring = noise(4 * 16, 3);
+        let filter = |pitch, centre, from| {
+            std::panic::catch_unwind(|| Fir::fastest().down(&taps, &ring, pitch, centre, from, &mut [Pixel::ZERO; 16]))
+        };
+        assert!(filter(16, 0, 0).is_ok());
+        // Four slots of 2⁶² pixels are 2⁶⁴, which wraps around to 0.
+        for (pitch, centre, from) in [(1 << 62, 0, 0), (16, 4, 0), (16, 0, 1), (17, 0, 0), (16, 0, usize::MAX)] {
+            assert!(filter(pitch, centre, from).is_err(), "{pitch} {centre} {from}");
         }
     }
 

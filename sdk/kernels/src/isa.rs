@@ -109,14 +109,25 @@ impl Isa {
             .map_err(|before| format!("the kernels are already limited to '{before}'"))
     }
 
-    /// Returns whether this process may use this instruction set, if the processor has it.
+    /// Returns the instruction set that [`Self::VARIABLE`] names, or `None` if it is not set.
     ///
-    /// # Panics
-    /// Panics if [`Self::VARIABLE`] names an instruction set that this processor lacks.
+    /// # Errors
+    /// Returns one line if this processor has none of this name.
+    pub fn of_variable() -> Result<Option<Isa>, String> {
+        match std::env::var_os(Self::VARIABLE) {
+            None => Ok(None),
+            Some(name) => {
+                (Self::named(&name.to_string_lossy()).map(Some)).map_err(|why| format!("{}: {why}", Self::VARIABLE))
+            }
+        }
+    }
+
+    /// Returns whether this process may use this instruction set, if the processor has it. Where [`Self::of_variable`]
+    /// is an error, only [`Isa::Portable`] is allowed.
     pub(crate) fn is_allowed(self) -> bool {
-        let limit = LIMIT.get_or_init(|| match std::env::var(Self::VARIABLE) {
-            Ok(name) => Self::named(&name).unwrap_or_else(|why| panic!("{}: {why}", Self::VARIABLE)),
-            Err(_) => Self::available()[0],
+        let limit = LIMIT.get_or_init(|| match Self::of_variable() {
+            Ok(named) => named.unwrap_or(Self::available()[0]),
+            Err(_) => Isa::Portable,
         });
         self <= *limit
     }

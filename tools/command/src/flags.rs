@@ -206,14 +206,19 @@ impl OverwriteFlag {
     }
 }
 
+/// The largest number of pixels of a size.
+const MOST_PIXELS: usize = 1 << 26;
+
 /// Parses a width and height such as 1920x1080.
 pub fn parse_size(text: &str) -> std::result::Result<(usize, usize), String> {
     let parsed = text
         .split_once(['x', '×'])
         .and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match parsed {
-        Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) => Ok((w, h)),
-        _ => Err("a size is written WxH, as 1920x1080, each up to 16384".into()),
+        Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) && w * h <= MOST_PIXELS => Ok((w, h)),
+        _ => Err(format!(
+            "a size is written WxH, as 1920x1080, each up to 16384 and {MOST_PIXELS} pixels in all"
+        )),
     }
 }
 

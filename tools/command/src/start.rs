@@ -44,9 +44,7 @@ impl Common {
     }
 
     fn traced(&self, command: impl FnOnce() -> Result<()>) -> Result<()> {
-        if let Ok(name) = std::env::var(Isa::VARIABLE) {
-            Isa::named(&name).map_err(|why| Error::Input(format!("{}: {why}", Isa::VARIABLE)))?;
-        }
+        Isa::of_variable().map_err(Error::Input)?;
         let mut pool = rayon::ThreadPoolBuilder::new();
         if let Some(threads) = self.threads {
             pool = pool.num_threads(threads.into());

@@ -98,8 +98,10 @@ impl Network {
     ///
     /// # Errors
     /// Returns [`Error::Network`] with the name of the wrong node, tensor or metadata and the expected value, or if the
-    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading allocates at most 4 times the file size plus 200 MB.
+    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading allocates at most 4 times the file size plus 200 MB. Returns
+    /// [`Error::Setting`] if the environment names an instruction set that this processor lacks.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
+        Isa::of_variable().map_err(Error::Setting)?;
         bounds::check(bytes)?;
         let model = proto::Model::decode(bytes)
             .map_err(|why| Error::Network(format!("not an ONNX file, or a truncated one: {why}")))?;

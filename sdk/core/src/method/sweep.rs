@@ -200,6 +200,7 @@ impl SweepPlan {
     /// so far away that light spreads over more than [`MAX_HOME_REACH`] from the front of the volume.
     pub fn new(height: usize, width: usize, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
         sweep.check(display)?;
+        Isa::of_variable().map_err(Error::Setting)?;
         if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
             return Err(Error::Setting(format!(
                 "sweep: a frame of {width}×{height} pixels is empty or too large"

@@ -38,10 +38,34 @@ pub fn check(table: &toml::Table, known: &[&str]) -> Result<()> {
     }
 }
 
-/// Returns the message of a TOML error in one line. For an unknown key, it names the nearest known keys instead of all.
+/// The names of types in messages of serde, and what TOML calls them.
+const TYPES: [(&str, &str); 6] = [
+    ("usize", "a whole number from 0"),
+    ("u32", "a whole number from 0"),
+    ("u8", "a whole number from 0"),
+    ("f64", "a number"),
+    ("a sequence", "a list"),
+    ("a boolean", "true or false"),
+];
+
+/// Returns the message of a TOML error in one line, with the key that it is about if that is known. For an unknown key,
+/// it names the nearest known keys instead of all.
 pub fn message(error: &toml::de::Error) -> String {
     let message = error.message().trim().replace('\n', " ");
     let message = message.trim_start_matches("display: ");
+    let of_type = |(kind, plain): (&str, &str)| {
+        Some(format!(
+            "{}expected {plain}",
+            message.strip_suffix(&format!("expected {kind}"))?
+        ))
+    };
+    if let Some(message) = TYPES.into_iter().find_map(of_type) {
+        let all = error.to_string();
+        let key = all
+            .lines()
+            .find_map(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+        return key.map_or(message.clone(), |key| format!("{key}: {message}"));
+    }
     let parts = message
         .strip_prefix("unknown field `")
         .and_then(|rest| rest.rsplit_once("`, expected "));

@@ -25,36 +25,37 @@ unsafe fn two(taps: &Taps, run: Run<2>) {
     unsafe { super::two::<__m256i, 2>(taps, run) }
 }
 
-#[expect(
-    clippy::undocumented_unsafe_blocks,
-    reason = "all run inside the functions above, which have the instructions"
-)]
 impl Lanes for __m256i {
     const LANES: usize = 8;
     type Sums = [Self; 2];
 
     #[inline(always)]
     unsafe fn load(from: *const Pixel) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { _mm256_loadu_si256(from.cast()) }
     }
 
     #[inline(always)]
     unsafe fn store(self, to: *mut Pixel) {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { _mm256_storeu_si256(to.cast(), self) }
     }
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
+    unsafe fn add(self, other: Self) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { _mm256_add_epi16(self, other) }
     }
 
     #[inline(always)]
-    fn sums(start: i32) -> Self::Sums {
+    unsafe fn sums(start: i32) -> Self::Sums {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { [_mm256_set1_epi32(start); 2] }
     }
 
     #[inline(always)]
-    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+    unsafe fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe {
             let [c, d] = [word(tap[0]), word(tap[1])];
             [
@@ -65,7 +66,8 @@ impl Lanes for __m256i {
     }
 
     #[inline(always)]
-    fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
+    unsafe fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe {
             let shift = _mm_cvtsi32_si128(shift as i32);
             let [re, im] = [_mm256_sra_epi32(re, shift), _mm256_sra_epi32(im, shift)];
@@ -82,9 +84,12 @@ impl Lanes for __m256i {
 }
 
 /// Returns a tap's two factors in all lanes.
+///
+/// # Safety
+/// The caller must have detected the instruction set.
 #[inline(always)]
-fn word(factors: [i16; 2]) -> __m256i {
+unsafe fn word(factors: [i16; 2]) -> __m256i {
     let word = u32::from(factors[0].cast_unsigned()) | u32::from(factors[1].cast_unsigned()) << 16;
-    // SAFETY: runs inside the functions above.
+    // SAFETY: the caller upholds this function's contract.
     unsafe { _mm256_set1_epi32(word.cast_signed()) }
 }

@@ -20,7 +20,6 @@ unsafe fn two(taps: &Taps, run: Run<2>) {
     unsafe { super::two::<int16x8x2_t, 1>(taps, run) }
 }
 
-#[expect(clippy::undocumented_unsafe_blocks, reason = "NEON is always there")]
 impl Lanes for int16x8x2_t {
     const LANES: usize = 8;
     /// The lower and upper halves of the real parts, then of the imaginary parts.
@@ -28,31 +27,36 @@ impl Lanes for int16x8x2_t {
 
     #[inline(always)]
     unsafe fn load(from: *const Pixel) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { vld2q_s16(from.cast()) }
     }
 
     #[inline(always)]
     unsafe fn store(self, to: *mut Pixel) {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { vst2q_s16(to.cast(), self) }
     }
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
+    unsafe fn add(self, other: Self) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { int16x8x2_t(vaddq_s16(self.0, other.0), vaddq_s16(self.1, other.1)) }
     }
 
     #[inline(always)]
-    fn sums(start: i32) -> Self::Sums {
+    unsafe fn sums(start: i32) -> Self::Sums {
+        // SAFETY: the caller upholds the contract of the trait.
         unsafe { [[vdupq_n_s32(start); 2]; 2] }
     }
 
     #[inline(always)]
-    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+    unsafe fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
         [products(self, tap[0], re), products(self, tap[1], im)]
     }
 
     #[inline(always)]
-    fn narrow(sums: Self::Sums, shift: u32) -> Self {
+    unsafe fn narrow(sums: Self::Sums, shift: u32) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
         let [re, im] = sums.map(|sums| unsafe {
             let [lower, upper] = sums.map(|sums| vshlq_s32(sums, vdupq_n_s32(-(shift as i32))));
             let parts = vqmovn_high_s32(vqmovn_s32(lower), upper);

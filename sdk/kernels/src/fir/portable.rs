@@ -38,23 +38,23 @@ impl Lanes for [Pixel; LANES] {
     }
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
+    unsafe fn add(self, other: Self) -> Self {
         std::array::from_fn(|i| Pixel::new(self[i].re() + other[i].re(), self[i].im() + other[i].im()))
     }
 
     #[inline(always)]
-    fn sums(start: i32) -> Self::Sums {
+    unsafe fn sums(start: i32) -> Self::Sums {
         [[start; 2]; LANES]
     }
 
     #[inline(always)]
-    fn multiply(self, tap: &Tap, sums: Self::Sums) -> Self::Sums {
+    unsafe fn multiply(self, tap: &Tap, sums: Self::Sums) -> Self::Sums {
         let product = |pixel: Pixel, [a, b]: [i16; 2]| pixel.re() * i32::from(a) + pixel.im() * i32::from(b);
         std::array::from_fn(|i| std::array::from_fn(|part| sums[i][part].wrapping_add(product(self[i], tap[part]))))
     }
 
     #[inline(always)]
-    fn narrow(sums: Self::Sums, shift: u32) -> Self {
+    unsafe fn narrow(sums: Self::Sums, shift: u32) -> Self {
         sums.map(|[re, im]| Pixel::new(saturated(re >> shift), saturated(im >> shift)))
     }
 }

@@ -36,17 +36,17 @@ impl Lanes for v128 {
     }
 
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
+    unsafe fn add(self, other: Self) -> Self {
         i16x8_add(self, other)
     }
 
     #[inline(always)]
-    fn sums(start: i32) -> Self::Sums {
+    unsafe fn sums(start: i32) -> Self::Sums {
         [i32x4_splat(start); 2]
     }
 
     #[inline(always)]
-    fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
+    unsafe fn multiply(self, tap: &Tap, [re, im]: Self::Sums) -> Self::Sums {
         [
             i32x4_add(re, i32x4_dot_i16x8(self, word(tap[0]))),
             i32x4_add(im, i32x4_dot_i16x8(self, word(tap[1]))),
@@ -54,7 +54,7 @@ impl Lanes for v128 {
     }
 
     #[inline(always)]
-    fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
+    unsafe fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
         let parts = i16x8_narrow_i32x4(i32x4_shr(re, shift), i32x4_shr(im, shift));
         let parts = i16x8_shuffle::<0, 4, 1, 5, 2, 6, 3, 7>(parts, parts);
         i16x8_max(i16x8_min(parts, i16x8_splat(MOST)), i16x8_splat(LEAST))
