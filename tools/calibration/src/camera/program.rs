@@ -6,17 +6,19 @@
 //! also in another run. Other lines are messages for the user. The program ends when its input ends.
 //!
 //! A photograph that fails its check is asked for again. Only one that passes gets its name, so that a run that was cut
-//! off can be resumed.
+//! off can be resumed. One run at a time takes photographs in a folder.
 
 use crate::camera::photograph::Photograph;
 use ndarray::ArrayView2;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 use serde_json::Value;
-use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::collections::BTreeMap;
+use std::fs::{File, TryLockError};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 /// The name of the photograph that is not checked yet.
@@ -25,6 +27,12 @@ const INCOMING: &str = "incoming.png";
 const SHOWN: &str = "show.png";
 /// The name of the program's settings.
 const SETTINGS: &str = "settings.json";
+/// The name of the file that keeps other runs out of a folder.
+const LOCK: &str = ".phasefront-capture";
+/// The maximum length of a line of the program, in bytes.
+const MOST_LINE: u64 = 1 << 16;
+/// The number of answers that wait. More make the program wait.
+const MOST_ANSWERS: usize = 4;
 /// The time that the program has to end after its input ended.
 const LAST: Duration = Duration::from_secs(5);
 
@@ -69,9 +77,47 @@ pub struct CaptureProgram {
     name: String,
     child: Child,
     input: Option<ChildStdin>,
-    lines: Receiver<String>,
+    answers: Receiver<Answer>,
     tries: usize,
     timeout: Duration,
+    /// The folders that other runs are kept out of.
+    claimed: BTreeMap<PathBuf, ClaimedFolder>,
+}
+
+/// What the program wrote.
+#[derive(Debug)]
+enum Answer {
+    Done(Value),
+    Failed(String),
+    /// A line over [`MOST_LINE`].
+    Endless,
+}
+
+/// A folder in which only this run takes photographs, as long as this value lives.
+#[derive(Debug)]
+pub struct ClaimedFolder {
+    /// The system releases the lock of a killed run.
+    _lock: File,
+}
+
+impl ClaimedFolder {
+    /// Keeps other runs out of `folder`.
+    ///
+    /// # Errors
+    /// Returns an error if another run takes photographs there, or if the folder is not writable.
+    pub fn new(folder: &Path) -> Result<Self> {
+        let path = folder.join(LOCK);
+        let file = File::options().write(true).create(true).truncate(false).open(&path);
+        let file = file.map_err(|e| Error::file(&path, format!("cannot be written: {e}")))?;
+        // A file system without locks keeps no run out.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(Error::file(
+                folder,
+                "another run takes photographs there; wait for it, or give another folder",
+            ));
+        }
+        Ok(ClaimedFolder { _lock: file })
+    }
 }
 
 impl CaptureProgram {
@@ -96,22 +142,17 @@ impl CaptureProgram {
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(refuse("has no standard input and output".into()));
         };
-        let (sender, lines) = channel();
-        // Ends when the program closes its output.
-        std::thread::spawn(move || {
-            for line in BufReader::new(output).lines().map_while(std::result::Result::ok) {
-                if sender.send(line).is_err() {
-                    return;
-                }
-            }
-        });
+        let (sender, answers) = sync_channel(MOST_ANSWERS);
+        let name = program.clone();
+        std::thread::spawn(move || listen(output, &name, &sender));
         Ok(CaptureProgram {
             name: program.clone(),
             child,
             input: Some(input),
-            lines,
+            answers,
             tries,
             timeout,
+            claimed: BTreeMap::new(),
         })
     }
 
@@ -120,7 +161,7 @@ impl CaptureProgram {
     ///
     /// # Errors
     /// Returns an error if the last photograph asked for is not good enough, if the program reports an error that
-    /// often, ends or takes too long, or if a file cannot be written.
+    /// often, ends or takes too long, if another run takes photographs in the folder, or if a file cannot be written.
     pub fn take<T>(
         &mut self,
         shot: &Shot<'_>,
@@ -130,6 +171,9 @@ impl CaptureProgram {
         let folder = path.parent().unwrap_or(Path::new("."));
         let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
         let (show, photo, kept) = (folder.join(SHOWN), folder.join(INCOMING), folder.join(SETTINGS));
+        if !self.claimed.contains_key(&folder) {
+            self.claimed.insert(folder.clone(), ClaimedFolder::new(&folder)?);
+        }
         write_levels(shot.levels, &show)?;
         let mut settings = read_settings(&kept)?;
         let mut again: Option<String> = None;
@@ -178,6 +222,12 @@ impl CaptureProgram {
     /// Sends a request and returns the settings of the answer or its error.
     fn ask(&mut self, request: &Request<'_>) -> Result<std::result::Result<Value, String>> {
         let line = serde_json::to_string(request).map_err(|e| Error::Input(e.to_string()))?;
+        // Nobody asked for these.
+        while let Ok(answer) = self.answers.try_recv() {
+            if matches!(answer, Answer::Endless) {
+                return Err(self.endless());
+            }
+        }
         let sent = self.input.as_mut().map(|input| {
             writeln!(input, "{line}")?;
             input.flush()
@@ -185,34 +235,30 @@ impl CaptureProgram {
         if !matches!(sent, Some(Ok(()))) {
             return Err(self.ended());
         }
-        let end = Instant::now() + self.timeout;
-        loop {
-            let line = match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
-                Ok(line) => line,
-                Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
-                Err(RecvTimeoutError::Timeout) => {
-                    let seconds = self.timeout.as_secs_f64();
-                    // It hangs, and would not notice the end of its input.
-                    let _ = self.kill();
-                    return Err(self.refuse(&format!(
-                        "no answer in {seconds} seconds; --capture-timeout-s gives it more"
-                    )));
-                }
-            };
-            let answer = serde_json::from_str::<Value>(&line).unwrap_or_default();
-            if let Some(done) = answer.get("done") {
-                return Ok(Ok(done.clone()));
+        match self.answers.recv_timeout(self.timeout) {
+            Ok(Answer::Done(done)) => Ok(Ok(done)),
+            Ok(Answer::Failed(why)) => Ok(Err(why)),
+            Ok(Answer::Endless) => Err(self.endless()),
+            Err(RecvTimeoutError::Disconnected) => Err(self.ended()),
+            Err(RecvTimeoutError::Timeout) => {
+                let seconds = self.timeout.as_secs_f64();
+                // It hangs, and would not notice the end of its input.
+                let _ = self.kill();
+                Err(self.refuse(&format!(
+                    "no answer in {seconds} seconds; --capture-timeout-s gives it more"
+                )))
             }
-            if let Some(why) = answer.get("error") {
-                let why = why.as_str().map_or_else(|| why.to_string(), str::to_owned);
-                return Ok(Err(why.lines().collect::<Vec<_>>().join(" ")));
-            }
-            log::info!("{}: {line}", self.name);
         }
     }
 
     fn refuse(&self, why: &str) -> Error {
         Error::Input(format!("--capture {}: {why}", self.name))
+    }
+
+    /// Ends a program that wrote a line over [`MOST_LINE`].
+    fn endless(&mut self) -> Error {
+        let _ = self.kill();
+        self.refuse(&format!("it wrote a line of over {MOST_LINE} bytes"))
     }
 
     fn ended(&mut self) -> Error {
@@ -244,6 +290,41 @@ impl CaptureProgram {
         }
         self.child.kill()
     }
+}
+
+/// Passes on the answers among the lines of `output` until it ends, and logs the others. Messages take no memory, and
+/// no time of the answer.
+fn listen(output: ChildStdout, name: &str, answers: &SyncSender<Answer>) {
+    let mut output = BufReader::new(output);
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        let answer = match (&mut output).take(MOST_LINE).read_until(b'\n', &mut line) {
+            Err(_) | Ok(0) => return,
+            Ok(_) if line.len() as u64 == MOST_LINE && !line.ends_with(b"\n") => Some(Answer::Endless),
+            Ok(_) => answer(&line),
+        };
+        match answer {
+            None => log::info!("{name}: {}", String::from_utf8_lossy(&line).trim_end()),
+            Some(answer) => {
+                let is_last = matches!(answer, Answer::Endless);
+                if answers.send(answer).is_err() || is_last {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Returns the answer in a line, or `None` if the line is a message.
+fn answer(line: &[u8]) -> Option<Answer> {
+    let mut value = serde_json::from_slice::<Value>(line).ok()?;
+    if let Some(done) = value.get_mut("done") {
+        return Some(Answer::Done(done.take()));
+    }
+    let why = value.get("error")?;
+    let why = why.as_str().map_or_else(|| why.to_string(), str::to_owned);
+    Some(Answer::Failed(why.lines().collect::<Vec<_>>().join(" ")))
 }
 
 /// Interrupts. A terminal sends them to this process only, because the program has a process group of its own.

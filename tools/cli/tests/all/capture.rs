@@ -270,6 +270,11 @@ fn programs_that_do_not_help_are_named() {
         std::thread::sleep(Duration::from_millis(10));
         !is_alive()
     }));
+    // Messages are no answer, and a line without an end is none either.
+    fs::write(folder.path("program.sh"), "while :; do echo a driver says hello; done").unwrap();
+    assert!(folder.fails(&slow, 1).contains("no answer in 0.5 seconds"));
+    fs::write(folder.path("program.sh"), "exec cat /dev/zero").unwrap();
+    assert!(folder.fails(&LUT, 1).contains("a line of over 65536 bytes"));
     let absent = [&LUT[..10], &["no-such-program"]].concat();
     assert!(
         folder
@@ -332,6 +337,72 @@ fn an_interrupt_ends_a_program_that_hangs_too() {
             "{status}"
         );
         assert!(ends(&folder, "sleep"));
+    }
+}
+
+/// A folder without photographs costs a line for each colour, not for each photograph.
+#[test]
+fn a_folder_without_photographs_is_told_in_a_line_for_each_colour() {
+    let folder = Folder::new();
+    fs::write(folder.path("three.toml"), "width = 144\nheight = 64").unwrap();
+    for colour in ["red", "green", "blue"] {
+        fs::create_dir_all(folder.path(&format!("taken/{colour}"))).unwrap();
+    }
+    let said = folder.fails(
+        &[
+            "calibrate",
+            "lut",
+            "--captures",
+            "taken",
+            "-o",
+            "t.pfp",
+            "--display",
+            "three.toml",
+        ],
+        1,
+    );
+    assert_eq!(said.lines().count(), 4, "{said}");
+    assert!(
+        said.contains("red: 256 of 256 photographs are missing, the first of pattern_000.png"),
+        "{said}"
+    );
+    assert!(said.contains("768 of 768 captures cannot be used"), "{said}");
+}
+
+#[test]
+fn two_runs_do_not_photograph_into_one_folder() {
+    let folder = Folder::new();
+    fs::write(
+        folder.path("one.toml"),
+        "width = 144\nheight = 64\nwavelengths_nm = [532]",
+    )
+    .unwrap();
+    fs::write(folder.path("program.sh"), "read -r line; touch asked; sleep 1000").unwrap();
+    let all = [
+        &["calibrate", "all", "bench", "--z-mm", "5.5", "--display", "one.toml"][..],
+        &LUT[9..],
+    ]
+    .concat();
+    for call in [&LUT[..], &all] {
+        let mut first = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .args(call)
+            .current_dir(folder.path(""))
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        while !folder.path("asked").exists() {
+            std::thread::sleep(Duration::from_millis(10));
+            assert_eq!(first.try_wait().unwrap(), None);
+        }
+        let said = folder.fails(call, 1);
+        assert!(
+            said.contains("another run takes photographs there") && said.lines().count() == 1,
+            "{said}"
+        );
+        let id = first.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        first.wait().unwrap();
+        fs::remove_file(folder.path("asked")).unwrap();
     }
 }
 

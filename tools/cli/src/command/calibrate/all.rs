@@ -8,6 +8,7 @@ use super::lut::Lut;
 use super::model::LearnModel;
 use clap::{Args, ValueEnum};
 use phasefront::{Display, Target};
+use phasefront_calibration::camera::program::ClaimedFolder;
 use phasefront_calibration::colours;
 use phasefront_calibration::optics::spot;
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag};
@@ -66,6 +67,8 @@ impl All {
         let target = self.display.read_without_offset()?.target;
         self.check(&target)?;
         output::folder(&self.folder, Holding::RunOf(DISPLAY))?;
+        output::make_folder(&self.folder)?;
+        let _claimed = ClaimedFolder::new(&self.folder)?;
         let mut file = CalibratedFile::begin(&self.folder, self.display.name())?;
         let mut capture = self.capture.later()?;
         let has = |name: &str| self.folder.join(name).is_file();
@@ -220,7 +223,6 @@ impl CalibratedFile {
                 "is of another display; a calibration needs a folder of its own",
             ));
         }
-        output::make_folder(folder)?;
         let file = CalibratedFile { path, table };
         file.write()?;
         Ok(file)

@@ -8,7 +8,7 @@ use phasefront_calibration::camera::pattern::{DARK, PATTERNS, Pattern};
 use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_calibration::camera::program::{self, Shot};
 use phasefront_calibration::colours;
-use phasefront_calibration::curves::lut::{self, Checks, Errors, Refusal};
+use phasefront_calibration::curves::lut::{self, Checks, Errors, Problem, Refusal, What};
 use phasefront_calibration::curves::report;
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, check_used};
 use phasefront_command::terminal::{self, progress_bar};
@@ -17,6 +17,9 @@ use phasefront_io::output;
 use phasefront_io::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+
+/// The largest number of missing photographs of one colour that are named one by one.
+const MOST_NAMED: usize = 8;
 
 /// Find each pixel's phase curve: write the 256 patterns, or read their photographs
 ///
@@ -181,9 +184,7 @@ impl Lut {
                 Err(Refusal::Other(e)) => return Err(e),
             }
         }
-        for problem in &problems {
-            log::warn!("{}", captures.join(problem.to_string()).display());
-        }
+        warn_of(&problems, captures, colours);
         if curves.len() < colours.len() {
             return Err(Error::file(
                 captures,
@@ -234,5 +235,27 @@ impl Lut {
             ),
             value: json!({"output": path.display().to_string(), "report": report}),
         })
+    }
+}
+
+/// Warns of each problem of the photographs in `captures`, and of many that are missing in one line for each colour.
+fn warn_of(problems: &[Problem], captures: &Path, colours: &[&str]) {
+    let (missing, others): (Vec<_>, Vec<_>) = problems.iter().partition(|problem| problem.what == What::Missing);
+    let mut named = others;
+    for name in colours {
+        let missing: Vec<_> = missing.iter().filter(|problem| problem.colour == *name).collect();
+        match missing[..] {
+            [first, ..] if missing.len() > MOST_NAMED => log::warn!(
+                "{}: {} of {PATTERNS} photographs are missing, the first of pattern_{:03}.png; name it capture_{:03}.png or .tif",
+                captures.join(name).display(),
+                missing.len(),
+                first.pattern,
+                first.pattern
+            ),
+            _ => named.extend(missing),
+        }
+    }
+    for problem in named {
+        log::warn!("{}", captures.join(problem.to_string()).display());
     }
 }
