@@ -293,13 +293,14 @@ for (const id of ["method", "width", "localSteps", "backend"]) {
   });
 }
 at("shown").addEventListener("click", async ({ target, clientX, clientY }) => {
-  if (target.localName !== "canvas") return;
+  if (target.localName !== "canvas" || !hologram) return;
   const box = target.getBoundingClientRect();
   const zMm = await hologram.zAt((clientX - box.left) / box.width, (clientY - box.top) / box.height);
   stop();
   focus(Math.round((0.5 - zMm / DEPTH_MM) * STEPS));
 });
 at("save").addEventListener("click", async () => {
+  if (!hologram) return;
   // The worker has the canvas of the page, so the pixels of a copy are saved.
   const shown = at("phases").querySelector("canvas");
   const copy = new OffscreenCanvas(shown.width, shown.height);

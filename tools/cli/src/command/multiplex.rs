@@ -121,7 +121,11 @@ impl MultiplexCommand {
             )
         });
         let text = format!("{} maps of {width}×{height}{}", maps.len(), text.collect::<String>());
-        terminal::print(json, &json!({ "width": width, "height": height, "shown": rows }), text);
+        terminal::print(
+            json,
+            &json!({ "output": self.output, "packed": self.packed, "width": width, "height": height, "shown": rows }),
+            text,
+        );
         Ok(())
     }
 

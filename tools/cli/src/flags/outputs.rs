@@ -51,13 +51,14 @@ impl OutputFlags {
 
     /// Writes the levels of `made` to `output`, and the other files, and reports them.
     pub(crate) fn finish(&self, output: &Path, display: &DisplayFile, made: &HologramResult, json: bool) -> Result<()> {
-        self.write(output, display, made)?;
+        let packed = self.write(output, display, made)?;
         let judged = self.judge.then(|| judge(display, made)).transpose()?;
-        self.report(output, made, judged.as_ref(), json);
+        self.report(output, &packed, made, judged.as_ref(), json);
         Ok(())
     }
 
-    fn write(&self, output: &Path, display: &DisplayFile, made: &HologramResult) -> Result<()> {
+    /// Writes the files and returns the paths of those that are packed.
+    fn write(&self, output: &Path, display: &DisplayFile, made: &HologramResult) -> Result<Vec<PathBuf>> {
         let (levels, field) = infos(display, made);
         if let (Some(path), Some(values)) = (&self.complex, &made.field) {
             if matches!(made.encoder.options.encoding, Encoding::Deep(_)) {
@@ -69,13 +70,15 @@ impl OutputFlags {
             hologram::write_complex(path, values.view(), &field)?;
         }
         let hologram = made.hologram(levels);
-        if let Some(path) = &self.packed {
-            packed::write(path, &packed::pack(&hologram, display)?)?;
-        }
-        hologram::write_hologram(output, &hologram)
+        let packed = match &self.packed {
+            Some(path) => packed::write(path, &packed::pack(&hologram, display)?)?,
+            None => Vec::new(),
+        };
+        hologram::write_hologram(output, &hologram)?;
+        Ok(packed)
     }
 
-    fn report(&self, output: &Path, made: &HologramResult, judged: Option<&Judged>, json: bool) {
+    fn report(&self, output: &Path, packed: &[PathBuf], made: &HologramResult, judged: Option<&Judged>, json: bool) {
         let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
         let stages: serde_json::Map<_, _> = (made.stages.iter())
             .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
@@ -88,7 +91,8 @@ impl OutputFlags {
         terminal::print(
             json,
             &json!({
-                "output": output.display().to_string(), "complex": self.complex, "width": width, "height": height,
+                "output": output.display().to_string(), "complex": self.complex, "packed": packed,
+                "width": width, "height": height,
                 "method": made.method, "encoder": made.encoder.name, "dark_threshold": made.encoder.options.dark_threshold,
                 "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
                 "stage_ms": stages, "total_ms": ms(&total), "shown": judged,

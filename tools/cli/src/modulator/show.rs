@@ -104,7 +104,13 @@ pub fn show(frames: &[Image], showing: &Showing) -> Result<Shown> {
 }
 
 fn run(app: &mut impl ApplicationHandler) -> Result<()> {
-    let refuse = |e: winit::error::EventLoopError| Error::Input(format!("there is no desktop to show on: {e}"));
+    let refuse = |e: winit::error::EventLoopError| {
+        let why = e.to_string();
+        // winit puts the place in its source first: "os error at FILE:LINE: ".
+        let told = why.strip_prefix("os error at ").and_then(|why| why.split_once(": "));
+        let told = told.map_or(&*why, |(_, told)| told);
+        Error::Input(format!("there is no desktop to show on: {told}"))
+    };
     EventLoop::new().map_err(refuse)?.run_app(app).map_err(refuse)
 }
 

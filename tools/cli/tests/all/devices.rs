@@ -45,12 +45,14 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
         frame(&folder, (48, 32));
         let size = format!("{}x{}", size.0, size.1);
         let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
-        folder.succeeds(&[&SMALL_HOLOGRAM[..], fit, &to].concat());
+        let told = folder.succeeds(&[&SMALL_HOLOGRAM[..], fit, &to, &["--json"]].concat());
+        let told: serde_json::Value = serde_json::from_str(&told).unwrap();
         let frames = if folder.path("frame.png").exists() {
             vec!["frame.png"]
         } else {
             vec!["frame-red.png", "frame-green.png", "frame-blue.png"]
         };
+        assert_eq!(told["packed"], serde_json::json!(frames), "{name}");
         let back = ["--display", name, "--size", &size, "-o", "back.png"];
         folder.succeeds(&[&["unpack"], &frames[..], &back].concat());
         let hologram = levels(&folder.path("hologram.png"));
@@ -394,6 +396,11 @@ fn tables_of_two_columns_are_read_and_voltages_are_the_drivers() {
             .collect();
         fs::write(folder.path(name), lines).unwrap();
     }
+    let downward: String = (0..256).rev().map(|i| format!("{i} {}\n", level(i))).collect();
+    fs::write(folder.path("downward.lut"), &downward).unwrap();
+    fs::write(folder.path("marked.txt"), format!("\u{feff}{}", column.join("\n"))).unwrap();
+    fs::write(folder.path("twice.lut"), downward.replace("255 59", "254 59")).unwrap();
+    fs::write(folder.path("flat.txt"), "7\n".repeat(256)).unwrap();
     let made = |table: &str| {
         fs::write(folder.path("d.toml"), format!("lut = \"{table}\"")).unwrap();
         folder.run(&[&SMALL_HOLOGRAM[..], &["--display", "d.toml", "-o", "h.png"]].concat())
@@ -402,10 +409,14 @@ fn tables_of_two_columns_are_read_and_voltages_are_the_drivers() {
         assert!(made(table).status.success());
         levels(&folder.path("h.png"))
     };
-    assert_eq!(shown("one.txt"), shown("two.lut"));
+    for table in ["two.lut", "downward.lut", "marked.txt"] {
+        assert_eq!(shown("one.txt"), shown(table), "{table}");
+    }
     for (table, words) in [
         ("volts.lut", "load the file into the modulator's driver"),
-        ("late.lut", "no level of 0..=255"),
+        ("late.lut", "each of 0 to 255 once"),
+        ("twice.lut", "each of 0 to 255 once"),
+        ("flat.txt", "the level 7 for every phase"),
     ] {
         let said = String::from_utf8(made(table).stderr).unwrap();
         assert!(said.contains(words) && said.lines().count() == 1, "{said}");
