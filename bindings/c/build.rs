@@ -1,5 +1,6 @@
 //! Gives the shared library its name for the linker: programs ask for the version whose calls they were built with.
-//! Before 1.0 a new minor version may change calls.
+//! Before 1.0 a new minor version may change calls. The library exports its own calls alone, not those that its
+//! dependencies export for other languages.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -11,5 +12,6 @@ fn main() {
             env!("CARGO_PKG_VERSION_MINOR")
         );
         println!("cargo:rustc-cdylib-link-arg=-Wl,-soname,{name}");
+        println!("cargo:rustc-cdylib-link-arg=-Wl,--exclude-libs,ALL");
     }
 }

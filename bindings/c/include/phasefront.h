@@ -341,7 +341,7 @@ typedef struct PfPlacement {
 
 // A receiver of log messages, which is called on any thread. The message is valid during the call. The receiver may
 // call the library. On a thread that computes for a session it cannot wait for a frame: pf_session_process,
-// pf_session_warm_up and pf_hologram_preview are refused.
+// pf_session_warm_up and pf_hologram_refocus are refused.
 typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *message);
 
 // A quality level: a method, a resolution and the number of correction steps.

@@ -24,7 +24,7 @@ const LEVELS: [LogLevel; 4] = [LogLevel::Error, LogLevel::Warning, LogLevel::Inf
 
 /// A receiver of log messages, which is called on any thread. The message is valid during the call. The receiver may
 /// call the library. On a thread that computes for a session it cannot wait for a frame: pf_session_process,
-/// pf_session_warm_up and pf_hologram_preview are refused.
+/// pf_session_warm_up and pf_hologram_refocus are refused.
 pub type PfOnLog = Option<unsafe extern "C" fn(context: *mut c_void, level: PfLogLevel, message: *const c_char)>;
 
 struct Listener {

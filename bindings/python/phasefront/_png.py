@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import secrets
+import stat
 import struct
-import tempfile
 import zlib
 from pathlib import Path
 
@@ -17,7 +18,8 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def write(path: Path, image: NDArray[numpy.uint8], keyword: str, text: str) -> None:
-    """Writes `image`, (H, W, 3) or (H, W, 1), with `text` under `keyword`, both Latin-1. The write is atomic."""
+    """Writes `image`, (H, W, 3) or (H, W, 1), with `text` under `keyword`, both Latin-1. The write is atomic. A file
+    that is replaced keeps its permissions."""
     height, width, colours = image.shape
     rows = numpy.zeros((height, 1 + colours * width), numpy.uint8)  # each row begins with its filter type: 0, none
     rows[:, 1:] = image.reshape(height, -1)
@@ -27,10 +29,13 @@ def write(path: Path, image: NDArray[numpy.uint8], keyword: str, text: str) -> N
         (b"IDAT", zlib.compress(rows.data)),
         (b"IEND", b""),
     ]
-    handle, beside = tempfile.mkstemp(prefix=".phasefront-", dir=path.parent)
+    beside = path.parent / f".phasefront-{secrets.token_hex(6)}.tmp"
+    file = open(beside, "xb")  # `tempfile` would make it private
     try:
-        with os.fdopen(handle, "wb") as file:
+        with file:
             file.write(b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks))
+        if path.exists():
+            os.chmod(beside, stat.S_IMODE(path.stat().st_mode))
         os.replace(beside, path)
     except BaseException:
         os.unlink(beside)

@@ -93,21 +93,32 @@ class QualityChanged:
 Event: TypeAlias = Processed | Dropped | Failed | QualityChanged
 
 
+def _call(handler: Callable[..., object], *arguments: object) -> None:
+    """Calls a handler of the user. What it raises becomes an `Exception`: the generated code catches no other, and
+    ctypes would report success."""
+    try:
+        handler(*arguments)
+    except Exception:
+        raise
+    except BaseException as error:
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
+
+
 class _Listener(_ffi.SessionListener):
     def __init__(self, tell: Callable[[Event], object], purpose: Purpose):
         self._tell, self._purpose = tell, purpose
 
     def on_processed(self, hologram: _ffi.RawHologram) -> None:
-        self._tell(Processed(Hologram(hologram, self._purpose)))
+        _call(self._tell, Processed(Hologram(hologram, self._purpose)))
 
     def on_dropped(self, timestamp_ns: int, reason: DropReason) -> None:
-        self._tell(Dropped(timestamp_ns, reason))
+        _call(self._tell, Dropped(timestamp_ns, reason))
 
     def on_failed(self, timestamp_ns: int, message: str) -> None:
-        self._tell(Failed(timestamp_ns, message))
+        _call(self._tell, Failed(timestamp_ns, message))
 
     def on_quality_changed(self, timestamp_ns: int, change: QualityChange) -> None:
-        self._tell(QualityChanged(timestamp_ns, change))
+        _call(self._tell, QualityChanged(timestamp_ns, change))
 
     def on_closed(self) -> None:
         """Does nothing: Python keeps the listener as long as it is needed."""
@@ -284,7 +295,7 @@ class _LogHandler(_ffi.LogListener):
         self._handle = handle
 
     def on_log(self, level: LogLevel, message: str) -> None:
-        self._handle(level, message)
+        _call(self._handle, level, message)
 
 
 def send_log(level: LogLevel, handler: Callable[[LogLevel, str], object] | None) -> None:
@@ -298,10 +309,10 @@ class _StageHandler(_ffi.StageListener):
         self._handle = handle
 
     def on_begin(self, stage: Stage) -> None:
-        self._handle(stage, True)
+        _call(self._handle, stage, True)
 
     def on_end(self, stage: Stage) -> None:
-        self._handle(stage, False)
+        _call(self._handle, stage, False)
 
 
 def send_stages(handler: Callable[[Stage, bool], object] | None) -> None:

@@ -56,6 +56,21 @@ def test_a_file_has_the_levels_and_what_they_are_for(display, tmp_path):
     assert os.listdir(tmp_path) == ["hologram.png"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="permissions of Unix")
+def test_a_new_file_has_the_permissions_of_others_and_a_replaced_one_its_own(display, tmp_path):
+    path = tmp_path / "hologram.png"
+    before = os.umask(0o022)
+    try:
+        saved(path, target=display)
+        assert path.stat().st_mode & 0o777 == 0o644
+        path.chmod(0o600)
+        saved(path, target=display)
+        assert path.stat().st_mode & 0o777 == 0o600
+    finally:
+        os.umask(before)
+    assert os.listdir(tmp_path) == ["hologram.png"]
+
+
 def test_a_table_travels_and_a_calibration_is_named(display, tmp_path):
     table = bytes(range(255, -1, -1))
     saved(str(tmp_path / "table.png"), target=Target.with_look_up_table(display, table), encoding=Encoding.double_phase())

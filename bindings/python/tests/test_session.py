@@ -218,7 +218,7 @@ def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
         events(event)
         raise raised
 
-    for raised in (ValueError("no thanks"), FrameError("no thanks")):
+    for raised in (ValueError("no thanks"), FrameError("no thanks"), SystemExit(3), KeyboardInterrupt()):
         events = Events()
         with Session(options, RunningMode.LIVE, listener) as session:
             for i in range(3):
@@ -226,6 +226,25 @@ def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
                 events.wait(i + 1)
         assert session.statistics().listener_failures == 3
         assert [type(event) for event in events.all] == [Processed] * 3
+
+
+NO_KERNELS = """
+import phasefront
+for call in (lambda: phasefront.Network.from_file("MODEL"), phasefront.session_options):
+    try:
+        call()
+    except phasefront.SettingError as error:
+        print(error)
+"""
+
+
+def test_an_instruction_set_that_the_processor_lacks_is_a_setting_error():
+    model = os.path.join(os.path.dirname(__file__), "../../../models/rgbd-8-int8.onnx")
+    code = NO_KERNELS.replace("MODEL", model)
+    environment = os.environ | {"PHASEFRONT_KERNELS": "nonsense"}
+    run = subprocess.run([sys.executable, "-P", "-c", code], env=environment, capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert [line.split(";")[0] for line in run.stdout.splitlines()] == ["PHASEFRONT_KERNELS: no kernels 'nonsense'"] * 2
 
 
 LEFT_OPEN = """
