@@ -230,9 +230,9 @@ def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
 
 NO_KERNELS = """
 import phasefront
-for call in (lambda: phasefront.Network.from_file("MODEL"), phasefront.session_options):
+for method in (phasefront.Network.from_file("MODEL"), phasefront.Method.sweep()):
     try:
-        call()
+        phasefront.Session(phasefront.session_options(method))
     except phasefront.SettingError as error:
         print(error)
 """

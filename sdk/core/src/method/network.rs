@@ -98,10 +98,8 @@ impl Network {
     ///
     /// # Errors
     /// Returns [`Error::Network`] with the name of the wrong node, tensor or metadata and the expected value, or if the
-    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading allocates at most 4 times the file size plus 200 MB. Returns
-    /// [`Error::Setting`] if the environment names an instruction set that this processor lacks.
+    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading allocates at most 4 times the file size plus 200 MB.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
-        Isa::of_variable().map_err(Error::Setting)?;
         bounds::check(bytes)?;
         let model = proto::Model::decode(bytes)
             .map_err(|why| Error::Network(format!("not an ONNX file, or a truncated one: {why}")))?;
@@ -267,6 +265,7 @@ impl Network {
     /// graph.
     #[doc(hidden)]
     pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
+        Isa::of_variable().map_err(Error::Setting)?;
         match FusedChain::new(&self.chain, None) {
             Ok(chain) => self.fused_plan(height, width, chain),
             #[cfg(feature = "tract")]
