@@ -13,17 +13,42 @@ public enum SessionEvent: Sendable {
 }
 
 /// The events of a live stream, for one reader. At most two holograms wait in the queue. A newer one replaces the
-/// oldest, which is reported as dropped with ``DropReason/unread``, so memory stays constant if the reader is slow.
+/// oldest, which is reported as dropped with ``DropReason/unread``. At most 64 events wait; a newer one replaces the
+/// oldest that is no hologram. So memory stays constant if nobody reads, and ``HologramSession/statistics`` counts every
+/// frame.
 public final class SessionEvents: AsyncSequence, Sendable {
     /// The element type: an event.
     public typealias Element = SessionEvent
 
-    private static let mostHolograms = 2
+    static let mostHolograms = 2
+    static let mostEvents = 64
 
     private struct State {
         var waiting: [SessionEvent] = []
+        var holograms = 0
         var reader: CheckedContinuation<SessionEvent?, Never>?
         var isFinished = false
+
+        /// Adds an event. The time and the memory of a call are bounded.
+        mutating func append(_ event: SessionEvent) {
+            waiting.append(event)
+            if waiting.count > SessionEvents.mostEvents, let oldest = waiting.firstIndex(where: { !$0.isProcessed }) {
+                waiting.remove(at: oldest)
+            }
+            if event.isProcessed { holograms += 1 }
+            if holograms > SessionEvents.mostHolograms, let oldest = waiting.firstIndex(where: \.isProcessed),
+                case .processed(let hologram) = waiting[oldest]
+            {
+                holograms -= 1
+                waiting[oldest] = .dropped(timestampNs: hologram.info.timestampNs, reason: .unread)
+            }
+        }
+
+        mutating func removeFirst() -> SessionEvent {
+            let event = waiting.removeFirst()
+            if event.isProcessed { holograms -= 1 }
+            return event
+        }
     }
 
     private let state = Locked(State())
@@ -35,11 +60,7 @@ public final class SessionEvents: AsyncSequence, Sendable {
                 state.reader = nil
                 return reader
             }
-            state.waiting.append(event)
-            let holograms = state.waiting.indices.filter { state.waiting[$0].isProcessed }
-            if holograms.count > Self.mostHolograms, case .processed(let oldest) = state.waiting[holograms[0]] {
-                state.waiting[holograms[0]] = .dropped(timestampNs: oldest.info.timestampNs, reason: .unread)
-            }
+            state.append(event)
             return nil
         }
         reader?.resume(returning: event)
@@ -60,7 +81,7 @@ public final class SessionEvents: AsyncSequence, Sendable {
             await withCheckedContinuation { continuation in
                 let (answer, earlier): (SessionEvent??, CheckedContinuation<SessionEvent?, Never>?) = state.withLock {
                     state in
-                    if !state.waiting.isEmpty { return (.some(state.waiting.removeFirst()), nil) }
+                    if !state.waiting.isEmpty { return (.some(state.removeFirst()), nil) }
                     if state.isFinished || Task.isCancelled { return (.some(nil), nil) }
                     defer { state.reader = continuation }
                     return (nil, state.reader)

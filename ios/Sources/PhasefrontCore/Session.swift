@@ -13,6 +13,8 @@ public final class HologramSession: Sendable {
     /// modes.
     public let events: SessionEvents
     private let raw: RawSession
+    /// The frames of asynchronous calls.
+    private let queue = DispatchQueue(label: "org.phasefront.session", qos: .userInitiated)
 
     /// Creates a session that runs in `mode`. A live stream calls `listener` on its own thread, one event after
     /// another, and processes no frame during the call. Without a listener, read ``events``.
@@ -50,16 +52,28 @@ public final class HologramSession: Sendable {
                 depth: frame.depthBytes, confidence: frame.confidenceBytes, info: frame.info))
     }
 
-    /// Returns the hologram of `frame`, in an image or a video session, without blocking the caller's thread. The frame's
-    /// memory must stay valid until then.
+    /// Returns the hologram of `frame`, in an image or a video session, without blocking the caller's thread. Frames are
+    /// computed one after another. The frame's memory must stay valid until the call ends. A call whose task is cancelled
+    /// throws `CancellationError`: its frame is not computed unless that has begun, and then it is finished first.
     ///
     /// - Throws: ``PhasefrontError`` if the frame is unusable or late, or if the session is a live stream, paused or closed.
     public func process(_ frame: CameraFrame) async throws -> Hologram {
-        try await withCheckedThrowingContinuation { continuation in
-            DispatchQueue.global(qos: .userInitiated).async {
-                continuation.resume(with: Result { try self.process(frame) })
+        let isCancelled = Locked(false)
+        let hologram = try await withTaskCancellationHandler {
+            try await withCheckedThrowingContinuation { continuation in
+                queue.async {
+                    continuation.resume(
+                        with: Result {
+                            if isCancelled.withLock({ $0 }) { throw CancellationError() }
+                            return try self.process(frame)
+                        })
+                }
             }
+        } onCancel: {
+            isCancelled.withLock { $0 = true }
         }
+        try Task.checkCancellation()
+        return hologram
     }
 
     /// Submits `frame` to a live stream, which copies it. Never waits for a frame to be processed. Returns the reason

@@ -213,6 +213,44 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual([holograms, unread], [2, 6])
     }
 
+    func testEventsThatNobodyReadsTakeBoundedMemory() async throws {
+        let session = try HologramSession(options(), mode: .live)
+        // A paused session drops each frame at once, which is an event.
+        try session.pause()
+        var frame = CameraFrame(
+            timestampNs: 0, colour: ColourImage(format: .rgba, width: 8, height: 6, bytes: Data(count: 4 * 8 * 6)),
+            depth: DepthImage(format: .metresF32, width: 8, height: 6, bytes: Data(count: 4 * 8 * 6)))
+        for i in 1...100_000 as ClosedRange<Int64> {
+            frame.timestampNs = i
+            try session.submit(frame)
+        }
+        session.close()
+        var last: [Int64] = []
+        for await event in session.events {
+            guard case .dropped(let timestampNs, .paused) = event else { return XCTFail("\(event)") }
+            last.append(timestampNs)
+        }
+        XCTAssertEqual(last, Array(99_937...100_000))
+        XCTAssertEqual(session.statistics.dropped.paused, 100_000)
+    }
+
+    func testACancelledCallThrowsAndItsFrameIsNotComputed() async throws {
+        let session = try HologramSession(options(), mode: .image)
+        let calls = (1...8 as ClosedRange<Int64>).map { i in
+            Task { try await session.process(still(timestampNs: i)) }
+        }
+        calls.forEach { $0.cancel() }
+        for call in calls {
+            do {
+                _ = try await call.value
+                XCTFail("a cancelled call returned a hologram")
+            } catch is CancellationError {}
+        }
+        // One at most had begun.
+        XCTAssertLessThanOrEqual(session.statistics.processed, 1)
+        _ = try await session.process(still())
+    }
+
     func testACancelledReaderEnds() async throws {
         let session = try HologramSession(options(), mode: .live)
         let reading = Task { for await _ in session.events {} }

@@ -1,11 +1,13 @@
 package org.phasefront
 
 import com.sun.jna.Native
-import java.util.ArrayDeque
+import kotlinx.coroutines.CancellationException
 import kotlinx.coroutines.Dispatchers
 import kotlinx.coroutines.channels.Channel
 import kotlinx.coroutines.flow.Flow
 import kotlinx.coroutines.flow.flow
+import kotlinx.coroutines.sync.Mutex
+import kotlinx.coroutines.sync.withLock
 import kotlinx.coroutines.withContext
 
 /**
@@ -29,6 +31,9 @@ public class HologramSession(
     listener: ((SessionEvent) -> Unit)? = null,
 ) : AutoCloseable {
     private val queue = EventQueue()
+
+    /** Belongs to the frame of [process] that is computed. */
+    private val turn = Mutex()
     private val raw: RawSession = when {
         listener != null -> RawSession(options, mode, Listener(listener))
         mode == RunningMode.LIVE -> RawSession(options, mode, Listener(queue::push, queue::finish))
@@ -42,20 +47,32 @@ public class HologramSession(
     /**
      * The events of a live stream, for one reader. Empty if the session has a listener, and in the other running modes.
      * At most two holograms wait in the queue. A newer one replaces the oldest, which is reported as dropped with
-     * [DropReason.UNREAD], so memory stays constant if the reader is slow.
+     * [DropReason.UNREAD]. At most 64 events wait; a newer one replaces the oldest that is no hologram. So memory stays
+     * constant if nobody reads, and [statistics] counts every frame.
      */
     public val events: Flow<SessionEvent> = flow {
         while (true) emit(queue.take() ?: break)
     }
 
     /**
-     * Returns the hologram of [frame], in an image or a video session, without blocking the caller's thread. The frame's
-     * memory must stay valid until then.
+     * Returns the hologram of [frame], in an image or a video session, without blocking the caller's thread. Frames are
+     * computed one after another. The frame's memory must stay valid until the call ends. A call that is cancelled throws
+     * `CancellationException`: at once while its frame waits for an earlier one, which is then not computed, otherwise
+     * when its frame is done.
      *
      * @throws PhasefrontException if the frame is unusable or late, or if the session is a live stream, paused or
      * closed. Later frames are not affected.
      */
-    public suspend fun process(frame: CameraFrame): Hologram = withContext(Dispatchers.Default) { processBlocking(frame) }
+    public suspend fun process(frame: CameraFrame): Hologram = turn.withLock {
+        var made: Hologram? = null
+        try {
+            withContext(Dispatchers.Default) { processBlocking(frame).also { made = it } }
+        } catch (cancelled: CancellationException) {
+            // Nobody receives the hologram.
+            made?.close()
+            throw cancelled
+        }
+    }
 
     /**
      * Returns the hologram of [frame], in an image or a video session. Blocks until it is done.
@@ -194,7 +211,7 @@ private class Listener(
     }
 }
 
-/** A queue of events for one reader. */
+/** A queue of events for one reader. Its length is bounded, and with it the memory and the time of a call. */
 internal class EventQueue {
     private val waiting = ArrayDeque<SessionEvent>()
     private var holograms = 0
@@ -202,27 +219,30 @@ internal class EventQueue {
     private val changed = Channel<Unit>(Channel.CONFLATED)
 
     fun push(event: SessionEvent) {
-        val given = synchronized(waiting) {
-            if (finished) return@synchronized event
-            waiting.add(event)
-            if (event !is SessionEvent.Processed || ++holograms <= MOST_HOLOGRAMS) return@synchronized null
-            holograms--
-            val oldest = waiting.first { it is SessionEvent.Processed } as SessionEvent.Processed
-            val dropped = SessionEvent.Dropped(oldest.hologram.info.timestampNs, DropReason.UNREAD)
-            val kept = waiting.map { if (it === oldest) dropped else it }
-            waiting.clear()
-            waiting.addAll(kept)
-            oldest
-        }
-        (given as? SessionEvent.Processed)?.hologram?.close()
+        val unread = synchronized(waiting) { if (finished) event.hologram else add(event) }
+        unread?.close()
         changed.trySend(Unit)
     }
+
+    /** Adds [event] and returns the hologram that had to go, if any. */
+    private fun add(event: SessionEvent): Hologram? {
+        waiting.addLast(event)
+        if (waiting.size > MOST_EVENTS) waiting.removeAt(waiting.indexOfFirst { it !is SessionEvent.Processed })
+        if (event !is SessionEvent.Processed || ++holograms <= MOST_HOLOGRAMS) return null
+        holograms--
+        val oldest = waiting.indexOfFirst { it is SessionEvent.Processed }
+        val unread = waiting[oldest].hologram
+        unread?.let { waiting[oldest] = SessionEvent.Dropped(it.info.timestampNs, DropReason.UNREAD) }
+        return unread
+    }
+
+    private val SessionEvent.hologram: Hologram? get() = (this as? SessionEvent.Processed)?.hologram
 
     /** Waits for the next event. Returns null after the last one. */
     suspend fun take(): SessionEvent? {
         while (true) {
             synchronized(waiting) {
-                waiting.poll()?.let {
+                waiting.removeFirstOrNull()?.let {
                     if (it is SessionEvent.Processed) holograms--
                     return it
                 }
@@ -240,5 +260,6 @@ internal class EventQueue {
 
     private companion object {
         const val MOST_HOLOGRAMS = 2
+        const val MOST_EVENTS = 64
     }
 }

@@ -18,6 +18,9 @@ import kotlin.test.assertFalse
 import kotlin.test.assertIs
 import kotlin.test.assertNull
 import kotlin.test.assertTrue
+import kotlinx.coroutines.CancellationException
+import kotlinx.coroutines.Dispatchers
+import kotlinx.coroutines.async
 import kotlinx.coroutines.flow.toList
 import kotlinx.coroutines.runBlocking
 
@@ -254,6 +257,33 @@ class SessionTest {
         assertEquals(8, events.size)
         assertEquals(2, events.count { it is SessionEvent.Processed })
         assertEquals(6, events.count { it is SessionEvent.Dropped && it.reason == DropReason.UNREAD })
+    }
+
+    @Test
+    fun eventsThatNobodyReadsTakeBoundedMemory() = runBlocking {
+        val session = HologramSession(options(), RunningMode.LIVE)
+        // A paused session drops each frame at once, which is an event.
+        session.pause()
+        val colour = ColourImage(ColourFormat.RGBA, 8, 6, direct(4 * 8 * 6))
+        val depth = DepthImage(DepthFormat.METRES_F32, 8, 6, direct(4 * 8 * 6))
+        for (i in 1L..100_000L) session.submit(CameraFrame(i, colour, depth))
+        session.close()
+        assertEquals((99_937L..100_000L).map { SessionEvent.Dropped(it, DropReason.PAUSED) }, session.events.toList())
+        assertEquals(100_000, session.statistics.dropped.paused.toInt())
+    }
+
+    @Test
+    fun aCancelledCallThrowsAndItsFrameIsNotComputed() = runBlocking {
+        image { session ->
+            runBlocking {
+                val calls = (1L..8L).map { async(Dispatchers.Default) { session.process(still(it)) } }
+                calls.forEach { it.cancel() }
+                calls.forEach { assertFailsWith<CancellationException> { it.await() } }
+            }
+            // One at most had begun.
+            assertTrue(session.statistics.processed.toInt() <= 1, "${session.statistics.processed} frames were computed")
+            runBlocking { session.process(still()) }.close()
+        }
     }
 
     @Test
