@@ -1,17 +1,29 @@
 @_exported import Foundation
 
-public final class CGColorSpace: @unchecked Sendable {
-    public init?(name: CFString) { fatalError() }
-    public static let sRGB: CFString = ""
-}
 public typealias CFString = String
-public func CGColorSpaceCreateDeviceRGB() -> CGColorSpace { fatalError() }
+public typealias CFData = Data
+public typealias CFDictionary = [AnyHashable: Any]
+public final class CGColorSpace: @unchecked Sendable {
+    public init?(name: CFString) {}
+    init() {}
+    public static let sRGB: CFString = "sRGB"
+}
+public func CGColorSpaceCreateDeviceRGB() -> CGColorSpace { CGColorSpace() }
+public func CGColorSpaceCreateDeviceGray() -> CGColorSpace { CGColorSpace() }
 public typealias CGDataProviderReleaseDataCallback = @convention(c) (UnsafeMutableRawPointer?, UnsafeRawPointer, Int) -> Void
+/// Calls `releaseData` once, when it is released.
+/// https://developer.apple.com/documentation/coregraphics/cgdataproviderreleasedatacallback
 public final class CGDataProvider {
+    private let release: () -> Void
+
     public init?(
         dataInfo: UnsafeMutableRawPointer?, data: UnsafeRawPointer, size: Int,
         releaseData: @escaping CGDataProviderReleaseDataCallback
-    ) { fatalError() }
+    ) {
+        release = { releaseData(dataInfo, data, size) }
+    }
+
+    deinit { release() }
 }
 public enum CGImageAlphaInfo: UInt32, Sendable { case none, noneSkipLast, noneSkipFirst }
 public struct CGBitmapInfo: OptionSet, Sendable {
@@ -21,9 +33,37 @@ public struct CGBitmapInfo: OptionSet, Sendable {
 }
 public enum CGColorRenderingIntent: Int32, Sendable { case defaultIntent }
 public final class CGImage: @unchecked Sendable {
+    public let width, height: Int
+    private let provider: CGDataProvider?
+
     public init?(
         width: Int, height: Int, bitsPerComponent: Int, bitsPerPixel: Int, bytesPerRow: Int, space: CGColorSpace,
         bitmapInfo: CGBitmapInfo, provider: CGDataProvider, decode: UnsafePointer<CGFloat>?, shouldInterpolate: Bool,
         intent: CGColorRenderingIntent
-    ) { fatalError() }
+    ) {
+        guard bytesPerRow >= width * bitsPerPixel / 8 else { return nil }
+        (self.width, self.height, self.provider) = (width, height, provider)
+    }
+
+    /// An image of a file, which is not read.
+    public init(ofFileWith width: Int, _ height: Int) { (self.width, self.height, provider) = (width, height, nil) }
 }
+public final class CGContext {
+    private let memory: UnsafeMutableRawPointer?
+    private let size: Int
+
+    public init?(
+        data: UnsafeMutableRawPointer?, width: Int, height: Int, bitsPerComponent: Int, bytesPerRow: Int,
+        space: CGColorSpace, bitmapInfo: UInt32
+    ) {
+        (memory, size) = (data, bytesPerRow * height)
+    }
+
+    public func draw(_: CGImage, in _: CGRect) {
+        for i in 0..<size { memory?.storeBytes(of: UInt8(truncatingIfNeeded: i / 4 % 251), toByteOffset: i, as: UInt8.self) }
+    }
+}
+
+// What Foundation has on Apple's systems alone.
+extension URL { public static var documentsDirectory: URL { FileManager.default.temporaryDirectory } }
+extension ProcessInfo { public var isLowPowerModeEnabled: Bool { false } }

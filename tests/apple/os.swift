@@ -26,6 +26,9 @@ public struct OSSignpostID: Sendable { public init(log: OSLog, object: AnyObject
 public func os_signpost(_: OSSignpostType, log: OSLog, name: StaticString, signpostID: OSSignpostID) {}
 extension ProcessInfo {
     public enum ThermalState: Int, Sendable { case nominal, fair, serious, critical }
-    public var thermalState: ThermalState { fatalError() }
-    public static var thermalStateDidChangeNotification: Notification.Name { fatalError() }
+    /// The state that a test sets, and whose change it posts:
+    /// https://developer.apple.com/documentation/foundation/processinfo/thermalstatedidchangenotification
+    nonisolated(unsafe) public static var thermal = ThermalState.nominal
+    public var thermalState: ThermalState { Self.thermal }
+    public static var thermalStateDidChangeNotification: Notification.Name { Notification.Name("NSProcessInfoThermalStateDidChange") }
 }

@@ -15,6 +15,11 @@ final class PixelBuffers: @unchecked Sendable {
         self.pool = pool
     }
 
+    /// Releases the buffers that nothing shows.
+    func flush() {
+        if let pool { CVPixelBufferPoolFlush(pool, .excessBuffers) }
+    }
+
     func next() throws -> CVPixelBuffer {
         var buffer: CVPixelBuffer?
         if let pool { CVPixelBufferPoolCreatePixelBuffer(nil, pool, &buffer) }

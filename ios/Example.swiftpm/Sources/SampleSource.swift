@@ -1,59 +1,23 @@
-import ARKit
 import Phasefront
 import UIKit
 
-/// A source of frames.
-@MainActor
-protocol FrameSource {
-    /// Submits frames to `session` until `stop()`.
-    func start(_ session: HologramSession)
-    func stop()
-}
-
-/// A source of colour and depth from ARKit, on devices with LiDAR.
-final class CameraSource: NSObject, FrameSource, ARSessionDelegate {
-    static var isSupported: Bool { ARWorldTrackingConfiguration.supportsFrameSemantics(.smoothedSceneDepth) }
-
-    private let camera = ARSession()
-    /// The session, written before the camera runs and read on its queue.
-    nonisolated(unsafe) private var session: HologramSession?
-
-    func start(_ session: HologramSession) {
-        self.session = session
-        let configuration = ARWorldTrackingConfiguration()
-        configuration.frameSemantics.insert(.smoothedSceneDepth)
-        camera.delegate = self
-        camera.delegateQueue = DispatchQueue(label: "camera")
-        camera.run(configuration)
-    }
-
-    func stop() { camera.pause() }
-
-    nonisolated func session(_: ARSession, didUpdate frame: ARFrame) {
-        do {
-            try session?.submit(frame)
-        } catch {
-            print(error.localizedDescription)
-        }
-    }
-}
-
-/// A source for devices without LiDAR: a window that moves over the project's sample scene, 30 times per second.
-final class SampleSource: FrameSource {
+/// A source for devices without depth: a window that moves over the project's sample scene, 30 times per second.
+final class SampleSource: FrameSource, @unchecked Sendable {
+    /// Why it is not the camera.
+    private let why: String
+    /// Written before it runs.
     private var task: Task<Void, Never>?
 
-    func start(_ session: HologramSession) {
-        task = Task.detached {
-            guard let scene = SampleScene() else { return }
+    init(why: String) { self.why = why }
+
+    func start(_ feed: Feed) {
+        task = Task.detached { [why] in
+            guard let scene = SampleScene() else { return feed.tell(.failed("the app lacks its sample scene")) }
             var step = 0
             while !Task.isCancelled {
-                do {
-                    try session.submit(scene.frame(step))
-                    try await Task.sleep(nanoseconds: 33_000_000)
-                } catch {
-                    return
-                }
+                feed.frame("Sample scene: \(why)") { try $0.submit(scene.frame(step)) }
                 step += 1
+                try? await Task.sleep(nanoseconds: 33_000_000)
             }
         }
     }
