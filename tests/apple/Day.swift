@@ -10,6 +10,7 @@ import os
 struct Day {
     static func main() async {
         let plays: [(String, @MainActor () async throws -> Void)] = [
+            ("events lead from state to state", states),
             ("the first launch asks, and the camera starts after yes", firstLaunch),
             ("a denied camera is said, and works once it is allowed", denied),
             ("permission that is taken away is said", revoked),
@@ -87,6 +88,27 @@ private func opened(lidar: Bool) async throws -> App {
     app.open()
     try await app.shows(lidar ? lidarCamera : dualCamera)
     return app
+}
+
+/// Android's sample has the same table, in SourceStateTest.kt.
+@MainActor
+private func states() {
+    let states: [SourceState] = [
+        .stopped, .waitingForPermission(to: "x"), .starting, .running("a"), .interrupted("a"), .failed("a"),
+    ]
+    func check(_ event: SourceEvent, _ letters: String) {
+        let told = states.map { state -> String in
+            let next = state.after(event)
+            return next == state ? "." : "\(next)".prefix(1).uppercased()
+        }
+        if told.joined() != letters { fail("\(event) leads to \(told.joined()), not to \(letters)") }
+    }
+    check(.asked(to: "y"), "WWWWWW")
+    check(.started, "SS.SSS")
+    check(.stopped, ".SSSSS")
+    check(.frame("b"), "..RRR.")
+    check(.interrupted("b"), "..III.")
+    check(.failed("b"), "..FFF.")
 }
 
 @MainActor
