@@ -1,22 +1,35 @@
 #!/usr/bin/env bash
 # Builds PhasefrontFFI.xcframework for Package.swift, on Linux or a Mac: for devices, the simulator and macOS. A static
 # library of Rust needs neither a linker nor an SDK; on Linux zig assembles what dependencies bring, and LLVM joins the
-# processors. `ios/build-xcframework.sh [--kernels-only] [--release] [PLATFORM…]` takes the platforms ios, simulator and
-# macos, by default all. --kernels-only leaves out tract and the GPU (docs/ios.md). --release also zips the framework and
-# prints the checksum for the Package.swift at the root. PHASEFRONT_PROFILE names another cargo profile than `mobile`.
+# processors. `ios/build-xcframework.sh [--full] [--c] [--release] [PLATFORM…]` takes the platforms ios, simulator and
+# macos, by default all. --full adds tract and the GPU (docs/ios.md). --c builds PhasefrontC.xcframework instead, for C, C++
+# and Unity. --release also zips the framework and prints the checksum for the Package.swift at the root.
+# PHASEFRONT_PROFILE names another cargo profile than `mobile`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-features=(--features gpu)
+features=(--no-default-features --features built-in-network)
+name=PhasefrontFFI
+crate=phasefront-ffi
+headers=(ios/Generated/{PhasefrontFFI.h,module.modulemap})
+full=
 zip=
 platforms=()
 for argument; do
     case $argument in
-    --kernels-only) features=(--no-default-features --features built-in-network) ;;
+    --full)
+        features=(--no-default-features --features built-in-network,tract,gpu)
+        full=-full
+        ;;
+    --c)
+        name=PhasefrontC
+        crate=phasefront-c
+        headers=(bindings/c/include/phasefront.h{,pp})
+        ;;
     --release) zip=1 ;;
     ios | simulator | macos) platforms+=("$argument") ;;
     *)
-        echo 'usage: ios/build-xcframework.sh [--kernels-only] [--release] [ios] [simulator] [macos]' >&2
+        echo 'usage: ios/build-xcframework.sh [--full] [--c] [--release] [ios] [simulator] [macos]' >&2
         exit 2
         ;;
     esac
@@ -38,7 +51,8 @@ done
 export IPHONEOS_DEPLOYMENT_TARGET=16.0 MACOSX_DEPLOYMENT_TARGET=13.0
 built="${CARGO_TARGET_DIR:-target}"
 build="$built/xcframework"
-framework=ios/PhasefrontFFI.xcframework
+framework=ios/$name.xcframework
+binary=lib${crate//-/_}.a
 rm -rf "$build" "$framework"
 mkdir -p "$build" "$framework"
 
@@ -66,31 +80,32 @@ for target in "${targets[@]}"; do
         rustup component add rust-src
         standard=(-Z build-std=std,panic_unwind)
     }
-    ${standard:+env RUSTC_BOOTSTRAP=1} cargo rustc "${standard[@]}" --profile "$profile" --package phasefront-ffi "${features[@]}" --target "$target" --crate-type staticlib
-    library="$built/$target/${profile/#dev/debug}/libphasefront_ffi.a"
+    ${standard:+env RUSTC_BOOTSTRAP=1} cargo rustc "${standard[@]}" --profile "$profile" --package $crate "${features[@]}" --target "$target" --crate-type staticlib
+    library="$built/$target/${profile/#dev/debug}/$binary"
     mkdir -p "$build/$target"
     cp "$library" "$build/$target/"
-    release/without-bitcode "$build/$target/libphasefront_ffi.a"
+    release/without-bitcode "$build/$target/$binary"
 done
-ios/required-reasons "$build/${targets[0]}/libphasefront_ffi.a"
+ios/required-reasons "$build/${targets[0]}/$binary"
 
 # Adds a folder of the framework: `slice PLATFORM VARIANT TARGET…` joins the processors of the targets.
 slice() {
-    local platform=$1 variant=$2 libraries=() processors=() target name
+    local platform=$1 variant=$2 libraries=() processors=() target slice
     shift 2
     for target; do
-        libraries+=("$build/$target/libphasefront_ffi.a")
+        libraries+=("$build/$target/$binary")
         processors+=("$([[ $target = aarch64* ]] && echo arm64 || echo x86_64)")
     done
-    name="$platform-$(IFS=_ && echo "${processors[*]}")${variant:+-$variant}"
+    slice="$platform-$(IFS=_ && echo "${processors[*]}")${variant:+-$variant}"
     # The headers have a folder of their own, because the module maps of several frameworks would collide in one.
-    mkdir -p "$framework/$name/Headers/PhasefrontFFI"
-    cp ios/Generated/PhasefrontFFI.h ios/Generated/module.modulemap "$framework/$name/Headers/PhasefrontFFI/"
-    "$lipo" -create "${libraries[@]}" -output "$framework/$name/libphasefront_ffi.a"
+    mkdir -p "$framework/$slice/Headers/$name"
+    cp "${headers[@]}" "$framework/$slice/Headers/$name/"
+    [ $name != PhasefrontC ] || printf 'module PhasefrontC {\n    header "phasefront.h"\n    export *\n}\n' >"$framework/$slice/Headers/$name/module.modulemap"
+    "$lipo" -create "${libraries[@]}" -output "$framework/$slice/$binary"
     {
         printf '    <dict>\n'
-        printf '      <key>%s</key>\n      <string>%s</string>\n' BinaryPath libphasefront_ffi.a HeadersPath Headers \
-            LibraryIdentifier "$name" LibraryPath libphasefront_ffi.a
+        printf '      <key>%s</key>\n      <string>%s</string>\n' BinaryPath "$binary" HeadersPath Headers \
+            LibraryIdentifier "$slice" LibraryPath "$binary"
         printf '      <key>SupportedArchitectures</key>\n      <array>\n'
         printf '        <string>%s</string>\n' "${processors[@]}"
         printf '      </array>\n      <key>SupportedPlatform</key>\n      <string>%s</string>\n' "$platform"
@@ -125,7 +140,7 @@ END
 cp LICENSE-MIT LICENSE-APACHE THIRD-PARTY.md ios/Sources/PhasefrontCore/PrivacyInfo.xcprivacy "$framework/"
 
 if [ -n "$zip" ]; then
-    file="$build/PhasefrontFFI.xcframework.zip"
+    file="$build/$name$full.xcframework.zip"
     # The same files give the same checksum, which is SHA-256, as from `swift package compute-checksum`.
     python3 - "$framework" "$file" <<'END'
 import hashlib

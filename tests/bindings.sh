@@ -21,7 +21,7 @@ install() {
     need apt-get || return 1
     (
         flock 9
-        get() { as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq "$@" >/dev/null 2>&1; }
+        get() { as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=600 "$@" >/dev/null 2>&1; }
         get install -y --no-install-recommends "$@" || { get update && get install -y --no-install-recommends "$@"; }
     ) 9>"$cache/install.lock"
 }

@@ -1,6 +1,8 @@
 // The Gradle library: the Kotlin API over the generated code, and libphasefront_ffi.so for two ABIs. Needs cargo,
 // cargo-ndk 4 and NDK r28 or later, which aligns libraries to pages of 16 KB.
 import com.vanniktech.maven.publish.AndroidSingleVariantLibrary
+import org.jetbrains.kotlin.gradle.dsl.JvmTarget
+import org.jetbrains.kotlin.gradle.dsl.KotlinVersion
 
 plugins {
     alias(libs.plugins.android.library)
@@ -16,18 +18,24 @@ val phasefrontVersion = ofCargo("version")
 group = "org.phasefront"
 version = phasefrontVersion
 
+// gradle.properties says what the two artefacts have.
+val isFull = providers.gradleProperty("phasefront.full").map(String::toBoolean).get()
+val artefact = if (isFull) "phasefront-full" else "phasefront"
+val features = if (isFull) "built-in-network,tract,gpu" else "built-in-network"
+
 val libraries = layout.buildDirectory.dir("rust/jniLibs")
 val generated = layout.buildDirectory.dir("generated/uniffi")
 
 val buildRust by tasks.registering(Exec::class) {
     description = "Builds libphasefront_ffi.so for the phones' ABIs."
     workingDir = workspace
+    inputs.property("features", features)
     inputs.files(fileTree(workspace) { include("Cargo.*", "bindings/src/**", "bindings/Cargo.toml", "sdk/**", "models/*.onnx") })
     outputs.dir(libraries)
     commandLine(
         "cargo", "ndk", "--target", "arm64-v8a", "--target", "x86_64", "--platform", "26",
         "--output-dir", libraries.get().asFile.path, "build", "--profile", "mobile", "--package", "phasefront-ffi",
-        "--features", "gpu",
+        "--no-default-features", "--features", features,
     )
 }
 
@@ -73,7 +81,15 @@ android {
     packaging { jniLibs.useLegacyPackaging = false }
 }
 
-kotlin { compilerOptions { jvmTarget.set(org.jetbrains.kotlin.gradle.dsl.JvmTarget.JVM_17) } }
+kotlin {
+    // Apps with this Kotlin or a later one can use the library.
+    coreLibrariesVersion = libs.versions.kotlin.least.get()
+    compilerOptions {
+        jvmTarget.set(JvmTarget.JVM_17)
+        languageVersion.set(KotlinVersion.KOTLIN_2_2)
+        apiVersion.set(KotlinVersion.KOTLIN_2_2)
+    }
+}
 
 tasks.named("preBuild") { dependsOn(generateKotlin) }
 
@@ -88,7 +104,7 @@ mavenPublishing {
     configure(AndroidSingleVariantLibrary("release", sourcesJar = true, publishJavadocJar = true))
     publishToMavenCentral()
     signAllPublications()
-    coordinates("org.phasefront", "phasefront", phasefrontVersion)
+    coordinates("org.phasefront", artefact, phasefrontVersion)
     pom {
         name.set("Phasefront")
         description.set("RGB-D frames to phase-only 3D holograms, on the device")

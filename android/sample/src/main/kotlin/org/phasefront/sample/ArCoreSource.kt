@@ -1,70 +1,136 @@
 package org.phasefront.sample
 
+import android.app.Activity
 import android.content.Context
+import android.hardware.camera2.CameraAccessException
 import android.hardware.camera2.CameraCharacteristics
 import android.hardware.camera2.CameraManager
-import android.opengl.EGL14
-import android.opengl.EGLConfig
-import android.opengl.GLES20
+import com.google.ar.core.ArCoreApk
 import com.google.ar.core.CameraIntrinsics
 import com.google.ar.core.Config
 import com.google.ar.core.Frame
 import com.google.ar.core.Session
+import com.google.ar.core.TrackingFailureReason
 import com.google.ar.core.exceptions.CameraNotAvailableException
+import com.google.ar.core.exceptions.DeadlineExceededException
+import com.google.ar.core.exceptions.FatalException
+import com.google.ar.core.exceptions.NotTrackingException
 import com.google.ar.core.exceptions.NotYetAvailableException
+import com.google.ar.core.exceptions.ResourceExhaustedException
+import com.google.ar.core.exceptions.UnavailableApkTooOldException
+import com.google.ar.core.exceptions.UnavailableDeviceNotCompatibleException
 import com.google.ar.core.exceptions.UnavailableException
+import com.google.ar.core.exceptions.UnavailableUserDeclinedInstallationException
+import java.util.concurrent.CountDownLatch
+import java.util.concurrent.TimeUnit
 import kotlin.concurrent.thread
 import org.phasefront.ArIntrinsics
 import org.phasefront.CameraFrame
-import org.phasefront.Orientation
 import org.phasefront.arCameras
 import org.phasefront.sensorOrientation
 import org.phasefront.toColourImage
 import org.phasefront.toDepthImage
 
-/** A source of colour and raw depth with its confidence by ARCore, which computes depth on phones without a depth camera. */
-class ArCoreSource private constructor(private val session: Session, private val orientation: Orientation) : FrameSource {
-    @Volatile private var running = false
+/**
+ * A source of colour and raw depth with its confidence by ARCore, which computes depth on phones without a depth camera.
+ * Check [ArCore.prepare] first. [displayDegrees] is the display's rotation.
+ */
+class ArCoreSource(private val context: Context, private val displayDegrees: () -> Int) : FrameSource {
+    private val closed = CountDownLatch(1)
+    private var worker: Thread? = null
+    private val isOpen: Boolean get() = closed.count > 0
 
-    override fun start(onFrame: (CameraFrame) -> Unit, onError: (String) -> Unit) {
-        running = true
-        thread(name = "ARCore") {
+    override fun start(listener: FrameSource.Listener) {
+        worker = thread(name = "ARCore") {
             try {
-                onTexture { frames(onFrame) }
-            } catch (_: CameraNotAvailableException) {
-                onError("the camera is used by another app")
-            } finally {
-                session.close()
+                val session = session()
+                try {
+                    CameraTexture().use { Frames(session, listener).run(it.name) }
+                } finally {
+                    session.close()
+                }
+            } catch (refused: UnavailableException) {
+                listener.onFailed(ArCore.reason(refused))
+            } catch (_: SecurityException) {
+                listener.onFailed("the app may not use the camera")
+            } catch (lost: CameraAccessException) {
+                listener.onFailed("the camera does not answer (${lost.message})")
+            } catch (broken: RuntimeException) {
+                // ARCore's own exceptions are unchecked, and none of them may end the app.
+                listener.onFailed("ARCore failed (${broken.message ?: broken.javaClass.simpleName})")
             }
         }
     }
 
-    /** Each update waits for the next image of the camera. */
-    private fun frames(onFrame: (CameraFrame) -> Unit) {
-        session.resume()
-        var last = 0L
-        while (running) {
-            val frame = session.update()
-            if (frame.timestamp <= last) continue
-            last = frame.timestamp
-            try {
-                take(frame, onFrame)
-            } catch (_: NotYetAvailableException) {
-                // Depth needs a few moving images first.
-            }
+    /** Opens a session with raw depth. */
+    private fun session(): Session {
+        val session = Session(context)
+        if (!session.isDepthModeSupported(Config.DepthMode.RAW_DEPTH_ONLY)) {
+            session.close()
+            throw UnavailableDeviceNotCompatibleException()
         }
-        session.pause()
+        val config = Config(session).setDepthMode(Config.DepthMode.RAW_DEPTH_ONLY).setFocusMode(Config.FocusMode.AUTO)
+            .setUpdateMode(Config.UpdateMode.BLOCKING)
+        session.configure(config)
+        return session
     }
 
-    private fun take(frame: Frame, onFrame: (CameraFrame) -> Unit) {
-        frame.acquireCameraImage().use { image ->
-            frame.acquireRawDepthImage16Bits().use { raw ->
-                frame.acquireRawDepthConfidenceImage().use { confidence ->
-                    val colour = image.toColourImage()
-                    val depth = raw.toDepthImage(confidence)
-                    val camera = frame.camera
-                    val cameras = arCameras(camera.imageIntrinsics.numbers(), colour, camera.textureIntrinsics.numbers(), depth)
-                    onFrame(CameraFrame(frame.timestamp, colour, depth, orientation, cameras))
+    /** The frames of a session. */
+    private inner class Frames(private val session: Session, private val listener: FrameSource.Listener) {
+        private val sensorDegrees = context.getSystemService(CameraManager::class.java)
+            .getCameraCharacteristics(session.cameraConfig.cameraId).get(CameraCharacteristics.SENSOR_ORIENTATION) ?: 0
+
+        /** Takes frames until the source is closed. Where another app takes the camera, tries again each second. */
+        fun run(texture: Int) {
+            session.setCameraTextureName(texture)
+            while (isOpen) {
+                try {
+                    session.resume()
+                    try {
+                        take()
+                    } finally {
+                        session.pause()
+                    }
+                } catch (_: CameraNotAvailableException) {
+                    listener.onInterrupted("another app uses the camera")
+                    closed.await(1, TimeUnit.SECONDS)
+                }
+            }
+        }
+
+        /** Each update waits for the next image of the camera. */
+        private fun take() {
+            var last = 0L
+            while (isOpen) {
+                val frame = session.update()
+                if (frame.timestamp == last) continue
+                last = frame.timestamp
+                try {
+                    take(frame)
+                } catch (_: NotTrackingException) {
+                    listener.onInterrupted(ArCore.advice(frame.camera.trackingFailureReason))
+                } catch (_: NotYetAvailableException) {
+                    // Depth needs a few images from different places first.
+                    listener.onInterrupted(ArCore.advice(TrackingFailureReason.NONE))
+                } catch (_: ResourceExhaustedException) {
+                    // Images are still in use. The next frame will do.
+                } catch (_: DeadlineExceededException) {
+                    // The frame is too old. The next one will do.
+                }
+            }
+        }
+
+        private fun take(frame: Frame) {
+            frame.acquireCameraImage().use { image ->
+                frame.acquireRawDepthImage16Bits().use { raw ->
+                    frame.acquireRawDepthConfidenceImage().use { confidence ->
+                        val colour = image.toColourImage()
+                        val depth = raw.toDepthImage(confidence)
+                        val camera = frame.camera
+                        val cameras = arCameras(camera.imageIntrinsics.numbers(), colour, camera.textureIntrinsics.numbers(), depth)
+                        val orientation = sensorOrientation(sensorDegrees, displayDegrees(), isFront = false)
+                        listener.onFrame(CameraFrame(frame.timestamp, colour, depth, orientation, cameras), "Camera with depth by ARCore")
+                    }
                 }
             }
         }
@@ -72,52 +138,61 @@ class ArCoreSource private constructor(private val session: Session, private val
 
     private fun CameraIntrinsics.numbers() = ArIntrinsics(focalLength, principalPoint, imageDimensions)
 
-    /** Runs [work] with a texture that nobody sees: ARCore draws the camera's image into one. */
-    private fun onTexture(work: () -> Unit) {
-        val display = EGL14.eglGetDisplay(EGL14.EGL_DEFAULT_DISPLAY)
-        EGL14.eglInitialize(display, null, 0, null, 0)
-        val configs = arrayOfNulls<EGLConfig>(1)
-        val needed = intArrayOf(EGL14.EGL_RENDERABLE_TYPE, EGL14.EGL_OPENGL_ES2_BIT, EGL14.EGL_SURFACE_TYPE, EGL14.EGL_PBUFFER_BIT, EGL14.EGL_NONE)
-        EGL14.eglChooseConfig(display, needed, 0, configs, 0, 1, IntArray(1), 0)
-        val version = intArrayOf(EGL14.EGL_CONTEXT_CLIENT_VERSION, 2, EGL14.EGL_NONE)
-        val context = EGL14.eglCreateContext(display, configs[0], EGL14.EGL_NO_CONTEXT, version, 0)
-        val size = intArrayOf(EGL14.EGL_WIDTH, 1, EGL14.EGL_HEIGHT, 1, EGL14.EGL_NONE)
-        val surface = EGL14.eglCreatePbufferSurface(display, configs[0], size, 0)
-        EGL14.eglMakeCurrent(display, surface, surface, context)
-        try {
-            val texture = IntArray(1)
-            GLES20.glGenTextures(1, texture, 0)
-            session.setCameraTextureName(texture[0])
-            work()
-        } finally {
-            EGL14.eglMakeCurrent(display, EGL14.EGL_NO_SURFACE, EGL14.EGL_NO_SURFACE, EGL14.EGL_NO_CONTEXT)
-            EGL14.eglDestroySurface(display, surface)
-            EGL14.eglDestroyContext(display, context)
-        }
-    }
-
     override fun close() {
-        running = false
+        closed.countDown()
+        worker?.join()
     }
+}
+
+/** Whether ARCore can be used. */
+sealed interface ArCore {
+    data object Ready : ArCore
+
+    /** ARCore asks its server whether it knows the phone. Ask again soon. */
+    data object Checking : ArCore
+
+    /** The user is asked to install ARCore or its update. The activity is paused; ask again when it is resumed. */
+    data object Installing : ArCore
+
+    data class Missing(val why: String) : ArCore
 
     companion object {
-        /** Returns a source if ARCore is installed and gives depth on this phone, or null. */
-        fun find(context: Context, displayDegrees: Int): ArCoreSource? {
-            val session = try {
-                Session(context)
-            } catch (_: UnavailableException) {
-                return null
+        /**
+         * Returns whether ARCore can be used. Where it can be installed and [mayAsk], asks the user. The call belongs in
+         * the activity's `onResume`.
+         */
+        fun prepare(activity: Activity, mayAsk: Boolean): ArCore {
+            val availability = ArCoreApk.getInstance().checkAvailability(activity.applicationContext)
+            if (availability.isTransient) return Checking
+            if (!availability.isSupported) return Missing("ARCore does not know this phone")
+            return try {
+                when (ArCoreApk.getInstance().requestInstall(activity, mayAsk)) {
+                    ArCoreApk.InstallStatus.INSTALLED -> Ready
+                    ArCoreApk.InstallStatus.INSTALL_REQUESTED -> Installing
+                }
+            } catch (refused: UnavailableException) {
+                Missing(reason(refused))
+            } catch (broken: FatalException) {
+                Missing("ARCore failed (${broken.message})")
             }
-            if (!session.isDepthModeSupported(Config.DepthMode.RAW_DEPTH_ONLY)) {
-                session.close()
-                return null
-            }
-            val config = Config(session).setDepthMode(Config.DepthMode.RAW_DEPTH_ONLY).setFocusMode(Config.FocusMode.AUTO)
-                .setUpdateMode(Config.UpdateMode.BLOCKING)
-            session.configure(config)
-            val about = context.getSystemService(CameraManager::class.java).getCameraCharacteristics(session.cameraConfig.cameraId)
-            val sensorDegrees = about.get(CameraCharacteristics.SENSOR_ORIENTATION) ?: 0
-            return ArCoreSource(session, sensorOrientation(sensorDegrees, displayDegrees, isFront = false))
+        }
+
+        /** Says in words of a user why there is no session. */
+        fun reason(of: UnavailableException): String = when (of) {
+            is UnavailableUserDeclinedInstallationException -> "Google Play Services for AR is not installed"
+            is UnavailableApkTooOldException -> "Google Play Services for AR is too old; update it in the Play Store"
+            is UnavailableDeviceNotCompatibleException -> "ARCore gives no depth on this phone"
+            else -> "ARCore cannot be used (${of.javaClass.simpleName})"
+        }
+
+        /** Says what a user can do when ARCore does not know where the phone is. */
+        fun advice(why: TrackingFailureReason): String = when (why) {
+            TrackingFailureReason.INSUFFICIENT_LIGHT -> "it is too dark, or the lens is covered"
+            TrackingFailureReason.EXCESSIVE_MOTION -> "move the phone more slowly"
+            TrackingFailureReason.INSUFFICIENT_FEATURES -> "point the phone at something with more detail"
+            TrackingFailureReason.CAMERA_UNAVAILABLE -> "another app uses the camera"
+            TrackingFailureReason.BAD_STATE -> "ARCore has lost its way; try again"
+            TrackingFailureReason.NONE -> "move the phone slowly to and fro, so that ARCore sees depth"
         }
     }
 }

@@ -5,229 +5,202 @@ import android.app.Activity
 import android.content.Intent
 import android.content.pm.PackageManager
 import android.hardware.display.DisplayManager
-import android.os.Build
+import android.net.Uri
 import android.os.Bundle
-import android.os.PowerManager
-import android.util.Log
-import android.view.Gravity
-import android.view.MotionEvent
+import android.os.Handler
+import android.os.Looper
+import android.provider.Settings
 import android.view.Surface
-import android.view.View
-import android.widget.Button
-import android.widget.ImageView
-import android.widget.LinearLayout
-import android.widget.SeekBar
-import android.widget.TextView
-import android.widget.Toast
-import java.util.concurrent.Executors
-import org.phasefront.CameraFrame
+import android.view.WindowManager
 import org.phasefront.Hologram
 import org.phasefront.HologramDisplay
 import org.phasefront.HologramLog
-import org.phasefront.HologramSession
-import org.phasefront.PhasefrontException
-import org.phasefront.RunningMode
-import org.phasefront.SessionEvent
-import org.phasefront.phoneOptions
 import org.phasefront.sendToLogcat
-import org.phasefront.thermalOf
 import org.phasefront.writeOutput
 import org.phasefront.writePreview
 
 /**
  * Converts the camera or the sample scene to holograms. Shows the displayed image focused by the slider or a tap, the
- * levels on an external screen if there is one, and statistics.
+ * levels on an external screen if there is one, and what the camera and the session do.
  */
-class MainActivity : Activity() {
-    private lateinit var preview: ImageView
-    private lateinit var focus: SeekBar
-    private lateinit var statistics: TextView
-
-    /** Plans and closes sessions and opens cameras, one after another, because each takes long. */
-    private val work = Executors.newSingleThreadExecutor()
-
-    /** Written on the thread of [work]. */
-    @Volatile private var session: HologramSession? = null
-    private var source: FrameSource? = null
+class MainActivity : Activity(), Holograms.Screen, MainView.Actions {
+    private lateinit var view: MainView
+    private lateinit var holograms: Holograms
+    private val main = Handler(Looper.getMainLooper())
+    private val display = HologramDisplay(width = 960, height = 540)
+    private val views = Bitmaps(display.width / 2, display.height / 2)
+    private val levels = Bitmaps(display.width, display.height)
     private var output: PhaseOutput? = null
-    private val hologramDisplay = HologramDisplay(width = 960, height = 540)
-    private val views = Bitmaps(hologramDisplay.width / 2, hologramDisplay.height / 2)
-    private val levels = Bitmaps(hologramDisplay.width, hologramDisplay.height)
-    private var wasAsked = false
-
-    /** The focus, written on the main thread and read on the session's thread. */
-    @Volatile private var zMm = 0.0
-
-    /** Whether an external screen shows the levels, written on the main thread and read on the session's thread. */
-    @Volatile private var needsLevels = false
 
     /** The latest hologram, for taps. Only the main thread uses it. */
     private var latest: Hologram? = null
+
+    /** Whether the user was asked for the camera, and for ARCore's installation. */
+    private var wasAsked = false
+    private var wasAskedForArCore = false
+
+    /** The display's rotation, written on the main thread and read on the camera's. */
+    @Volatile private var displayDegrees = 0
+
+    /** Whether an external screen shows the levels, written on the main thread and read on the session's thread. */
+    @Volatile private var needsLevels = false
 
     private val screens = object : DisplayManager.DisplayListener {
         override fun onDisplayAdded(id: Int) = showOnExternalScreen()
 
         override fun onDisplayRemoved(id: Int) = showOnExternalScreen()
 
-        override fun onDisplayChanged(id: Int) = Unit
-    }
-    private val thermal = if (Build.VERSION.SDK_INT < Build.VERSION_CODES.Q) {
-        null
-    } else {
-        PowerManager.OnThermalStatusChangedListener { status -> work.execute { session?.setThermal(thermalOf(status)) } }
+        // Also a rotation by half a turn, which changes no configuration.
+        override fun onDisplayChanged(id: Int) = rotate()
     }
 
-    override fun onCreate(savedInstanceState: Bundle?) {
-        super.onCreate(savedInstanceState)
+    override fun onCreate(saved: Bundle?) {
+        super.onCreate(saved)
         HologramLog.sendToLogcat()
-        preview = ImageView(this).apply {
-            adjustViewBounds = true
-            setOnTouchListener { view, event -> event.action == MotionEvent.ACTION_UP && tapped(view, event) }
+        window.addFlags(WindowManager.LayoutParams.FLAG_KEEP_SCREEN_ON)
+        view = MainView(this, display.volumeDepthMm, this)
+        holograms = Holograms(applicationContext, display, this)
+        saved?.let {
+            view.zMm = it.getDouble(FOCUS)
+            wasAsked = it.getBoolean(ASKED)
+            wasAskedForArCore = it.getBoolean(ASKED_FOR_ARCORE)
         }
-        focus = SeekBar(this).apply {
-            max = FOCUS_STEPS
-            progress = FOCUS_STEPS / 2
-            setOnSeekBarChangeListener(object : SeekBar.OnSeekBarChangeListener {
-                override fun onProgressChanged(bar: SeekBar, progress: Int, fromUser: Boolean) {
-                    zMm = hologramDisplay.volumeDepthMm * (progress.toDouble() / FOCUS_STEPS - 0.5)
-                }
+        setContentView(view.root)
+    }
 
-                override fun onStartTrackingTouch(bar: SeekBar) = Unit
-
-                override fun onStopTrackingTouch(bar: SeekBar) = Unit
-            })
-        }
-        statistics = TextView(this).apply { setPadding(24, 24, 24, 24) }
-        val benchmark = Button(this).apply {
-            text = "Benchmark"
-            // The session is closed during the benchmark, so that nothing else computes.
-            setOnClickListener { startActivity(Intent(context, BenchmarkActivity::class.java)) }
-        }
-        setContentView(
-            LinearLayout(this).apply {
-                orientation = LinearLayout.VERTICAL
-                gravity = Gravity.CENTER_VERTICAL
-                for (view in listOf(preview, focus, statistics, benchmark)) addView(view)
-            },
-        )
+    override fun onSaveInstanceState(to: Bundle) {
+        super.onSaveInstanceState(to)
+        to.putDouble(FOCUS, view.zMm)
+        to.putBoolean(ASKED, wasAsked)
+        to.putBoolean(ASKED_FOR_ARCORE, wasAskedForArCore)
     }
 
     override fun onStart() {
         super.onStart()
         getSystemService(DisplayManager::class.java).registerDisplayListener(screens, null)
+        rotate()
         showOnExternalScreen()
-        if (hasCamera() || wasAsked) {
-            run()
-        } else {
-            wasAsked = true
-            requestPermissions(arrayOf(Manifest.permission.CAMERA), 0)
+    }
+
+    // Also after each dialogue of the system.
+    override fun onResume() {
+        super.onResume()
+        begin()
+    }
+
+    /** Starts what can be started now: asks for the camera, waits for ARCore, or starts a source. */
+    private fun begin() {
+        main.removeCallbacks(again)
+        if (holograms.isRunning) return
+        if (!hasCamera() && !wasAsked) return ask()
+        if (!hasCamera()) return start { SampleSource(assets, "the app may not use the camera") }
+        CameraSource.find(this, ::displayDegrees)?.let { camera -> return start { camera } }
+        when (val arCore = ArCore.prepare(this, mayAsk = !wasAskedForArCore)) {
+            ArCore.Ready -> start { ArCoreSource(applicationContext, ::displayDegrees) }
+            ArCore.Checking -> {
+                holograms.tell(SourceEvent.Started)
+                main.postDelayed(again, CHECK_MS)
+            }
+            ArCore.Installing -> {
+                wasAskedForArCore = true
+                holograms.tell(SourceEvent.Asked("install Google Play Services for AR"))
+            }
+            is ArCore.Missing -> start { SampleSource(assets, arCore.why) }
         }
     }
 
-    override fun onRequestPermissionsResult(request: Int, permissions: Array<out String>, results: IntArray) {
-        super.onRequestPermissionsResult(request, permissions, results)
-        if (!hasCamera()) say("without the permission for the camera, this is the sample scene")
-        run()
+    private val again = Runnable(::begin)
+
+    private fun start(source: () -> FrameSource) {
+        view.offer(if (hasCamera()) null else "Allow the camera")
+        holograms.start(source)
     }
 
     private fun hasCamera(): Boolean = checkSelfPermission(Manifest.permission.CAMERA) == PackageManager.PERMISSION_GRANTED
 
-    private fun run() {
-        val degrees = displayDegrees()
-        work.execute {
-            if (session != null) return@execute
-            try {
-                session = HologramSession(phoneOptions(hologramDisplay), RunningMode.LIVE, ::heard)
-            } catch (refused: PhasefrontException) {
-                return@execute runOnUiThread { say(refused.message.orEmpty()) }
-            }
-            val camera = if (hasCamera()) CameraSource.find(this, degrees) ?: ArCoreSource.find(this, degrees) else null
-            source = (camera ?: SampleSource(assets)).also { it.start(::submit) { message -> runOnUiThread { say(message) } } }
-        }
-        if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q && thermal != null) {
-            getSystemService(PowerManager::class.java).addThermalStatusListener(thermal)
-        }
+    private fun ask() {
+        wasAsked = true
+        holograms.tell(SourceEvent.Asked("use the camera"))
+        requestPermissions(arrayOf(Manifest.permission.CAMERA), 0)
     }
 
-    private fun submit(frame: CameraFrame) {
-        try {
-            session?.submit(frame)
-        } catch (refused: PhasefrontException) {
-            Log.w("sample", refused.message.orEmpty())
-        }
+    override fun onRequestPermissionsResult(request: Int, permissions: Array<out String>, results: IntArray) {
+        super.onRequestPermissionsResult(request, permissions, results)
+        // Empty if the dialogue went away without an answer. The activity is resumed after this.
+        wasAsked = results.isNotEmpty()
     }
 
-    /** Handles an event on the session's thread. */
-    private fun heard(event: SessionEvent) {
-        if (event !is SessionEvent.Processed) return
-        val hologram = event.hologram
-        val view = views.next().also { hologram.writePreview(zMm, it) }
+    /** Asks for the camera once more. Android no longer shows its dialogue after two refusals, but the app's settings. */
+    override fun retry() {
+        holograms.stop(::forget)
+        if (hasCamera()) return begin()
+        if (shouldShowRequestPermissionRationale(Manifest.permission.CAMERA)) return ask()
+        startActivity(Intent(Settings.ACTION_APPLICATION_DETAILS_SETTINGS, Uri.fromParts("package", packageName, null)))
+    }
+
+    override fun show(state: SourceState) {
+        view.state = state.text
+        if (state is SourceState.Failed) view.offer("Try again")
+    }
+
+    override fun show(hologram: Hologram, told: String) {
+        val seen = views.next().also { hologram.writePreview(view.zMm, it) }
         val image = if (needsLevels) levels.next().also { hologram.writeOutput(it) } else null
-        val told = describe()
         runOnUiThread {
-            latest?.close()
+            forget()
             latest = hologram
-            preview.setImageBitmap(view)
+            view.show(seen, told)
             image?.let { output?.show(it) }
-            statistics.text = told
         }
     }
 
-    private fun describe(): String {
-        val of = session?.statistics ?: return ""
-        return "%.1f holograms a second, %d dropped of %d\n%s: %.1f ms, of which the method takes %.1f".format(
-            of.rateHz,
-            of.dropped.total,
-            of.submitted,
-            of.backend,
-            of.times.totalMs,
-            of.times.methodMs,
-        )
+    private fun forget() {
+        latest?.close()
+        latest = null
     }
 
-    private fun tapped(view: View, event: MotionEvent): Boolean {
-        val z = latest?.zAt(event.x.toDouble() / view.width, event.y.toDouble() / view.height) ?: return false
-        focus.progress = ((z / hologramDisplay.volumeDepthMm + 0.5) * FOCUS_STEPS).toInt()
-        view.performClick()
-        return true
+    override fun zAt(x: Double, y: Double): Double? = latest?.zAt(x, y)
+
+    // The session is closed during the benchmark, so that nothing else computes.
+    override fun measure() = startActivity(Intent(this, BenchmarkActivity::class.java))
+
+    @Suppress("DEPRECATION") // The newer call needs API 30.
+    private fun rotate() {
+        displayDegrees = when (windowManager.defaultDisplay.rotation) {
+            Surface.ROTATION_90 -> 90
+            Surface.ROTATION_180 -> 180
+            Surface.ROTATION_270 -> 270
+            else -> 0
+        }
     }
 
     /** Shows the levels on the first external screen, which may have come or gone. */
     private fun showOnExternalScreen() {
-        val found = getSystemService(DisplayManager::class.java).getDisplays(DisplayManager.DISPLAY_CATEGORY_PRESENTATION)
-        if (output?.display?.displayId == found.firstOrNull()?.displayId) return
+        val found = getSystemService(DisplayManager::class.java).getDisplays(DisplayManager.DISPLAY_CATEGORY_PRESENTATION).firstOrNull()
+        if (output != null && output?.display?.displayId == found?.displayId) return
         output?.dismiss()
-        output = found.firstOrNull()?.let { PhaseOutput(this, it, hologramDisplay.width, hologramDisplay.height).apply { show() } }
+        output = found?.let {
+            try {
+                PhaseOutput(this, it, display.width, display.height).apply { show() }
+            } catch (_: WindowManager.InvalidDisplayException) {
+                // It was unplugged just now.
+                null
+            }
+        }
         needsLevels = output != null
     }
 
-    @Suppress("DEPRECATION") // The newer call needs API 30.
-    private fun displayDegrees(): Int = when (windowManager.defaultDisplay.rotation) {
-        Surface.ROTATION_90 -> 90
-        Surface.ROTATION_180 -> 180
-        Surface.ROTATION_270 -> 270
-        else -> 0
+    // The system needs memory.
+    override fun onLowMemory() {
+        super.onLowMemory()
+        forget()
     }
-
-    private fun say(message: String) = Toast.makeText(this, message, Toast.LENGTH_LONG).show()
 
     override fun onStop() {
         super.onStop()
+        main.removeCallbacks(again)
         getSystemService(DisplayManager::class.java).unregisterDisplayListener(screens)
-        if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q && thermal != null) {
-            getSystemService(PowerManager::class.java).removeThermalStatusListener(thermal)
-        }
-        work.execute {
-            source?.close()
-            source = null
-            session?.close()
-            session = null
-            // Behind what the listener has posted.
-            runOnUiThread {
-                latest?.close()
-                latest = null
-            }
-        }
+        holograms.stop(::forget)
         output?.dismiss()
         output = null
         needsLevels = false
@@ -235,10 +208,15 @@ class MainActivity : Activity() {
 
     override fun onDestroy() {
         super.onDestroy()
-        work.shutdown()
+        holograms.close()
     }
 
     private companion object {
-        const val FOCUS_STEPS = 200
+        const val FOCUS = "focus"
+        const val ASKED = "asked"
+        const val ASKED_FOR_ARCORE = "asked for ARCore"
+
+        /** Between two questions to ARCore, in ms. */
+        const val CHECK_MS = 200L
     }
 }

@@ -12,24 +12,33 @@ import org.phasefront.DepthFormat
 import org.phasefront.DepthImage
 import org.phasefront.ImagePlane
 
-/** A source for phones without depth: a window that moves over the project's sample scene, 30 times per second. */
-class SampleSource(private val assets: AssetManager) : FrameSource {
-    @Volatile private var running = false
+/**
+ * A source for phones without depth: a window that moves over the project's sample scene, 30 times per second. [why] says
+ * on the screen why it is not the camera.
+ */
+class SampleSource(private val assets: AssetManager, private val why: String) : FrameSource {
+    private var worker: Thread? = null
 
-    override fun start(onFrame: (CameraFrame) -> Unit, onError: (String) -> Unit) {
-        running = true
-        thread(name = "sample scene") {
+    override fun start(listener: FrameSource.Listener) {
+        worker = thread(name = "sample scene") {
             val scene = SampleScene(assets)
             var step = 0
-            while (running) {
-                onFrame(scene.frame(step++))
-                Thread.sleep(33)
+            try {
+                while (true) {
+                    listener.onFrame(scene.frame(step++), "Sample scene: $why")
+                    Thread.sleep(33)
+                }
+            } catch (_: InterruptedException) {
+                // It is closed.
             }
         }
     }
 
     override fun close() {
-        running = false
+        worker?.run {
+            interrupt()
+            join()
+        }
     }
 }
 

@@ -8,12 +8,9 @@ import android.graphics.Bitmap
 import android.graphics.Canvas
 import android.graphics.Color
 import android.graphics.drawable.BitmapDrawable
-import android.os.Looper
-import android.view.View
 import android.view.ViewGroup
 import android.widget.Button
 import android.widget.ImageView
-import android.widget.TextView
 import kotlin.test.assertContains
 import kotlin.test.assertEquals
 import kotlin.test.assertNotEquals
@@ -25,43 +22,29 @@ import org.robolectric.Robolectric
 import org.robolectric.RobolectricTestRunner
 import org.robolectric.RuntimeEnvironment
 import org.robolectric.Shadows.shadowOf
-import org.robolectric.shadows.ShadowToast
 
 @RunWith(RobolectricTestRunner::class)
 class ActivitiesTest {
     private val app: Application = RuntimeEnvironment.getApplication()
-
-    private fun <T : View> T.all(): List<View> =
-        if (this is ViewGroup) (0 until childCount).flatMap { getChildAt(it).all() } + this else listOf(this)
-
-    private inline fun <reified T : View> Activity.find(which: (T) -> Boolean = { true }): T =
-        window.decorView.all().filterIsInstance<T>().first(which)
-
-    /** Runs what is posted to the main thread until [done], or fails after a minute. */
-    private fun wait(what: String, done: () -> Boolean) {
-        val end = System.nanoTime() + 60_000_000_000
-        while (!done()) {
-            assertTrue(System.nanoTime() < end, "$what did not come")
-            shadowOf(Looper.getMainLooper()).idle()
-            Thread.sleep(10)
-        }
-    }
 
     @Test
     fun theSampleSceneIsShownWithoutACamera() {
         val controller = Robolectric.buildActivity(MainActivity::class.java).setup()
         val activity = controller.get()
         assertEquals(listOf(Manifest.permission.CAMERA), shadowOf(activity).lastRequestedPermission.requestedPermissions.toList())
+        // The dialogue pauses the activity.
+        controller.pause()
         activity.onRequestPermissionsResult(0, arrayOf(Manifest.permission.CAMERA), intArrayOf(-1))
-        assertContains(ShadowToast.getTextOfLatestToast(), "sample scene")
+        controller.resume()
 
         val preview = activity.find<ImageView>()
         wait("a preview") { preview.drawable != null }
+        assertContains(activity.text(), "Sample scene: the app may not use the camera")
         val bitmap = assertNotNull((preview.drawable as BitmapDrawable).bitmap)
         assertEquals(480 to 270, bitmap.width to bitmap.height)
         assertEquals(Bitmap.DENSITY_NONE, bitmap.density)
         assertNotEquals(bitmap.getPixel(0, 0), bitmap.getPixel(240, 135), "the preview is empty")
-        assertContains(activity.find<TextView> { "holograms a second" in it.text }.text, "the method takes")
+        assertContains(activity.text(), "the method takes")
 
         controller.pause().stop().destroy()
         wait("the end of the session") { Thread.getAllStackTraces().keys.none { it.name == "sample scene" } }
