@@ -12,6 +12,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// The version of this header. pf_version returns that of the library.
+#define PHASEFRONT_VERSION "0.1.0"
+#define PHASEFRONT_VERSION_MAJOR 0
+#define PHASEFRONT_VERSION_MINOR 1
+#define PHASEFRONT_VERSION_PATCH 0
+
 // The result of a call.
 typedef enum PfStatus {
   // The call succeeded.
