@@ -110,7 +110,7 @@ export async function run() {
     WorkerSession.open({ target }, "image", { module: "/tests/nothing.wasm" }),
   );
   const missing = new Worker("/tests/nothing.js", { type: "module" });
-  await refused("session", "its worker has ended", WorkerSession.open({ target }, "image", { worker: missing }));
+  await refused("session", "could not be loaded", WorkerSession.open({ target }, "image", { worker: missing }));
 
   const session = await WorkerSession.open({ target, method: { kind: "auto", network: "rgbd-8" } }, "video");
   await session.warmUp();

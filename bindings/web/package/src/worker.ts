@@ -125,8 +125,13 @@ export class WorkerSession {
     };
     worker.onerror = (event) => {
       event.preventDefault();
-      const why = event.message ? `: ${event.message}` : "; is its script missing?";
-      this.#end(new PhasefrontError("session", `session: its worker has ended${why}`));
+      // An event without a message says that the script could not be loaded, and the browser keeps from the page why.
+      const why = event.message
+        ? `its worker has ended: ${event.message}`
+        : "the script of its worker, session-worker, could not be loaded; the browser's list of requests has its address: " +
+          "403 from Vite's server means that the package lies outside of the project, so install the packed one, and 404 that " +
+          "a bundler moved the script, so pass the setting worker";
+      this.#end(new PhasefrontError("session", `session: ${why}`));
     };
   }
 
