@@ -50,7 +50,7 @@ for platform in "${platforms[@]}"; do
 done
 export IPHONEOS_DEPLOYMENT_TARGET=16.0 MACOSX_DEPLOYMENT_TARGET=13.0
 built="${CARGO_TARGET_DIR:-target}"
-build="$built/xcframework"
+build="$built/$name$full"
 framework=ios/$name.xcframework
 binary=lib${crate//-/_}.a
 rm -rf "$build" "$framework"
