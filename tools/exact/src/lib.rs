@@ -5,6 +5,7 @@
 //! it, and `phasefront-lab` makes data sets and runs studies with it.
 
 pub mod corrected;
+pub mod incoherent;
 pub mod point_based;
 pub mod sm_lbm;
 pub mod truth;

@@ -6,6 +6,7 @@ mod occlusion;
 mod scene;
 mod seeds;
 mod sensors;
+mod stacks;
 mod study;
 
 use clap::{Parser, Subcommand};
@@ -16,7 +17,7 @@ use phasefront_io::Result;
 const FILES: &str = "\
 Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
 folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \
-or empty unless --overwrite is given. `dataset` and `seeds` complete what an earlier run began. All this is checked before any work.";
+or empty unless --overwrite is given. `dataset`, `seeds` and `stacks` complete what an earlier run began. All this is checked before any work.";
 
 /// Ground truth for phase-only holograms: scenes, data sets, evaluation and studies.
 #[derive(Parser)]
@@ -33,6 +34,7 @@ pub(crate) enum Command {
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
     Seeds(seeds::Seeds),
+    Stacks(stacks::Stacks),
     Occlusion(occlusion::Occlusion),
     Evaluate(Box<evaluate::Evaluate>),
     Study(study::Study),
@@ -45,6 +47,7 @@ impl Command {
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
             Command::Seeds(command) => command.run(json),
+            Command::Stacks(command) => command.run(json),
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),
             Command::Study(command) => command.run(json),

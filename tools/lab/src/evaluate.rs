@@ -2,8 +2,9 @@
 //! SSIM of the midpoint hologram, and their means over a focal stack of each scene's 15 most frequent depths and 5
 //! random depths. Any [`Method`] that makes a field can be measured, with the field itself or encoded.
 //!
-//! An encoded field is measured as an eye sees it: through the modulator's levels and the Fourier aperture. The truth
-//! is always the complex field of the data set. Pairs are valid up to their border, so the whole frame counts.
+//! An encoded field is measured as an eye sees it: through the modulator's levels and the Fourier aperture. There are
+//! two truths: the complex field of the data set, a coherent wave, and what incoherent light shows of the scene through
+//! the same aperture ([`Natural`]). Pairs are valid up to their border, so the whole frame counts.
 
 mod ceiling;
 
@@ -21,6 +22,7 @@ use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::pipeline::display_plan::{DisplayPlan, remove_mean_phase};
 use phasefront_core::view::refocus::{Refocus, phase_only_field};
+use phasefront_exact::incoherent::{self, Natural, Pupil};
 use phasefront_exact::point_based::{self, Occlusion};
 use phasefront_exact::sm_lbm;
 use phasefront_exact::truth::{Figures, filled, judge, visible_depth, visible_frame, visible_rgb};
@@ -151,7 +153,7 @@ impl<'a> Method<'a> {
     /// Returns an error if the network is a pre-filter or is for another display.
     pub fn network(name: impl Into<String>, network: &Network, size: usize, display: &Display) -> Result<Self> {
         let name = name.into();
-        if network.input() == InputKind::Seeded {
+        if matches!(network.input(), InputKind::Seeded | InputKind::SeededColour) {
             return Self::seeded(name, network, size, display);
         }
         let of_layers = matches!(network.input(), InputKind::Ldi { .. });
@@ -237,6 +239,11 @@ impl Shown {
         }
     }
 
+    /// Returns the pupil that views pass.
+    fn pupil(&self, display: &Display) -> Pupil {
+        self.through.map_or_else(|| Pupil::of_aperture(display), Pupil::from)
+    }
+
     /// Returns this way for `method`, whose pre-filter replaces the encoder and the encoder's name.
     fn of(&self, method: &Method<'_>) -> Self {
         let levels = (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options)));
@@ -279,6 +286,82 @@ pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
     ways
 }
 
+/// The measures of one scene by both truths.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Judged {
+    /// Against the coherent wave of the data set.
+    #[serde(flatten)]
+    pub coherent: Figures,
+    /// Against incoherent light.
+    pub natural: Natural,
+}
+
+impl Judged {
+    fn mean(scenes: impl Iterator<Item = Judged> + Clone) -> Self {
+        let count = scenes.clone().count() as f64;
+        let mean =
+            |figure: fn(Figures) -> f64| scenes.clone().map(|judged| figure(judged.coherent)).sum::<f64>() / count;
+        Judged {
+            coherent: Figures {
+                amplitude_psnr: mean(|f| f.amplitude_psnr),
+                amplitude_ssim: mean(|f| f.amplitude_ssim),
+                focal_psnr: mean(|f| f.focal_psnr),
+                focal_ssim: mean(|f| f.focal_ssim),
+                brightness: mean(|f| f.brightness),
+                light: mean(|f| f.light),
+            },
+            natural: Natural::mean(scenes.map(|judged| judged.natural)),
+        }
+    }
+}
+
+/// Both truths of one scene.
+struct Truths<'a> {
+    ldi: &'a Ldi,
+    display: &'a Display,
+    /// The depths of focus of both, in metres: those of the coherent wave come first.
+    z_m: Vec<f64>,
+    coherent: Vec<Array3<f32>>,
+    /// What incoherent light shows through each pupil so far.
+    natural: Vec<(Pupil, incoherent::Judge)>,
+}
+
+impl<'a> Truths<'a> {
+    /// Prepares the truths of `pair`, the coherent one at the midpoint and at the normalized `depths`.
+    fn new(viewer: &Viewer, manifest: &'a Manifest, pair: &'a dataset::Pair, depths: &[f64]) -> Result<Self> {
+        let display = &manifest.display;
+        let mut z_m = vec![0.0];
+        z_m.extend(depths.iter().map(|d| display.z_of_depth(*d)));
+        let coherent = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
+        z_m.extend(incoherent::Judge::z_m(display));
+        Ok(Truths {
+            ldi: &pair.ldi,
+            display,
+            z_m,
+            coherent,
+            natural: Vec::new(),
+        })
+    }
+
+    /// Judges the views at each of the depths of focus.
+    fn judge(&mut self, seen: &Seen, pupil: Pupil, margin: usize) -> Result<Judged> {
+        if self.natural.iter().all(|(known, _)| *known != pupil) {
+            let judge = incoherent::Judge::of(self.ldi, self.display, pupil)?;
+            self.natural.push((pupil, judge));
+        }
+        let (coherent, natural) = seen.views.split_at(self.coherent.len());
+        let judge_of = self.natural.iter().find(|(known, _)| *known == pupil);
+        let (_, of_pupil) = judge_of.expect("one was made for it");
+        Ok(Judged {
+            coherent: Figures {
+                light: seen.light,
+                ..judge(coherent, &self.coherent, margin)?
+            },
+            natural: of_pupil.judge(natural, margin)?,
+        })
+    }
+}
+
 /// The results of one way on all scenes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
@@ -291,16 +374,16 @@ pub struct Row {
     /// The name of the [`Shown`].
     pub shown: String,
     /// The means over the scenes.
-    pub mean: Figures,
+    pub mean: Judged,
     /// For each scene: its index in the data set and its measures.
-    pub scenes: Vec<(usize, Figures)>,
+    pub scenes: Vec<(usize, Judged)>,
 }
 
 impl Row {
     /// Returns the indices of the `count` scenes with the lowest amplitude PSNR, worst first.
     pub fn worst(&self, count: usize) -> Vec<usize> {
         let mut scenes = self.scenes.clone();
-        scenes.sort_by(|(_, a), (_, b)| a.amplitude_psnr.total_cmp(&b.amplitude_psnr));
+        scenes.sort_by(|(_, a), (_, b)| a.coherent.amplitude_psnr.total_cmp(&b.coherent.amplitude_psnr));
         scenes.iter().take(count).map(|(index, _)| *index).collect()
     }
 }
@@ -529,20 +612,15 @@ pub fn evaluate(
         .map(|&index| {
             let pair = dataset::read_pair(manifest, dir, index)?;
             let at = stack_depths(&pair.ldi.layers[0].depth, (seed << 32) + index as u64);
-            let mut z_m = vec![0.0];
-            z_m.extend(at.iter().map(|d| manifest.display.z_of_depth(*d)));
-            let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
+            let mut truths = Truths::new(&viewer, manifest, &pair, &at)?;
             let mut figures = Vec::new();
             for sensor in &depths {
                 let Sensed { scene, wrong } = Sensed::new(&pair.ldi, *sensor, (seed << 32) + index as u64)?;
                 for (method, ways) in &each {
                     let field = (method.field)(&scene)?;
                     for shown in ways {
-                        let seen = viewer.views(&field, shown, &z_m)?;
-                        let judged = Figures {
-                            light: seen.light,
-                            ..judge(&seen.views, &truth, *margin)?
-                        };
+                        let seen = viewer.views(&field, shown, &truths.z_m)?;
+                        let judged = truths.judge(&seen, shown.pupil(&manifest.display), *margin)?;
                         figures.push((judged, wrong));
                     }
                 }
@@ -559,20 +637,12 @@ pub fn evaluate(
         .enumerate()
         .map(|(row, (sensor, method, shown))| {
             let each = || of_scenes.iter().map(|figures| figures[row].0);
-            let mean = |figure: fn(Figures) -> f64| each().map(figure).sum::<f64>() / scenes.len() as f64;
             Row {
                 method: method.name.clone(),
                 sensor: *sensor,
                 wrong_depth: of_scenes.iter().map(|figures| figures[row].1).sum::<f64>() / scenes.len() as f64,
                 shown: shown.name.clone(),
-                mean: Figures {
-                    amplitude_psnr: mean(|f| f.amplitude_psnr),
-                    amplitude_ssim: mean(|f| f.amplitude_ssim),
-                    focal_psnr: mean(|f| f.focal_psnr),
-                    focal_ssim: mean(|f| f.focal_ssim),
-                    brightness: mean(|f| f.brightness),
-                    light: mean(|f| f.light),
-                },
+                mean: Judged::mean(each()),
                 scenes: scenes.iter().copied().zip(each()).collect(),
             }
         })

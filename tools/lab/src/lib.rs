@@ -6,4 +6,5 @@ pub mod evaluate;
 pub mod scene;
 pub mod seeds;
 pub mod sensor;
+pub mod stacks;
 pub mod study;

@@ -13,6 +13,7 @@ use phasefront_command::flags::{DisplayFlags, EncoderName};
 use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_core::depth::sharpness;
+use phasefront_exact::incoherent::{self, Natural, Pupil};
 use phasefront_exact::truth::{self, Figures};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::Hologram;
@@ -24,9 +25,10 @@ use std::time::Duration;
 
 /// Compare methods and encoders on an image and a display: quality of the displayed image, and time
 ///
-/// For a layered depth image, the reference is its exact wave. An RGB-D image has no exact wave. If its depth is clean,
-/// the reference is the exact wave of what is visible and of the hidden surfaces that the sweep finds; otherwise it is
-/// the wave of the largest network. The answer names the reference.
+/// There are two references. The first is coherent: for a layered depth image its exact wave. An RGB-D image has no
+/// exact wave. If its depth is clean, the reference is the exact wave of what is visible and of the hidden surfaces
+/// that the sweep finds; otherwise it is the wave of the largest network. The answer names the reference. The second is
+/// natural: what incoherent light, as in the world, shows of the same surfaces through the display's aperture.
 #[derive(Args)]
 pub(crate) struct Judge {
     #[command(flatten)]
@@ -73,6 +75,7 @@ struct Row {
     method: &'static str,
     encoder: String,
     figures: Figures,
+    natural: Natural,
     wave: Duration,
     encode: Duration,
     made: HologramResult,
@@ -99,11 +102,17 @@ impl Judge {
         }
         let (rgb, depth) = frame.values();
         let clean = sharpness::is_clean(rgb, depth, width);
+        let surfaces = match &layers {
+            Some(ldi) => ldi.clone(),
+            None => truth::filled(&frame, display)?,
+        };
         let image = Image::Rgbd(frame);
         let mut request = HologramRequest::of(self.display.clone());
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean, &mut request)?;
         let z_m = truth::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;
+        let natural = incoherent::Judge::of(&surfaces, display, Pupil::of_aperture(display))?;
+        let natural_z_m = incoherent::Judge::z_m(display);
         let combinations = self.combinations(display);
         let bar = progress_bar(combinations.len() as u64, "combinations");
         let mut rows = Vec::new();
@@ -115,7 +124,9 @@ impl Judge {
             );
             let made = request.make(&file, &image)?;
             let (info, _) = infos(&file, &made);
-            let shown = made.hologram(info).views_on(&file, &z_m)?;
+            let hologram = made.hologram(info);
+            let shown = hologram.views_on(&file, &z_m)?;
+            let shown_naturally = hologram.views_on(&file, &natural_z_m)?;
             let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
             rows.push(Row {
                 method: if combination.network.is_some() {
@@ -125,6 +136,7 @@ impl Judge {
                 },
                 encoder: made.encoder.describe(),
                 figures: truth::judge(&shown, &wanted, self.margin)?,
+                natural: natural.judge(&shown_naturally, self.margin)?,
                 wave: times[..times.len() - 1].iter().sum(),
                 encode: times[times.len() - 1],
                 made,
@@ -243,7 +255,7 @@ impl Row {
         json!({
             "method": self.method, "encoder": self.encoder, "psnr_db": self.figures.amplitude_psnr,
             "ssim": self.figures.amplitude_ssim, "stack_psnr_db": self.figures.focal_psnr,
-            "stack_ssim": self.figures.focal_ssim, "brightness": self.figures.brightness,
+            "stack_ssim": self.figures.focal_ssim, "natural": self.natural, "brightness": self.figures.brightness,
             "wave_ms": ms(self.wave), "encode_ms": ms(self.encode),
         })
     }
@@ -257,7 +269,7 @@ fn table(rows: &[Row], what: &str) -> String {
         .unwrap_or(0)
         .max(7);
     let mut text = format!(
-        "{:8}  {:wide$}  PSNR dB   SSIM  stack PSNR dB  stack SSIM  brightness  wave ms  encode ms",
+        "{:8}  {:wide$}  PSNR dB   SSIM  stack PSNR dB  stack SSIM  natural dB  in focus  out of focus  natural SSIM  brightness  wave ms  encode ms",
         "method", "encoder"
     );
     for row in rows {
@@ -270,14 +282,25 @@ fn table(rows: &[Row], what: &str) -> String {
             ..
         } = row.figures;
         text += &format!(
-            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {brightness:10.3}  {:7.1}  {:9.1}",
+            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {:10.2}  {:>8}  {:>12}  {:12.3}  {brightness:10.3}  {:7.1}  {:9.1}",
             row.method,
             row.encoder,
+            row.natural.psnr,
+            decibels(row.natural.in_focus_psnr),
+            decibels(row.natural.out_of_focus_psnr),
+            row.natural.ssim,
             1e3 * row.wave.as_secs_f64(),
             1e3 * row.encode.as_secs_f64(),
         );
     }
-    text + &format!("\nJudged by {what}. Times are of one run, after no warm-up.")
+    text + &format!(
+        "\nJudged by {what}; natural: by what incoherent light shows of these surfaces. Times are of one run, after no warm-up."
+    )
+}
+
+/// Writes a figure that there may not be.
+fn decibels(psnr: Option<f64>) -> String {
+    psnr.map_or_else(|| "–".to_owned(), |psnr| format!("{psnr:.2}"))
 }
 
 /// Writes a page that shows the displayed images of each combination and the reference.
@@ -331,6 +354,16 @@ fn write_page(
             (
                 "Over depths".into(),
                 format!("{:.2} dB, SSIM {:.3}", row.figures.focal_psnr, row.figures.focal_ssim),
+            ),
+            (
+                "As incoherent light".into(),
+                format!(
+                    "{:.2} dB, in focus {}, out of focus {}, SSIM {:.3}",
+                    row.natural.psnr,
+                    decibels(row.natural.in_focus_psnr),
+                    decibels(row.natural.out_of_focus_psnr),
+                    row.natural.ssim
+                ),
             ),
             ("Brightness".into(), format!("{brightness:.3} of what it is judged by")),
         ];

@@ -11,7 +11,7 @@ use phasefront_core::method::sweep::MAX_HIDDEN_LAYERS;
 use phasefront_core::optics::aperture::Opening;
 use phasefront_io::{Error, Result, output};
 use phasefront_lab::dataset::Manifest;
-use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown};
+use phasefront_lab::evaluate::{self, Judged, Method, Row, Sample, Shown};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -189,6 +189,7 @@ impl Evaluate {
             "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
             "offset_mm": self.offset_mm, "bits": self.bits, "margin": self.margin,
             "look_radius": self.look_radius, "look_shift": self.look_shift,
+            "natural": "what incoherent light shows of the whole scene through the same aperture, at six depths of focus",
             "focal_stack": {
                 "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
             },
@@ -342,7 +343,7 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
     );
     let depths = widest(5, &depth);
     let mut text = format!(
-        "{:depths$}  wrong  {:method$}  {:shown$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "{:depths$}  wrong  {:method$}  {:shown$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  natural dB  in focus  out of focus  natural SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
         "depth", "method", "shown"
     );
     for row in rows {
@@ -350,20 +351,26 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
         let least = row
             .scenes
             .iter()
-            .map(|(_, f)| f.amplitude_psnr)
+            .map(|(_, f)| f.coherent.amplitude_psnr)
             .fold(f64::INFINITY, f64::min);
+        let Judged { coherent, natural } = row.mean;
+        let db = |psnr: Option<f64>| psnr.map_or_else(|| "–".to_owned(), |psnr| format!("{psnr:.2}"));
         text += &format!(
-            "\n{:depths$}  {:4.1}%  {:method$}  {:shown$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
+            "\n{:depths$}  {:4.1}%  {:method$}  {:shown$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.2}  {:>8}  {:>12}  {:12.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
             depth(row),
             100.0 * row.wrong_depth,
             row.method,
             row.shown,
-            row.mean.amplitude_psnr,
-            row.mean.amplitude_ssim,
-            row.mean.focal_psnr,
-            row.mean.focal_ssim,
-            row.mean.brightness,
-            row.mean.light,
+            coherent.amplitude_psnr,
+            coherent.amplitude_ssim,
+            coherent.focal_psnr,
+            coherent.focal_ssim,
+            natural.psnr,
+            db(natural.in_focus_psnr),
+            db(natural.out_of_focus_psnr),
+            natural.ssim,
+            coherent.brightness,
+            coherent.light,
         );
     }
     text
