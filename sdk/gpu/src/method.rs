@@ -10,7 +10,7 @@ use super::numbers::Numbers;
 use super::{GpuError, Result};
 use chain::{ChainOptions, ChainPlan, End};
 use phasefront_core::display::Display;
-use phasefront_core::method::network::Network;
+use phasefront_core::method::network::{InputKind, Network};
 use phasefront_core::method::seeded::seed;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::method::{Method, sweep_plan};
@@ -93,6 +93,11 @@ impl MethodPlan {
             Method::Sweep(sweep) => {
                 let (packer, sweep) = swept(sweep_plan(height, width, *sweep, display)?)?;
                 (packer, Plan::Sweep(sweep))
+            }
+            Method::Seeded(network) if network.input() == InputKind::SeededColour => {
+                return Err(GpuError::Refused(
+                    "a network that takes the colours in turn runs on the CPU only".into(),
+                ));
             }
             Method::Seeded(network) => {
                 let sweep = seed(network, display);
