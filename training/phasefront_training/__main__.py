@@ -12,9 +12,10 @@ from statistics import fmean
 
 import torch
 
-from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, pool, prepare, quantize, recipe, rounding, seeds, shards, statistics
+from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, pool, prepare, quantize, recipe, rounding, seeds, shards, stacks, statistics
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
+from .natural import Natural
 from .stage1 import Stage1
 from .stage2 import Identity, Stage2, prefilter_network
 
@@ -65,6 +66,14 @@ def parser():
     p.add_argument("--phasefront-lab", default="phasefront-lab", metavar="FILE", help="path of the command phasefront-lab (default: the one on the PATH)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="for example: -- --planes 32")
 
+    p = add("stacks", run_stacks, "Make the incoherent focal stacks of a data set or a pool with `phasefront-lab stacks`, which receives the arguments after --.")
+    scenes = p.add_mutually_exclusive_group(required=True)
+    scenes.add_argument("--data", help="folder of the data set")
+    scenes.add_argument("--pool", metavar="DIR", help="folder of the pool")
+    p.add_argument("-o", "--output", required=True, help="folder of the stacks")
+    p.add_argument("--phasefront-lab", default="phasefront-lab", metavar="FILE", help="path of the command phasefront-lab (default: the one on the PATH)")
+    p.add_argument("arguments", nargs=argparse.REMAINDER, help="for example: -- --depths 8")
+
     p = add("statistics", run_statistics, "Compare the brightness, spectrum and depths of data sets with those of captured frames.")
     p.add_argument("--data", required=True, nargs="+", help="folders of data sets")
     p.add_argument("--split", choices=data.SPLITS, default="train")
@@ -83,6 +92,16 @@ def parser():
     p.add_argument("--average", type=int, default=0, metavar="STEPS", help="keep and evaluate the running mean of the weights over about this many steps (default 0: the weights themselves)")
     p.add_argument("--dimmed", type=float, default=0.0, help="share of samples whose colours, and with them their holograms, are scaled by a factor each (default 0)")
 
+    p = add("natural", run_natural, "Train a seeded network at half the resolution for natural focus: what the default encoder displays of its field, against incoherent focal stacks.")
+    training_flags(p, rate=7e-4)
+    resume_flag(p)
+    p.add_argument("--stacks", required=True, nargs="+", help="folder of the stacks of each data set or of the pool")
+    p.add_argument("--layers", type=int, default=8, help="number of convolution layers (default 8)")
+    p.add_argument("--filters", type=int, default=32, help="number of filters per layer (default 32)")
+    p.add_argument("--init", metavar="FILE", help="start with the weights of an .onnx or a checkpoint; layers are added up to --layers")
+    p.add_argument("--average", type=int, default=0, metavar="STEPS", help="keep and evaluate the running mean of the weights over about this many steps (default 0: the weights themselves)")
+    p.add_argument("--dimmed", type=float, default=0.0, help="share of samples whose colours, and with them their stacks, are scaled by a factor each (default 0)")
+
     p = add("stage2", run_stage2, "Train a hologram network and a pre-filter through the encoding (deep double phase method).")
     training_flags(p, crop=384, rate=2e-4)
     resume_flag(p)
@@ -100,6 +119,7 @@ def parser():
     whether.add_argument("--always-train", action="store_true", help="train even if rounding costs less")
     whether.add_argument("--never-train", action="store_true", help="do not train even if rounding costs more")
     training_flags(p, output="the .onnx file; training writes to FILE.qat", rate=1e-4)
+    p.add_argument("--stacks", nargs="+", help="for a network for natural focus: folder of the stacks of each data set or of the pool")
 
     p = add("export", run_export, "Write a checkpoint's network as float32 ONNX.")
     p.add_argument("checkpoint")
@@ -207,6 +227,15 @@ def run_seeds(args):
         seeds.make(manifest, output, args.variants, passed_on(args), args.phasefront_lab)
 
 
+def run_stacks(args):
+    if args.pool:
+        sets = [(each, Path(args.output) / each.folder.name) for each in pool.shards(args.pool)]
+    else:
+        sets = [(data.Manifest.read(args.data), args.output)]
+    for manifest, output in sets:
+        stacks.make(manifest, output, passed_on(args), args.phasefront_lab)
+
+
 def run_recipe(args):
     settings = recipe.Settings(
         Path(args.output), args.phasefront_lab, tuple(args.networks), args.hours, args.scenes, args.size, args.scene_planes, tuple(passed_on(args))
@@ -247,6 +276,16 @@ def run_stage1(args):
         train, validation = load(args, wanted)
         network = begun(args, wanted, train)
     task = Stage1(network, train, validation, workers, bf16=not args.f32, dimmed=args.dimmed, **sampling(args))
+    go(task, args, workers, resume)
+
+
+def run_natural(args):
+    resume = resumed(args)
+    workers = loop.Workers.start(args.device)
+    wanted = networks.Architecture(args.layers, args.filters, "seeded-colour", halved=True)
+    train, validation = load(args, wanted)
+    network = resume.network() if resume else begun(args, wanted, train)
+    task = Natural(network, train, validation, workers, bf16=not args.f32, dimmed=args.dimmed, **sampling(args))
     go(task, args, workers, resume)
 
 
@@ -308,34 +347,42 @@ def sampling(args):
 def load(args, architecture):
     """Returns the training scenes, and a few scenes for the curve's validation."""
     if args.pool:
-        if architecture.input == "seeded" and not args.seeds:
+        if architecture.seeded and not args.seeds:
             raise ValueError(NEEDS_SEEDS)
-        if args.seeds and len(args.seeds) > 1:
-            raise ValueError("a pool's seeds are in one folder, which `seeds --pool` makes")
-        of_pool = args.seeds[0] if args.seeds else None
-        train = pool.Pool(args.pool, architecture.ldi_layers, args.scenes, of_pool)
-        return train, pool.validation(args.pool, architecture.ldi_layers, VALIDATION_SCENES, of_pool)
+        of_pool = {}
+        for name in ("seeds", "stacks"):
+            if len(folders := getattr(args, name, None) or [None]) > 1:
+                raise ValueError(f"a pool's {name} are in one folder, which `{name} --pool` makes")
+            of_pool[name] = folders[0]
+        train = pool.Pool(args.pool, architecture.ldi_layers, args.scenes, **of_pool)
+        return train, pool.validation(args.pool, architecture.ldi_layers, VALIDATION_SCENES, **of_pool)
     folders, inputs = args.data, {architecture.input}
-    of_seeds = args.seeds or [None] * len(folders)
-    if len(of_seeds) != len(folders):
-        raise ValueError(f"{len(folders)} data sets and {len(of_seeds)} folders of seeds: --seeds takes one for each, in the same order")
+    more = []
+    for name in ("seeds", "stacks"):
+        more.append(getattr(args, name, None) or [None] * len(folders))
+        if len(more[-1]) != len(folders):
+            raise ValueError(f"{len(folders)} data sets and {len(more[-1])} folders of {name}: --{name} takes one for each, in the same order")
 
     def all_of(split, limit):
-        return data.Scenes.joined([scenes_for(*each, split, inputs, limit) for each in zip(folders, of_seeds)])
+        return data.Scenes.joined([scenes_for(*each, split, inputs, limit) for each in zip(folders, *more)])
 
     return all_of("train", args.scenes), all_of("validation", max(1, VALIDATION_SCENES // len(folders)))
 
 
-def scenes_for(folder, folder_of_seeds, split, inputs, limit):
-    """Returns scenes with the data that networks with these inputs read."""
-    if "seeded" in inputs and not folder_of_seeds:
+def scenes_for(folder, folder_of_seeds, folder_of_stacks, split, inputs, limit):
+    """Returns scenes with the data that networks with these inputs read, and with stacks if there is a folder of
+    them."""
+    if any(each.startswith("seeded") for each in inputs) and not folder_of_seeds:
         raise ValueError(NEEDS_SEEDS)
     layers = {networks.Architecture(3, input=each).ldi_layers for each in inputs}
     if len(layers) > 1:
         raise ValueError("networks for different inputs are evaluated one call each")
     manifest = data.Manifest.read(folder)
-    read = seeds.Seeds.read(folder_of_seeds) if folder_of_seeds else None
-    return data.Scenes(manifest, split, layers.pop(), limit, seeds=read)
+    more = {
+        "seeds": seeds.Seeds.read(folder_of_seeds) if folder_of_seeds else None,
+        "stacks": stacks.Stacks.read(folder_of_stacks) if folder_of_stacks else None,
+    }
+    return data.Scenes(manifest, split, layers.pop(), limit, **more)
 
 
 def resumed(args):
@@ -393,12 +440,13 @@ class Subject:
 def quantized_hologram(args):
     chain, display = checkpoint.load_network(args.file)
     train, validation = load(args, chain.architecture)
+    figure, training = (quantize.natural_figure, quantize.NaturalQuantizationAware) if args.stacks else (quantize.figure, quantize.QuantizationAware)
     return Subject(
         chain,
         list(quantize.examples(train, chain.architecture.input)),
-        lambda network: quantize.figure(network, validation),
-        lambda network, workers: quantize.QuantizationAware(network, train, validation, workers, **sampling(args)),
-        {"display": display, "seed_planes": train.facts.get("seed_planes")},
+        lambda network: figure(network, validation),
+        lambda network, workers: training(network, train, validation, workers, **sampling(args)),
+        {"display": display, "seed_planes": data.seed_planes(train.facts)},
     )
 
 
@@ -442,10 +490,10 @@ def run_export(args):
     last = Checkpoint.load(args.checkpoint)
     if args.network not in last.networks:
         raise ValueError(f"{args.checkpoint}: no {args.network}, only {', '.join(last.networks)}")
-    offset_m, seed_planes = last.extra.get("offset_m", 0.0), last.extra["data"].get("seed_planes")
+    offset_m, seed_planes = last.extra.get("offset_m", 0.0), data.seed_planes(last.extra["data"])
     network = last.network(args.network)
     if args.shrink != 1:
-        if network.architecture.input != "seeded":
+        if not network.architecture.seeded:
             raise ValueError("--shrink is for seeded networks, whose output is a correction")
         networks.scale_output(network, args.shrink)
     export.write(export.float_model(network, last.display, offset_m, seed_planes), args.output)
@@ -454,7 +502,7 @@ def run_export(args):
 def run_evaluate(args):
     predictors = {str(path): evaluate.predictor(path, args.device) for path in args.networks}
     inputs = {architecture.input for _, architecture, _ in predictors.values()} or {"rgbd"}
-    scenes = scenes_for(args.data, args.seeds, args.split, inputs, args.scenes)
+    scenes = scenes_for(args.data, args.seeds, None, args.split, inputs, args.scenes)
     methods = {
         "RGB as the field": evaluate.rgb_as_field,
         "SM-LBM of what is visible": evaluate.visible_layers(scenes.display, scenes.origin["planes"]),
@@ -484,7 +532,7 @@ def run_evaluate_encoding(args):
     if args.prefilter:
         del model.prefilter  # a module attribute accepts only modules, and the file is not one
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
-    scenes = scenes_for(args.data, args.seeds, args.split, {model.hologram.architecture.input}, args.scenes)
+    scenes = scenes_for(args.data, args.seeds, None, args.split, {model.hologram.architecture.input}, args.scenes)
     depth = evaluate.SENSOR if args.sensor_depth else "clean"
     results = evaluate_encoding.encoding_figures(model, scenes, depth)
     if args.picture:

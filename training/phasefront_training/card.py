@@ -40,7 +40,7 @@ def command(last, init):
     if last.kind == "stage1":
         parts += ["--layers", architecture.layers, "--filters", architecture.filters, "--input", architecture.input, "--head", architecture.head]
         parts += ["--halved"] if architecture.halved else []
-    if architecture.input == "seeded":
+    if architecture.seeded:
         parts += ["--seeds", *names("SEEDS", last)]
     if last.kind == "stage2":
         parts += ["--offset-mm", f"{last.extra['offset_m'] * 1e3:g}", "--identity-steps", last.options["identity_steps"]]
@@ -130,7 +130,7 @@ def seeds_again(scenes, folder, facts):
 def scenes_again(last):
     """Returns lines with the commands that make the training scenes of `last`."""
     data = last.extra["data"]
-    seeded = any(a.input == "seeded" for a, _ in last.networks.values())
+    seeded = any(a.seeded for a, _ in last.networks.values())
     if data.get("pool"):
         first = sets(last)[0]
         shares = " ".join(f"{each['like']}={each['shards']}" for each in sets(last))

@@ -123,13 +123,20 @@ def read_pair(path, ldi_layers, sensors=0):
     return colour.transpose(0, 3, 1, 2).reshape(3 * ldi_layers, height, width), depth, field, sensed
 
 
+def seed_planes(facts):
+    """Returns the planes of the sweep whose seeds the scenes with these facts have, or None without seeds. All sets of a
+    pool have the same."""
+    return facts.get("seed_planes") or next((each["seed_planes"] for each in facts.get("sets", ()) if "seed_planes" in each), None)
+
+
 class Scenes:
     """The scenes of a split in memory. Damaged files are reported on stderr and skipped.
 
-    With `seeds` (a seeds.Seeds), each scene also has variants of its depth, each with the field of the plane sweep.
+    With `seeds` (a seeds.Seeds), each scene also has variants of its depth, each with the field of the plane sweep. With
+    `stacks` (a stacks.Stacks), it also has an incoherent focal stack.
     """
 
-    def __init__(self, manifest, split, ldi_layers=1, limit=None, device="cpu", seeds=None):
+    def __init__(self, manifest, split, ldi_layers=1, limit=None, device="cpu", seeds=None, stacks=None):
         self.display = manifest.display
         self.ldi_layers = ldi_layers
         self.damaged = []
@@ -166,6 +173,9 @@ class Scenes:
             parts = [tuple(map(torch.from_numpy, seeds.of(number))) for number in self.numbers]
             self.origin["variants"] = len(parts[0][0]) - seeds.refined
             self.variant_depth, self.variant_seed = (_gather(parts, k, device) for k in range(2))
+        if stacks:
+            parts = [tuple(map(torch.from_numpy, stacks.of(number))) for number in self.numbers]
+            self.stack_depths, self.stack = (_gather(parts, k, device) for k in range(2))
 
     @classmethod
     def joined(cls, parts):
@@ -312,6 +322,8 @@ class Sampler:
     of its hologram. (This does not hold for a change of contrast.)
     """
 
+    batch_of = Batch
+
     def __init__(self, scenes, batch, crop, margin, sensor_depth=0.0, seed=0, rank=0, kind="rgbd", dimmed=0.0):
         if sensor_depth and scenes.ldi_layers > 1:
             raise ValueError("simulated sensor depth is for rgbd inputs: layered depth images are rendered, not measured")
@@ -330,7 +342,16 @@ class Sampler:
     def draw(self, step):
         rng = np.random.default_rng([self.seed, self.rank, step])
         samples = [self._sample(rng) for _ in range(self.batch)]
-        return Batch(*(torch.stack(members) for members in zip(*samples)))
+        return self.batch_of(*(torch.stack(members) for members in zip(*samples)))
+
+    def target(self, i, window, gains, rng):
+        """Returns what the network shall make of scene i in this window, and more members of the batch."""
+        return self.scenes.target[i][window].float() * gains.repeat(2, 1, 1), ()
+
+    @staticmethod
+    def finished(target):
+        """Converts a target to the form that the batch holds."""
+        return torch.complex(target[:3].contiguous(), target[3:].contiguous())
 
     def _sample(self, rng):
         scenes, (h, w), margin = self.scenes, self.crop, self.margin
@@ -342,12 +363,10 @@ class Sampler:
         window = (..., slice(y, y + h), slice(x, x + w))
         colour = scenes.colour[i][window].float() / 255
         depth = scenes.depth[i][window].float()
-        target = scenes.target[i][window].float()
         gains = torch.ones(3, 1, 1, device=depth.device)
         if self.dimmed and rng.random() < self.dimmed:
             gains = brightness_gains(colour, rng)
             colour = colour * gains.repeat(scenes.ldi_layers, 1, 1)
-            target = target * gains.repeat(2, 1, 1)
         valid = torch.zeros(1, h, w, device=depth.device)
         # At the frame's border the network also reads zeros in use. The loss leaves out only cut sides.
         valid[
@@ -365,6 +384,7 @@ class Sampler:
             measured = scenes.sensed[i][int(rng.integers(len(scenes.sensors)))][window][None].float()
         else:
             measured = simulate_sensor_depth(colour, depth[0], rng)[None] if from_sensor else depth
+        target, more = self.target(i, window, gains, rng)
         # The sensor's errors are a fraction of the scene's own volume, so the stretch follows the measurement.
         measured, depth = (stretched(each, scenes.stretch(i)) for each in (measured, depth))
         if self.place is None:
@@ -379,4 +399,4 @@ class Sampler:
         if transpose:
             members = [member.transpose(-1, -2) for member in members]
         given, target, depth, valid = members
-        return given, torch.complex(target[:3].contiguous(), target[3:].contiguous()), depth[0], valid
+        return given, self.finished(target), depth[0], valid, *more

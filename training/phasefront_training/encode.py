@@ -5,15 +5,21 @@ plane (positive: toward the viewer).
 """
 
 import math
+from functools import lru_cache
 
 import torch
 from torch.nn import functional as F
 
+from .losses import phase_per_metre
 from .networks import head_field, split
 from .optics import padded_shape, propagate, transfer
 
 LARGEST = 1 - 1e-6  # bound of the normalized amplitude, so that the slope of acos stays finite
 BLUR_SIGMA = 0.7  # pixels, of AA-DPM
+LARGEST_COSINE = 0.999  # the same bound where the slope of a sine is needed
+DARK_THRESHOLD = 0.4  # the core's default, a share of full light
+CLIPPED = 1e-3  # share of amplitudes above full light, as in the core
+LEAST_SCALE = 0.05  # as in the core
 DARK = 1e-3  # fraction of the scale below which the gradient of the phase fades instead of growing without bound
 
 
@@ -137,3 +143,69 @@ def band_limit(field, k=1.0):
     y, x = (torch.fft.fftfreq(n, dtype=torch.float64, device=field.device) for n in (height, width))
     stays = (math.pi * y).tan()[:, None] * (math.pi * x).tan()
     return torch.fft.ifft2(torch.fft.fft2(field) * (stays.abs() <= k))
+
+
+def full_light(field):
+    """Returns the amplitude that maps to full light (N, 1, 1, 1): the mean of the brightest values, about the 99.9th
+    percentile that sessions take, at least LEAST_SCALE. Its gradient tells a network what bright points cost."""
+    amplitudes = field.abs().flatten(1)
+    brightest = amplitudes.topk(math.ceil(2 * CLIPPED * amplitudes.shape[1]), 1, sorted=False).values
+    return brightest.mean(1).clamp(min=LEAST_SCALE)[:, None, None, None]
+
+
+def centred(field):
+    """Turns each colour of a field so that its mean phase is 0."""
+    turn = field.detach().sum((-2, -1), keepdim=True).conj()
+    return field * (turn / turn.abs().clamp(min=1e-9))
+
+
+def darkened(field, scale, threshold=DARK_THRESHOLD):
+    """Moves values below the share `threshold` of the scale toward the real axis (the core's dark threshold)."""
+    amplitude = field.abs()
+    weight = (amplitude / (threshold * scale)).clamp(max=1)
+    return torch.complex(weight * field.real + (1 - weight) * amplitude, weight * field.imag)
+
+
+@lru_cache(maxsize=8)
+def local_filter(radius=1.0):
+    """Returns the taps (7, 7) of the core's local correction: the aperture's circle, with the values 1 at frequency 0
+    and 0 at that of the checkerboard."""
+    y = (torch.arange(7) - 3).double()[:, None]
+    x, square = y.T, (y**2 + y.T**2)
+    rho = square.sqrt().clamp(min=1e-9)
+    taps = torch.where(square > 0, radius * torch.special.bessel_j1(math.pi * radius * rho) / (2 * rho), math.pi * radius**2 / 4)
+    sign = 1 - 2 * ((y + x) % 2)
+    # [N 1; 1 N]·[even; odd] = [1 − sum; −turned] for N taps.
+    count, missing, turned = taps.numel(), 1 - taps.sum(), (sign * taps).sum()
+    even = (count * missing + turned) / (count**2 - 1)
+    odd = (-count * turned - missing) / (count**2 - 1)
+    return (taps + even + odd * sign).float()
+
+
+def default_phasors(field, scale):
+    """Returns the phasors (N, 3, H, W) that the default encoder displays for a field at the modulator: dark threshold,
+    the blur of AA-DPM, double phase and one local step (core: encode/local.rs). Their gradient fades in darkness."""
+    wanted = centred(field) / scale
+    start = anti_alias(darkened(wanted, 1.0))
+    amplitude = start.abs()
+    cosine = amplitude.clamp(max=LARGEST_COSINE)
+    height, width = field.shape[-2:]
+    y, x = torch.arange(height, device=field.device)[:, None], torch.arange(width, device=field.device)
+    sine = (1 - 2 * ((x + y) % 2)) * (1 - cosine.square()).sqrt()
+    shown = start / (amplitude.square() + DARK**2).sqrt() * torch.complex(cosine, sine)
+    taps = local_filter().to(field.device).expand(6, 1, 7, 7)
+    change = F.conv2d(F.pad(channels(wanted - shown), [3] * 4, mode="reflect"), taps, groups=6)
+    corrected = shown + torch.complex(change[:, :3].contiguous(), change[:, 3:].contiguous())
+    return corrected / (corrected.abs().square() + DARK**2).sqrt()
+
+
+def views(phasors, scale, depths, display):
+    """Returns the amplitudes (N, P, 3, H, W) that phasors at the midpoint display behind the aperture at normalized
+    depths of focus (N, P). The surroundings are black."""
+    height, width = phasors.shape[-2:]
+    shape = padded_shape(display, display.volume_depth_m / 2, height, width)
+    spectrum = torch.fft.fft2(phasors, s=shape) * aperture(*shape, 1.0, phasors.device)
+    phase = display.z_m(depths)[..., None, None, None] * phase_per_metre(display, *shape, phasors.device)
+    there = spectrum[:, None] * torch.polar(torch.ones_like(phase, dtype=torch.float32), phase.float())
+    seen = torch.fft.ifft2(there)[..., :height, :width]
+    return scale[:, None] * (seen.real.square() + seen.imag.square() + 1e-8).sqrt()

@@ -54,7 +54,7 @@ def metadata(architecture, display, offset_m=0.0, seed_planes=None):
         "phasefront.offset_mm": _number(offset_m * 1e3),
     }
     found |= {"phasefront.corrected": "true"} if display.corrected else {}
-    return found | ({"phasefront.seed_planes": str(seed_planes)} if architecture.input == "seeded" and seed_planes else {})
+    return found | ({"phasefront.seed_planes": str(seed_planes)} if architecture.seeded and seed_planes else {})
 
 
 def _number(value):

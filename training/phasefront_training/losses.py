@@ -47,25 +47,25 @@ def stack_distances(depth, display, planes, rng):
     return torch.from_numpy(distances)
 
 
-def _phase_per_metre(display, height, width, device):
+def phase_per_metre(display, height, width, device):
     """Returns the carrier-free exponent per metre (3, H, W), float64."""
     key = (display, height, width, device)
-    if key not in _phase_per_metre.cache:
+    if key not in phase_per_metre.cache:
         x = torch.fft.fftfreq(width, display.pitch_m, dtype=torch.float64)
         y = torch.fft.fftfreq(height, display.pitch_m, dtype=torch.float64)
         f2 = y[:, None] ** 2 + x**2
         wavelength = torch.tensor(display.wavelengths_m, dtype=torch.float64)[:, None, None]
         root = (1 - wavelength**2 * f2).clamp(min=0).sqrt()
-        _phase_per_metre.cache[key] = (-2 * math.pi * wavelength * f2 / (1 + root)).to(device)
-    return _phase_per_metre.cache[key]
+        phase_per_metre.cache[key] = (-2 * math.pi * wavelength * f2 / (1 + root)).to(device)
+    return phase_per_metre.cache[key]
 
 
-_phase_per_metre.cache = {}
+phase_per_metre.cache = {}
 
 
 def focal_stack(field, distances_m, display):
     """Propagates fields (N, 3, H, W) circularly to distances (N, K). Returns fields (N, K, 3, H, W)."""
-    per_metre = _phase_per_metre(display, *field.shape[-2:], field.device)
+    per_metre = phase_per_metre(display, *field.shape[-2:], field.device)
     phase = (distances_m.to(field.device)[..., None, None, None] * per_metre).float()
     kernel = torch.polar(torch.ones_like(phase), phase)
     return torch.fft.ifft2(torch.fft.fft2(field)[:, None] * kernel)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from . import data
 from .seeds import Seeds
+from .stacks import Stacks
 
 FIRST_SEED = 1000  # lower seeds are for other data sets, some of them for tests
 KINDS = ("objects", "photographs", "varied")
@@ -23,6 +24,7 @@ SHARD_SCENES = 40  # one of them for validation and one for tests
 PART = ".part"  # suffix of an incomplete shard
 TENSORS = ("colour", "depth", "target", "sensed")  # of each scene
 SEEDED = ("variant_depth", "variant_seed")  # of each scene with seeds
+STACKED = ("stack_depths", "stack")  # of each scene with an incoherent focal stack
 
 
 def kind_of(shard, shares):
@@ -85,26 +87,28 @@ def shards(folder):
     return [data.Manifest.read(path) for path in found]
 
 
-def seeds_of(folder, manifest):
-    """Returns the seeds of a shard in the folder of a pool's seeds, or None without such a folder."""
-    return Seeds.read(Path(folder) / manifest.folder.name) if folder else None
+def more_of(manifest, seeds, stacks):
+    """Returns the seeds and the stacks of a shard in the folders of a pool's, as arguments of Scenes."""
+    folders = {"seeds": (Seeds, seeds), "stacks": (Stacks, stacks)}
+    return {name: kind.read(Path(folder) / manifest.folder.name) for name, (kind, folder) in folders.items() if folder}
 
 
-def validation(folder, ldi_layers, scenes, seeds=None):
-    """Returns one validation scene of each of the first `scenes` shards. seeds: the folder of the pool's seeds."""
+def validation(folder, ldi_layers, scenes, seeds=None, stacks=None):
+    """Returns one validation scene of each of the first `scenes` shards. seeds, stacks: the folders of the pool's."""
     first = shards(folder)[:scenes]
-    parts = [data.Scenes(manifest, "validation", ldi_layers, 1, seeds=seeds_of(seeds, manifest)) for manifest in first]
+    parts = [data.Scenes(manifest, "validation", ldi_layers, 1, **more_of(manifest, seeds, stacks)) for manifest in first]
     return data.Scenes.joined(parts)
 
 
 class Pool(data.Scenes):
     """The training scenes of a pool in memory. Each scene is a separate tensor, so that more scenes can be added.
 
-    seeds: the folder of the pool's seeds, which holds those of each shard in a folder of the shard's name.
+    seeds, stacks: the folders of the pool's seeds and stacks, which hold those of each shard in a folder of the shard's
+    name.
     """
 
-    def __init__(self, folder, ldi_layers=1, limit=None, seeds=None):
-        self.folder, self.limit, self.seeds = Path(folder), limit, seeds
+    def __init__(self, folder, ldi_layers=1, limit=None, seeds=None, stacks=None):
+        self.folder, self.limit, self.seeds, self.stacks = Path(folder), limit, seeds, stacks
         found = shards(folder)
         if not found:
             raise data.DataError(f"{folder}: no whole shard there yet; make the pool first (python -m phasefront_training pool)")
@@ -113,7 +117,7 @@ class Pool(data.Scenes):
         for name in ("display", "ldi_layers", "corrected", "seeded", "refined", "sensors"):
             setattr(self, name, getattr(first, name))
         self.origin, self.sets, self.damaged, self.numbers = {}, [], [], []
-        self.tensors = TENSORS + (SEEDED if self.seeded else ())
+        self.tensors = TENSORS + (SEEDED if self.seeded else ()) + (STACKED if stacks else ())
         for name in self.tensors:
             setattr(self, name, [])
         self._take(first)
@@ -157,7 +161,7 @@ class Pool(data.Scenes):
 
     def _read(self, manifest, ldi_layers):
         self.known.add(manifest.folder.name)
-        return data.Scenes(manifest, "train", ldi_layers, self.limit, seeds=seeds_of(self.seeds, manifest))
+        return data.Scenes(manifest, "train", ldi_layers, self.limit, **more_of(manifest, self.seeds, self.stacks))
 
     def _fits(self, scenes, manifest):
         for what in ("display", "shape", "corrected", "refined", "sensors"):

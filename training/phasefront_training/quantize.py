@@ -27,7 +27,8 @@ from torch.nn import functional as F
 from .data import network_input
 from .evaluate import evaluate, scene_as_seen, torch_predictor
 from .evaluate_encoding import DEEP, encoding_figures
-from .networks import SPLIT_STEP
+from .natural import Natural, figures, predictor
+from .networks import SPLIT_STEP, in_turn
 from .stage1 import Stage1
 from .stage2 import Stage2
 
@@ -211,7 +212,10 @@ def examples(scenes, kind):
     count = min(len(scenes), CALIBRATION_SCENES)
     for i in range(count):
         colour, depth, seed, _ = scene_as_seen(scenes, i * len(scenes) // count, "clean")
-        yield network_input(colour, depth, kind, seed)
+        if kind == "seeded-colour":
+            yield from in_turn(network_input(colour, depth, "seeded", seed)[None], scenes.display)
+        else:
+            yield network_input(colour, depth, kind, seed)
 
 
 class QuantizationAware(Stage1):
@@ -228,6 +232,10 @@ class QuantizationAware(Stage1):
 
     def extra(self):
         return super().extra() | {"ranges": self.network.ranges}
+
+
+class NaturalQuantizationAware(QuantizationAware, Natural):
+    """Training for natural focus with rounding in the forward pass."""
 
 
 class PrefilterQuantizationAware(Stage2):
@@ -253,6 +261,12 @@ def prefilter_examples(model, scenes):
 def figure(network, scenes):
     """Returns the amplitude PSNR of a Chain or a Quantized network on scenes."""
     return evaluate(torch_predictor(network), scenes, full=False)["amplitude_psnr"]
+
+
+def natural_figure(network, scenes):
+    """Returns the amplitude PSNR of what the default encoder displays of a network's fields, against the stacks of
+    scenes."""
+    return figures(predictor(network, scenes.display), scenes)["psnr"]
 
 
 def encoded_figure(model, scenes):

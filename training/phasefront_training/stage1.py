@@ -49,7 +49,7 @@ class Stage1(Task):
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.scenes, self.looked = scenes, 0
-        cut, kind = margin(network.architecture), network.architecture.input
+        cut, kind = margin(network.architecture), "seeded" if network.architecture.seeded else network.architecture.input
         self.sampler = Sampler(scenes, batch, crop, cut, sensor_depth, seed, workers.rank, kind, dimmed)
         self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, sensor_depth, seed, 0, kind, dimmed)
 
@@ -71,7 +71,11 @@ class Stage1(Task):
             return 0
         with torch.random.fork_rng():
             torch.manual_seed(int(np.random.default_rng([self.seed, step]).integers(2**62)))
-            return revive(self.network, self.revival.draw(step).input.to(self.device))
+            return revive(self.network, self.examples(step).to(self.device))
+
+    def examples(self, step):
+        """Returns inputs that determine which units fire."""
+        return self.revival.draw(step).input
 
     def loss(self, module, batch, step):
         x = batch.input.contiguous(memory_format=torch.channels_last)

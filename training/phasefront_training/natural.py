@@ -1,0 +1,140 @@
+"""Natural focus: a seeded network learns to display what incoherent light shows, out of focus as well as in focus.
+
+There is no target wave. The network corrects the plane sweep's field of each colour in turn, the default encoder turns it into phasors, and the loss is the root mean square difference between the amplitudes that these display at some depths of focus and the
+incoherent focal stack of the whole layered scene (stacks.py). Pixels in focus weigh five times as much as others.
+The network learns through the encoder because, trained on fields alone, it uses amplitudes that double phase clips.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from .data import Sampler, network_input
+from .encode import default_phasors, full_light, views
+from .metrics import ssim
+from .networks import field_of, in_turn
+from .stage1 import LIGHT_REACH_PX, Stage1
+
+PLANES = 3  # depths of focus of each sample
+IN_FOCUS_WEIGHT = 5.0
+IN_FOCUS_PX = 1.5  # blur at which the weight of focus has fallen to a third
+IN_FOCUS, OUT_OF_FOCUS = 2.0, 6.0  # bounds in pixels of the blur of figures
+BRIGHTER_ELSEWHERE = 0.3  # largest logarithm of a frame's full light over that of the crop
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The samples of one step.
+
+    input: the network's input (N, 10, H, W). stack: amplitudes (N, P, 3, H, W). depth: clean normalized depth of the
+    front layer (N, H, W). valid: (N, 1, H, W), 1 where the crop does not cut the network's view. depths: of focus,
+    normalized (N, P).
+    """
+
+    input: torch.Tensor
+    stack: torch.Tensor
+    depth: torch.Tensor
+    valid: torch.Tensor
+    depths: torch.Tensor
+
+
+class StackSampler(Sampler):
+    """Draws batches with `planes` depths of focus of each scene's stack."""
+
+    batch_of = Batch
+
+    def __init__(self, *args, planes=PLANES, **options):
+        super().__init__(*args, kind="seeded", **options)
+        self.planes = planes
+
+    def target(self, i, window, gains, rng):
+        chosen = torch.from_numpy(rng.choice(len(self.scenes.stack_depths[i]), self.planes, replace=False))
+        stack = self.scenes.stack[i][(chosen, *window)].float() / 255
+        return stack * gains, (self.scenes.stack_depths[i][chosen],)
+
+    @staticmethod
+    def finished(target):
+        return target
+
+
+def blur_px(depth, depths, display):
+    """Returns the radius in pixels (N, P, 3, H, W) of the blur that the whole aperture gives pixels of `depth` (N, H,
+    W) at depths of focus (N, P)."""
+    per_metre = torch.tensor(display.wavelengths_m) / (2 * display.pitch_m**2)
+    away_m = (display.z_m(depth)[:, None] - display.z_m(depths)[..., None, None]).abs()
+    return away_m[:, :, None] * per_metre.to(depth)[:, None, None]
+
+
+class Natural(Stage1):
+    """The task that trains a network for natural focus, which takes the colours in turn."""
+
+    kind = "natural"
+
+    def __init__(self, network, scenes, validation, workers, batch=1, crop=192, planes=None, sensor_depth=0.0, bf16=True, seed=0, dimmed=0.0):
+        super().__init__(network, scenes, validation, workers, batch, crop, 0, sensor_depth, bf16, seed, dimmed)
+        self.sampler = StackSampler(scenes, batch, crop, LIGHT_REACH_PX, sensor_depth, seed, workers.rank, dimmed=dimmed, planes=planes or PLANES)
+
+    def loss(self, module, batch, step):
+        x = batch.input.contiguous(memory_format=torch.channels_last)
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
+            field = field_of(module, self.network.architecture, x, self.display)
+        part = np.random.default_rng([self.seed, self.rank, step, 2]).random(len(field))
+        brighter = torch.from_numpy(np.exp(BRIGHTER_ELSEWHERE * part**2)).to(field.real)
+        scale = full_light(field) * brighter[:, None, None, None]
+        seen = views(default_phasors(field, scale), scale, batch.depths, self.display)
+        blur = blur_px(batch.depth, batch.depths, self.display)
+        focus = torch.exp(-((blur / IN_FOCUS_PX) ** 2))
+        counts = batch.valid[:, None].expand_as(blur)
+        weight = counts * (1 + (IN_FOCUS_WEIGHT - 1) * focus)
+        square = (seen - batch.stack).square()
+
+        def error(weight):
+            return ((weight * square).sum((1, 2, 3, 4)) / weight.sum((1, 2, 3, 4)).clamp(min=1) + 1e-6).sqrt().mean()
+
+        with torch.no_grad():
+            terms = {"in_focus": error(counts * (blur < IN_FOCUS)), "out_of_focus": error(counts * (blur > OUT_OF_FOCUS))}
+        return error(weight), terms
+
+    def examples(self, step):
+        return in_turn(self.revival.draw(step).input, self.display)
+
+    def validate(self):
+        predict = predictor(self.network, self.display, self.bf16)
+        line = {f"validation_{name}": value for name, value in figures(predict, self.validation).items()}
+        if self.sensor_depth:
+            line |= {f"validation_sensor_{name}": value for name, value in figures(predict, self.validation, 1).items()}
+        return line
+
+
+def predictor(network, display, autocast=False):
+    """Returns a predictor, colour, depth, seed -> field (3, H, W), by a network that takes the colours in turn."""
+
+    def predict(colour, depth, seed):
+        x = network_input(colour, depth, "seeded", seed)[None]
+        with torch.no_grad(), torch.autocast(x.device.type, torch.bfloat16, enabled=autocast):
+            return field_of(network, network.architecture, x, display)[0]
+
+    return predict
+
+
+@torch.no_grad()
+def figures(predict, scenes, variant=0):
+    """Returns the means over scenes of amplitude PSNR (all pixels, in focus, out of focus) and SSIM against the stack,
+    after one common scale, of what the default encoder displays of `predict`'s fields. variant: of the depth and seed
+    that `predict` reads."""
+    rows = []
+    for i in range(len(scenes)):
+        colour, depth, _ = scenes.scene(i)
+        measured, seed = scenes.variant(i, variant)
+        field = predict(colour, measured, seed)[None]
+        scale = full_light(field)
+        depths = scenes.stack_depths[i][None]
+        seen = views(default_phasors(field, scale), scale, depths, scenes.display)[0]
+        a, b = seen, scenes.stack[i].float() / 255
+        a = a * (a * b).sum() / (a * a).sum()
+        square, blur = (a - b).square(), blur_px(depth, depths, scenes.display)[0]
+        level = [-10 * torch.log10(square[where].mean()) for where in (blur >= 0, blur < IN_FOCUS, blur > OUT_OF_FOCUS)]
+        rows.append([float(value) for value in level] + [ssim(a, b)])
+    means = np.nanmean(rows, 0)
+    return dict(zip(("psnr", "in_focus_psnr", "out_of_focus_psnr", "ssim"), (float(value) for value in means)))
