@@ -78,16 +78,18 @@ pub enum DepthRange {
 #[derive(Debug, Clone, uniffi::Enum)]
 #[uniffi(name = "HologramMethod")]
 pub enum Method {
+    /// The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
+    /// estimated, and the plane sweep for all others. This is the default.
+    Auto {
+        /// The network, which must suit the session's display; none for the built-in one, or for the plane sweep alone
+        /// if that network was not trained for the display.
+        #[uniffi(default = None)]
+        network: Option<Arc<Network>>,
+    },
+    /// The plane sweep, which suits any display and needs no training.
+    Sweep,
     /// A trained network.
     Trained {
-        /// The network, which must suit the session's display.
-        network: Arc<Network>,
-    },
-    /// The plane sweep, which suits any display. It is slower and needs no training.
-    Sweep,
-    /// The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
-    /// estimated, and the plane sweep for all others.
-    Auto {
         /// The network, which must suit the session's display.
         network: Arc<Network>,
     },
@@ -254,28 +256,35 @@ pub struct Placement {
 
 impl Method {
     fn core(&self, display: &phasefront::Display) -> phasefront::Method {
+        let sweep = || Sweep::for_display(display);
         match self {
+            Method::Auto { network: Some(network) } => phasefront::Method::Auto(sweep(), network.core.clone()),
+            Method::Auto { network: None } => default_method(display),
+            Method::Sweep => phasefront::Method::Sweep(sweep()),
             Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
-            Method::Sweep => phasefront::Method::Sweep(Sweep::for_display(display)),
-            Method::Auto { network } => phasefront::Method::Auto(Sweep::for_display(display), network.core.clone()),
         }
     }
 }
 
+#[cfg(feature = "built-in-network")]
+use phasefront::models::default_method;
+
+/// Returns the method that needs no network.
+#[cfg(not(feature = "built-in-network"))]
+fn default_method(display: &phasefront::Display) -> phasefront::Method {
+    phasefront::Method::Sweep(Sweep::for_display(display))
+}
+
 /// Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
-/// correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
-/// built-in network, or the plane sweep if that network was not trained for the display.
+/// correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session chooses
+/// between the built-in network and the plane sweep by each frame's depth, as `Auto` does.
 #[uniffi::export(default(method = None))]
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
-        let defaults = match &method {
-            Some(method) => {
-                let method = method.core(&target.core.display);
-                session::SessionOptions::new(target.core.clone(), method)
-            }
-            None => default_options(&target.core),
-        };
-        Ok(SessionOptions::new(target, defaults))
+        let method = method.unwrap_or(Method::Auto { network: None });
+        let core = method.core(&target.core.display);
+        let defaults = session::SessionOptions::new(target.core.clone(), core);
+        Ok(SessionOptions::new(target, method, defaults))
     })
 }
 
@@ -301,33 +310,15 @@ pub fn phone_options(
     })
 }
 
-#[cfg(feature = "built-in-network")]
-fn default_options(target: &phasefront::Target) -> session::SessionOptions {
-    session::SessionOptions::for_target(target.clone())
-}
-
-#[cfg(not(feature = "built-in-network"))]
-fn default_options(target: &phasefront::Target) -> session::SessionOptions {
-    let sweep = Sweep::for_display(&target.display);
-    session::SessionOptions::new(target.clone(), phasefront::Method::Sweep(sweep))
-}
-
 impl SessionOptions {
-    /// Converts the options of the core, which are for the same `target`.
-    fn new(target: Arc<Target>, core: session::SessionOptions) -> Self {
+    /// Converts the options of the core, which are for the same `target` and `method`.
+    fn new(target: Arc<Target>, method: Method, core: session::SessionOptions) -> Self {
         let network = |core: &Arc<phasefront::Network>| Arc::new(Network { core: core.clone() });
-        let method = |method: &phasefront::Method| match method {
-            phasefront::Method::Network(core) | phasefront::Method::Seeded(core) => {
-                Method::Trained { network: network(core) }
-            }
-            phasefront::Method::Auto(_, core) => Method::Auto { network: network(core) },
-            _ => Method::Sweep,
-        };
         SessionOptions {
             target,
             quality_levels: (core.quality_levels.iter())
                 .map(|quality_level| QualityLevel {
-                    method: method(&quality_level.method),
+                    method: method.clone(),
                     width: quality_level.width,
                     height: quality_level.height,
                     local_steps: None,

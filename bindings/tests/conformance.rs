@@ -78,14 +78,15 @@ fn options(case: &Value) -> SessionOptions {
         (None, None) => Target::of_display(display).unwrap(),
     };
     let method = match case["method"].as_str().unwrap() {
-        "network" => Method::Trained {
+        "default" => None,
+        "network" => Some(Method::Trained {
             network: Network::built_in("rgbd-8").unwrap(),
-        },
-        "sweep" => Method::Sweep,
-        "auto" => Method::Auto {
-            network: Network::built_in("rgbd-8").unwrap(),
-        },
-        file => Method::Trained { network: model(file) },
+        }),
+        "sweep" => Some(Method::Sweep),
+        "auto" => Some(Method::Auto {
+            network: Some(Network::built_in("rgbd-8").unwrap()),
+        }),
+        file => Some(Method::Trained { network: model(file) }),
     };
     SessionOptions {
         encoding: match case["encoding"].as_str().unwrap() {
@@ -111,7 +112,7 @@ fn options(case: &Value) -> SessionOptions {
             let onnx = std::fs::read(folder().join(file)).unwrap();
             DepthNetwork::from_bytes(&onnx, Some(ColourScale::Unit), false).unwrap()
         }),
-        ..session_options(target, Some(method)).unwrap()
+        ..session_options(target, method).unwrap()
     }
 }
 
@@ -231,11 +232,17 @@ fn difference(a: &[u8], b: &[u8], levels: i32) -> (usize, i32) {
     })
 }
 
+/// Rewrites the suite once, if that is asked for.
+fn bless() {
+    static BLESSED: std::sync::Once = std::sync::Once::new();
+    if std::env::var_os("PHASEFRONT_BLESS").is_some() {
+        BLESSED.call_once(write::suite);
+    }
+}
+
 #[test]
 fn frames_become_the_levels_that_are_expected() {
-    if std::env::var_os("PHASEFRONT_BLESS").is_some() {
-        write::suite();
-    }
+    bless();
     let suite = std::fs::read_to_string(folder().join("cases.json")).unwrap();
     let suite: Value = serde_json::from_str(&suite).unwrap();
     let frames = std::fs::read(folder().join("frames.bin")).unwrap();
@@ -268,6 +275,26 @@ fn frames_become_the_levels_that_are_expected() {
     }
 }
 
+/// The default is the plane sweep where edges are sharp and the built-in network where they are soft.
+#[test]
+fn the_default_depends_on_the_edges_of_depth() {
+    bless();
+    let suite = std::fs::read(folder().join("cases.json")).unwrap();
+    let cases: Value = serde_json::from_slice(&suite).unwrap();
+    let frames = std::fs::read(folder().join("frames.bin")).unwrap();
+    for (edges, method) in [("sharp", "sweep"), ("soft", "network")] {
+        let name = format!("the default method, {edges} edges");
+        let cases = cases["cases"].as_array().unwrap();
+        let case = cases.iter().find(|case| case["name"] == name.as_str()).unwrap();
+        for explicit in ["sweep", "network", "auto"] {
+            let mut named = case.clone();
+            named["method"] = json!(explicit);
+            let same = run(&named, &frames).levels == run(case, &frames).levels;
+            assert_eq!(same, explicit == method || explicit == "auto", "{name} by {explicit}");
+        }
+    }
+}
+
 /// Writes the suite: a picture and its depth in each format.
 mod write {
     use super::*;
@@ -291,6 +318,14 @@ mod write {
             [0.3 * stripe, 0.3 + 0.5 * stripe * y, stripe * (1.0 - 0.4 * x)],
             1.2 + 0.5 * x,
         )
+    }
+
+    /// Returns the metres of a scene without a sharp edge: a bump in front of a wall, as depth from motion has it.
+    fn soft_metres(x: f64, y: f64) -> f64 {
+        let (dx, dy) = (x - 0.5, (y - 0.5) * 0.75);
+        let r = (dx * dx + dy * dy).sqrt();
+        let near = 1.0 - ((r - 0.15) / 0.2).clamp(0.0, 1.0);
+        1.8 - 1.2 * near * near * (3.0 - 2.0 * near)
     }
 
     fn at(i: usize, n: usize) -> f64 {
@@ -401,6 +436,7 @@ mod write {
                 let measured = if hole(x, y) { 0.0 } else { metres };
                 let normalized = (metres - 0.4) / 1.4;
                 match format {
+                    "soft-metres-f32" => (soft_metres(at(x, width), at(y, height)) as f32).to_le_bytes().to_vec(),
                     "metres-f32" => (if hole(x, y) { f32::NAN } else { metres as f32 })
                         .to_le_bytes()
                         .to_vec(),
@@ -629,6 +665,18 @@ mod write {
         one["depth_network"] = json!("depth.onnx");
         one["frames"] = json!([still(frames.colour("rgba", 64, 48, "bt601", false, 0.0), Value::Null)]);
         cases.push(one);
+
+        let (width, height) = (96, 72);
+        for (name, format) in [("sharp", "metres-f32"), ("soft", "soft-metres-f32")] {
+            let mut one = case(&format!("the default method, {name} edges"), vec![]);
+            one["method"] = json!("default");
+            one["display"] = json!(format!("width = {width}\nheight = {height}\n"));
+            let colour = frames.colour("rgba", width, height, "bt601", false, 0.0);
+            let mut depth = frames.depth(format, width / 2, height / 2, 0.0);
+            depth["format"] = json!("metres-f32");
+            one["frames"] = json!([still(colour, depth)]);
+            cases.push(one);
+        }
 
         let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0).levels).collect();
         let folder = folder();

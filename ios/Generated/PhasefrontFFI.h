@@ -341,6 +341,11 @@ uint64_t uniffi_phasefront_ffi_fn_clone_rawhologram(uint64_t handle, RustCallSta
 void uniffi_phasefront_ffi_fn_free_rawhologram(uint64_t handle, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWHOLOGRAM_FROM_LEVELS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWHOLOGRAM_FROM_LEVELS
+uint64_t uniffi_phasefront_ffi_fn_constructor_rawhologram_from_levels(ForeignBytes levels, RustBuffer info, uint64_t target, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWHOLOGRAM_OF_FIELD
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_RAWHOLOGRAM_OF_FIELD
 uint64_t uniffi_phasefront_ffi_fn_constructor_rawhologram_of_field(ForeignBytes field, int32_t width, int32_t height, double z_mm, uint64_t target, RustBuffer options, RustCallStatus *_Nonnull out_status
@@ -684,6 +689,11 @@ uint64_t uniffi_phasefront_ffi_fn_constructor_hologramtarget_with_look_up_table(
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_HOLOGRAMTARGET_DISPLAY
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_HOLOGRAMTARGET_DISPLAY
 RustBuffer uniffi_phasefront_ffi_fn_method_hologramtarget_display(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_HOLOGRAMTARGET_TO_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_HOLOGRAMTARGET_TO_BYTES
+RustBuffer uniffi_phasefront_ffi_fn_method_hologramtarget_to_bytes(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_STAGELISTENER
@@ -1296,6 +1306,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_hologramtarget_display(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_HOLOGRAMTARGET_TO_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_HOLOGRAMTARGET_TO_BYTES
+uint16_t uniffi_phasefront_ffi_checksum_method_hologramtarget_to_bytes(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_BEGIN
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_BEGIN
 uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin(void
@@ -1305,6 +1321,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
 uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_end(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWHOLOGRAM_FROM_LEVELS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_CONSTRUCTOR_RAWHOLOGRAM_FROM_LEVELS
+uint16_t uniffi_phasefront_ffi_checksum_constructor_rawhologram_from_levels(void
     
 );
 #endif

@@ -10,7 +10,9 @@
 //! The crate `phasefront` has this one as `phasefront::models`, by its feature `models`.
 
 use phasefront_core::display::Display;
+use phasefront_core::method::Method;
 use phasefront_core::method::network::Network;
+use phasefront_core::method::sweep::Sweep;
 use std::sync::Arc;
 
 /// The number format that a network computes in.
@@ -133,6 +135,16 @@ pub fn default_network(display: &Display) -> Option<Arc<Network>> {
     network("rgbd-8", Precision::Int8).filter(|network| network.check_display(display).is_ok())
 }
 
+/// Returns the default method for `display`: the automatic choice between the plane sweep and [`default_network`], or
+/// the sweep alone if that network was not trained for the display.
+pub fn default_method(display: &Display) -> Method {
+    let sweep = Sweep::for_display(display);
+    match default_network(display) {
+        Some(network) => Method::Auto(sweep, network),
+        None => Method::Sweep(sweep),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -165,6 +177,9 @@ mod tests {
             let display = Display::from_toml(display).unwrap();
             assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
             assert_eq!(default_network(&display).is_some(), trained);
+            let method = default_method(&display);
+            assert_eq!(matches!(method, Method::Auto(..)), trained, "{method:?}");
+            assert_eq!(matches!(method, Method::Sweep(_)), !trained, "{method:?}");
         }
     }
 }

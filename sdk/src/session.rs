@@ -190,7 +190,7 @@ impl VideoSession {
 
     /// Resumes a video: updates the state of the session with `frame`, without making its hologram, whose
     /// [`Hologram::scale`] was `scale`. The frames that follow give the same result as after [`Self::process`] of
-    /// `frame`, except for features that keep more state: a method chosen automatically, and steps at the midpoint.
+    /// `frame`, except with steps at the midpoint, which keep more state.
     ///
     /// # Errors
     /// Returns an error in the same cases as [`Self::process`], and if the scale is not positive and finite.

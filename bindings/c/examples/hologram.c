@@ -42,7 +42,7 @@ int main(int count, char **arguments) {
     PfOptions *options = NULL;
     PfSession *session = NULL;
     ok(pf_target_from_toml(display, &target));
-    ok(pf_options_new(target, PF_METHOD_DEFAULT, NULL, &options));
+    ok(pf_options_new(target, PF_METHOD_AUTO, NULL, &options));
     ok(pf_session_new(options, PF_RUNNING_MODE_IMAGE, NULL, &session));
 
     PfFrame frame = {.size = sizeof frame,

@@ -157,14 +157,13 @@ typedef enum PfRotation {
 
 // The method that computes holograms.
 typedef enum PfMethod {
-  // The built-in network, or the plane sweep if that network was not trained for the display.
-  PF_METHOD_DEFAULT = 0,
+  // The network for frames whose depth has soft edges, and the plane sweep for all others. Without a network, the
+  // built-in one, or the plane sweep alone if that network was not trained for the display. This is the default.
+  PF_METHOD_AUTO = 0,
   // A trained network.
   PF_METHOD_TRAINED = 1,
-  // The plane sweep, which suits any display. It is slower and needs no training.
+  // The plane sweep, which suits any display and needs no training.
   PF_METHOD_SWEEP = 2,
-  // The network for frames whose depth has soft edges, and the plane sweep for all others.
-  PF_METHOD_AUTO = 3,
 } PfMethod;
 
 // The running mode of a session. It is fixed when the session is created.
@@ -354,9 +353,9 @@ typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *messag
 typedef struct PfQualityLevel {
   // The size of this struct, sizeof(PfQualityLevel). Set it before the call.
   size_t size;
-  // The method, a PfMethod except PF_METHOD_DEFAULT.
+  // The method, a PfMethod.
   uint32_t method;
-  // The network of PF_METHOD_TRAINED and PF_METHOD_AUTO; otherwise NULL.
+  // The network of PF_METHOD_TRAINED; of PF_METHOD_AUTO, or NULL for the built-in one; otherwise NULL.
   const struct PfNetwork *network;
   // The width of the hologram in pixels.
   uint32_t width;
@@ -644,7 +643,7 @@ enum PfStatus pf_depth_network_from_bytes(const uint8_t *onnx,
 void pf_depth_network_free(struct PfDepthNetwork *network);
 
 // Creates the default options for `target`: holograms at its modulator's resolution by `method`, a PfMethod. `network`
-// is the method's network, or NULL for methods without one.
+// is the method's network; NULL for the plane sweep, and for PF_METHOD_AUTO with the built-in one.
 enum PfStatus pf_options_new(const struct PfTarget *target,
                              uint32_t method,
                              const struct PfNetwork *network,

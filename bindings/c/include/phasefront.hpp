@@ -110,8 +110,8 @@ class DepthNetwork : public detail::Object<PfDepthNetwork, pf_depth_network_free
 class Options : public detail::Object<PfOptions, pf_options_free> {
   public:
     using Object::Object;
-    // The defaults for a target, with PF_METHOD_DEFAULT.
-    explicit Options(const Target &target) : Options(target, PF_METHOD_DEFAULT, nullptr) {}
+    // The defaults for a target, with PF_METHOD_AUTO.
+    explicit Options(const Target &target) : Options(target, PF_METHOD_AUTO, nullptr) {}
     // The defaults for a target and a method, which may need a network.
     Options(const Target &target, PfMethod method, const Network *network)
         : Object(created([&](PfOptions **to) {

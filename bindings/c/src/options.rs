@@ -12,14 +12,13 @@ use phasefront_ffi::{
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfMethod {
-    /// The built-in network, or the plane sweep if that network was not trained for the display.
-    Default = 0,
+    /// The network for frames whose depth has soft edges, and the plane sweep for all others. Without a network, the
+    /// built-in one, or the plane sweep alone if that network was not trained for the display. This is the default.
+    Auto = 0,
     /// A trained network.
     Trained = 1,
-    /// The plane sweep, which suits any display. It is slower and needs no training.
+    /// The plane sweep, which suits any display and needs no training.
     Sweep = 2,
-    /// The network for frames whose depth has soft edges, and the plane sweep for all others.
-    Auto = 3,
 }
 
 /// The backend that computes frames.
@@ -41,9 +40,9 @@ const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
 pub struct PfQualityLevel {
     /// The size of this struct, sizeof(PfQualityLevel). Set it before the call.
     pub size: usize,
-    /// The method, a PfMethod except PF_METHOD_DEFAULT.
+    /// The method, a PfMethod.
     pub method: u32,
-    /// The network of PF_METHOD_TRAINED and PF_METHOD_AUTO; otherwise NULL.
+    /// The network of PF_METHOD_TRAINED; of PF_METHOD_AUTO, or NULL for the built-in one; otherwise NULL.
     pub network: *const PfNetwork,
     /// The width of the hologram in pixels.
     pub width: u32,
@@ -65,20 +64,22 @@ pub struct PfOptions(pub(crate) SessionOptions);
 
 /// # Safety
 /// `network` is NULL or valid.
-unsafe fn method_of(method: u32, network: *const PfNetwork) -> Result<Option<Method>> {
+unsafe fn method_of(method: u32, network: *const PfNetwork) -> Result<Method> {
     // SAFETY: the caller's promise.
-    let network = || unsafe { read(network, "network") }.map(|network| network.0.clone());
+    let given = || unsafe { read(network, "network") }.map(|network| network.0.clone());
     Ok(match method {
-        0 => None,
-        1 => Some(Method::Trained { network: network()? }),
-        2 => Some(Method::Sweep),
-        3 => Some(Method::Auto { network: network()? }),
-        other => return Err(PhasefrontError::Setting(format!("method is {other}; it is 0 to 3"))),
+        0 if network.is_null() => Method::Auto { network: None },
+        0 => Method::Auto {
+            network: Some(given()?),
+        },
+        1 => Method::Trained { network: given()? },
+        2 => Method::Sweep,
+        other => return Err(PhasefrontError::Setting(format!("method is {other}; it is 0 to 2"))),
     })
 }
 
 /// Creates the default options for `target`: holograms at its modulator's resolution by `method`, a PfMethod. `network`
-/// is the method's network, or NULL for methods without one.
+/// is the method's network; NULL for the plane sweep, and for PF_METHOD_AUTO with the built-in one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_new(
     target: *const PfTarget,
@@ -90,7 +91,10 @@ pub unsafe extern "C" fn pf_options_new(
     call(|| unsafe {
         give(options, "options", || {
             let target = read(target, "target")?.0.clone();
-            Ok(object(PfOptions(session_options(target, method_of(method, network)?)?)))
+            Ok(object(PfOptions(session_options(
+                target,
+                Some(method_of(method, network)?),
+            )?)))
         })
     })
 }
@@ -138,13 +142,8 @@ pub unsafe extern "C" fn pf_options_push_quality_level(
     unsafe {
         try_set(options, |options| {
             let quality_level = read_sized(quality_level, "quality_level")?;
-            let method = method_of(quality_level.method, quality_level.network)?.ok_or_else(|| {
-                PhasefrontError::Setting(
-                    "method of a quality level is PF_METHOD_DEFAULT; name one of the others".into(),
-                )
-            })?;
             options.quality_levels.push(QualityLevel {
-                method,
+                method: method_of(quality_level.method, quality_level.network)?,
                 width: quality_level.width as usize,
                 height: quality_level.height as usize,
                 local_steps: usize::try_from(quality_level.local_steps).ok(),

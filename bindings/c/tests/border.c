@@ -89,8 +89,8 @@ static void mistakes(PfTarget *target, PfOptions *options) {
     refused(pf_options_new(target, 7, NULL, &options), PF_STATUS_SETTING, "method is 7");
     refused(pf_options_new(target, PF_METHOD_TRAINED, NULL, &options), PF_STATUS_SETTING, "network is NULL");
     refused(pf_options_set_backend(options, 2), PF_STATUS_SETTING, "backend is 2");
-    PfQualityLevel quality_level = {.size = sizeof quality_level, .method = PF_METHOD_DEFAULT, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
-    refused(pf_options_push_quality_level(options, &quality_level), PF_STATUS_SETTING, "PF_METHOD_DEFAULT");
+    PfQualityLevel quality_level = {.size = sizeof quality_level, .method = PF_METHOD_TRAINED, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
+    refused(pf_options_push_quality_level(options, &quality_level), PF_STATUS_SETTING, "network is NULL");
     refused(pf_session_new(options, 3, NULL, &no_session), PF_STATUS_SETTING, "mode is 3");
     refused(pf_session_new(options, PF_RUNNING_MODE_LIVE, NULL, &no_session), PF_STATUS_SESSION, "listener");
     PfHologram *hologram = NULL;
@@ -301,7 +301,7 @@ int main(void) {
     ok(pf_target_size(target, &width, &height));
     assert(width == WIDTH && height == HEIGHT);
     PfOptions *options = NULL;
-    ok(pf_options_new(target, PF_METHOD_DEFAULT, NULL, &options));
+    ok(pf_options_new(target, PF_METHOD_AUTO, NULL, &options));
     mistakes(target, options);
     pf_target_free(target);
     stills(options);

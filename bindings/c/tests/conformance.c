@@ -136,7 +136,9 @@ static PfOptions *options_of(const cJSON *json, const char *suite, const char *m
     const char *method = text(json, "method");
     PfNetwork *trained = NULL;
     uint32_t number_of_method = PF_METHOD_TRAINED;
-    if (strcmp(method, "sweep") == 0) {
+    if (strcmp(method, "default") == 0) {
+        number_of_method = PF_METHOD_AUTO;
+    } else if (strcmp(method, "sweep") == 0) {
         number_of_method = PF_METHOD_SWEEP;
     } else if (strcmp(method, "network") == 0 || strcmp(method, "auto") == 0) {
         ok(pf_network_built_in("rgbd-8", &trained), "rgbd-8");

@@ -6,14 +6,14 @@ namespace Phasefront
     /// <summary>The method that computes holograms.</summary>
     public enum HologramMethod : uint
     {
-        /// <summary>The built-in network, or the plane sweep if that network was not trained for the display.</summary>
-        Default = 0,
+        /// <summary>The network for frames whose depth has soft edges, and the plane sweep for all others. Without a
+        /// network, the built-in one, or the plane sweep alone if that network was not trained for the display. This is
+        /// the default.</summary>
+        Auto = 0,
         /// <summary>A trained network.</summary>
         Trained = 1,
-        /// <summary>The plane sweep, which is slower and works for any display without training.</summary>
+        /// <summary>The plane sweep, which works for any display without training.</summary>
         Sweep = 2,
-        /// <summary>The network for frames whose depth has soft edges, and the plane sweep for all others.</summary>
-        Auto = 3,
     }
 
     /// <summary>The device that computes frames.</summary>
@@ -33,7 +33,7 @@ namespace Phasefront
         private SessionOptions(IntPtr handle) : base(handle) { }
 
         /// <summary>Returns the default options for <paramref name="target"/>.</summary>
-        public static SessionOptions For(HologramTarget target, HologramMethod method = HologramMethod.Default, HologramNetwork network = null)
+        public static SessionOptions For(HologramTarget target, HologramMethod method = HologramMethod.Auto, HologramNetwork network = null)
         {
             return With(network, native =>
             {

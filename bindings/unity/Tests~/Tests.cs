@@ -138,9 +138,10 @@ internal static class Tests
         var name = (string)one["method"];
         var method = name == "sweep" ? HologramMethod.Sweep : name == "auto" ? HologramMethod.Auto : HologramMethod.Trained;
         var builtIn = name == "network" || name == "auto";
-        using (var network = method == HologramMethod.Sweep ? null : builtIn ? HologramNetwork.BuiltIn() : Model(models, name))
+        var needsNone = name == "sweep" || name == "default";
+        using (var network = needsNone ? null : builtIn ? HologramNetwork.BuiltIn() : Model(models, name))
         {
-            var options = SessionOptions.For(target, method, network);
+            var options = name == "default" ? SessionOptions.For(target) : SessionOptions.For(target, method, network);
             switch ((string)one["encoding"])
             {
                 case "double-phase":
@@ -264,6 +265,8 @@ internal static class Tests
                     Pixels(hologram);
                     Refused(Status.Setting, "a shorter distance", () => hologram.Refocus(1e5));
                 }
+                Refused(Status.Frame, "null", () => session.Process(default(CameraFrame)));
+                Refused(Status.Frame, "null", () => session.Submit(null));
                 Refused(Status.Timestamp, "2", () => session.Process(frame));
                 frame.TimestampNs = 3;
                 Aligned(session, frame);

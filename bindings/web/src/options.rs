@@ -15,7 +15,8 @@ use wasm_bindgen::prelude::*;
 enum Maker {
     Trained(Arc<Network>),
     Sweep,
-    Auto(Arc<Network>),
+    /// With the network, or with the built-in one.
+    Auto(Option<Arc<Network>>),
 }
 
 /// The method that computes holograms.
@@ -34,9 +35,16 @@ impl RawMethod {
         RawMethod(Maker::Sweep)
     }
 
-    /// Creates the method that chooses between the network and the sweep by each frame's depth.
-    pub fn auto(network: &RawNetwork) -> RawMethod {
-        RawMethod(Maker::Auto(network.core.clone()))
+    /// Creates the method that chooses between the built-in network and the sweep by each frame's depth. It is the sweep
+    /// alone if that network was not trained for the display.
+    pub fn auto() -> RawMethod {
+        RawMethod(Maker::Auto(None))
+    }
+
+    /// Creates the method that chooses between `network` and the sweep by each frame's depth.
+    #[wasm_bindgen(js_name = autoWith)]
+    pub fn auto_with(network: &RawNetwork) -> RawMethod {
+        RawMethod(Maker::Auto(Some(network.core.clone())))
     }
 }
 
@@ -45,7 +53,8 @@ impl RawMethod {
         match &self.0 {
             Maker::Trained(network) => Method::trained(network.clone()),
             Maker::Sweep => Method::Sweep(Sweep::for_display(&target.display)),
-            Maker::Auto(network) => Method::Auto(Sweep::for_display(&target.display), network.clone()),
+            Maker::Auto(None) => phasefront::models::default_method(&target.display),
+            Maker::Auto(Some(network)) => Method::Auto(Sweep::for_display(&target.display), network.clone()),
         }
     }
 }

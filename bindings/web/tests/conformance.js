@@ -38,6 +38,7 @@ async function targetOf(one, api) {
 
 async function methodOf(name, api) {
   const kinds = { network: "trained", auto: "auto" };
+  if (name === "default") return undefined;
   if (name === "sweep") return { kind: "sweep" };
   return { kind: kinds[name] ?? "trained", network: api.network(name in kinds ? "rgbd-8" : await model(name)) };
 }

@@ -117,7 +117,7 @@ public final class HologramSession: Sendable {
 
 extension SessionOptions {
     /// Creates the default options for `display`: holograms at its resolution by `method` and AA-DPM. Without a method,
-    /// the built-in network is used, or the plane sweep if that network was not trained for the display.
+    /// the session chooses between the built-in network and the plane sweep by each frame's depth.
     ///
     /// - Throws: ``PhasefrontError/display(message:)`` for an impossible display.
     public init(display: HologramDisplay = HologramDisplay(), method: HologramMethod? = nil) throws {

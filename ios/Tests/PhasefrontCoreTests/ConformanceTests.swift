@@ -91,8 +91,9 @@ final class ConformanceTests: XCTestCase {
         try HologramNetwork.fromFile(path: Self.root.appendingPathComponent("models/\(file)").path)
     }
 
-    private func method(_ name: String) throws -> HologramMethod {
+    private func method(_ name: String) throws -> HologramMethod? {
         switch name {
+        case "default": nil
         case "network": .trained(network: try network.get())
         case "sweep": .sweep
         case "auto": .auto(network: try network.get())

@@ -406,7 +406,7 @@ final class SessionTests: XCTestCase {
     func testTheNetworkThatIsBuiltInIsTheDefault() throws {
         for offset in [0.0, 3, 12] {
             let defaults = try SessionOptions(display: HologramDisplay(width: 64, height: 48, offsetMm: offset))
-            guard case .trained = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
+            guard case .auto(network: nil) = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
             guard case .antiAlias = defaults.encoding else { return XCTFail("\(defaults.encoding)") }
             _ = try HologramSession(defaults, mode: .image).process(still())
         }
@@ -443,8 +443,9 @@ final class SessionTests: XCTestCase {
 
     func testWithoutANetworkTheSweepIsTheDefault() throws {
         let defaults = try SessionOptions(display: HologramDisplay(width: 64, height: 48, pitchUm: 3.74))
-        guard case .sweep = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
-        _ = try HologramSession(defaults, mode: .image).process(still())
+        let session = try HologramSession(defaults, mode: .image)
+        _ = try session.process(still())
+        XCTAssert(session.statistics.backendWhy.hasPrefix("the plane sweep"), session.statistics.backendWhy)
     }
 
     func testMessagesReachTheLog() throws {

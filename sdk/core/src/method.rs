@@ -13,6 +13,7 @@ use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
+use phasefront_kernels::Isa;
 use std::sync::Arc;
 
 /// A method that computes holograms.
@@ -99,6 +100,15 @@ enum Scratch {
 }
 
 impl MethodScratch {
+    /// Returns whether the plane sweep alone made the last frame, without a network.
+    pub(crate) fn is_swept(&self) -> bool {
+        match &self.0 {
+            Scratch::Network(_) | Scratch::Seeded(_) => false,
+            Scratch::Sweep(_) => true,
+            Scratch::Auto { was_soft, .. } => *was_soft != Some(true),
+        }
+    }
+
     /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         match &mut self.0 {
@@ -166,6 +176,15 @@ impl MethodPlan {
         }
     }
 
+    /// Returns the instruction set of the plane sweep. Returns `None` for a method without one.
+    pub fn swept_on(&self) -> Option<Isa> {
+        match &self.plan {
+            Plan::Network(_) => None,
+            Plan::Sweep(plan) | Plan::Auto(plan, _) => Some(plan.isa()),
+            Plan::Seeded(plan) => Some(plan.swept_on()),
+        }
+    }
+
     /// Returns working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
         MethodScratch(match &self.plan {
@@ -213,9 +232,7 @@ impl MethodPlan {
                     was_soft,
                 },
             ) => {
-                let is_soft = softness::is_soft(softness::sharp_edges(frame), was_soft.filter(|_| follows));
-                *was_soft = Some(is_soft);
-                if is_soft {
+                if choose(was_soft, follows, frame) {
                     trained.field(frame, field, of_trained)
                 } else {
                     sweep.field(frame, field, of_sweep)
@@ -224,6 +241,22 @@ impl MethodPlan {
             _ => panic!("the scratch is another plan's"),
         }
     }
+
+    /// Updates the state in `scratch` as [`Self::field_after`] does, without computing the field of `frame`.
+    pub(crate) fn skip(&self, follows: bool, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
+        frame.check(self.shape, self.colours)?;
+        if let Scratch::Auto { was_soft, .. } = &mut scratch.0 {
+            choose(was_soft, follows, frame);
+        }
+        Ok(())
+    }
+}
+
+/// Returns whether the depth of `frame` is soft, where the previous frame is `was_soft` if this one `follows` it.
+fn choose(was_soft: &mut Option<bool>, follows: bool, frame: &RgbdFrame) -> bool {
+    let is_soft = softness::is_soft(softness::sharp_edges(frame), was_soft.filter(|_| follows));
+    *was_soft = Some(is_soft);
+    is_soft
 }
 
 /// Checks that `network` takes `input`.

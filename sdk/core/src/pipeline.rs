@@ -75,6 +75,12 @@ pub struct FrameReport {
 }
 
 impl PipelineScratch {
+    /// Returns whether the plane sweep alone made the last frame, without a network.
+    #[doc(hidden)]
+    pub fn is_swept(&self) -> bool {
+        self.method.is_swept()
+    }
+
     /// Makes the computation stop early once `cancel` is requested.
     #[doc(hidden)]
     pub fn set_cancel(&mut self, cancel: &Cancel) {
@@ -198,6 +204,15 @@ impl Pipeline {
         let report = self.process_in(&mut field, past, frame, levels, scratch);
         scratch.field = field;
         report
+    }
+
+    /// Updates the state in `scratch` as [`Self::process_after`] does, without making the hologram of `frame`.
+    ///
+    /// # Errors
+    /// Returns an error if the frame has another shape.
+    #[doc(hidden)]
+    pub fn skip(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut PipelineScratch) -> Result<()> {
+        self.method.skip(past.is_some(), frame, &mut scratch.method)
     }
 
     fn process_in(

@@ -2,6 +2,7 @@
 
 pub(crate) mod chain;
 mod hidden;
+mod softness;
 mod sweep;
 
 use super::device::Device;
@@ -9,11 +10,13 @@ use super::input::{Colour, Depth, Form, Frame, Packer, Source};
 use super::numbers::Numbers;
 use super::{GpuError, Result};
 use chain::{ChainOptions, ChainPlan, End};
+use phasefront_core::depth::softness::is_soft;
 use phasefront_core::display::Display;
 use phasefront_core::method::network::{InputKind, Network};
 use phasefront_core::method::seeded::seed;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::method::{Method, sweep_plan};
+use softness::Softness;
 use std::sync::Arc;
 use sweep::Sweeper;
 
@@ -30,6 +33,20 @@ enum Plan {
     Sweep(Sweeper),
     /// The sweep, the conversion of its field and the frame to the network's input, and the network.
     Seeded(Sweeper, Box<Packer>, Trained),
+    Auto(Box<Auto>),
+}
+
+/// The network and the sweep, which write to the same field.
+struct Auto {
+    softness: Softness,
+    /// Whether the depth of the frame, or of the previous one until [`MethodPlan::choose`], is soft.
+    is_soft: Option<bool>,
+    sweep: Sweeper,
+    /// The sweep that seeds the network, if it needs one.
+    seed: Option<Sweeper>,
+    /// Converts the frame's surfaces to the network's input.
+    packer: Packer,
+    trained: Trained,
 }
 
 /// A network in its number format.
@@ -58,6 +75,12 @@ impl Trained {
             depth_scale,
             chain: ChainPlan::new(device, chain, numbers, size, &packer.input, end, fusion)?,
         })
+    }
+}
+
+impl Trained {
+    fn sums(&self) -> (&wgpu::Buffer, usize) {
+        (&self.chain.partial, self.chain.parts)
     }
 }
 
@@ -110,11 +133,35 @@ impl MethodPlan {
                 let trained = Trained::new(device, network, how, size, &seeded, options)?;
                 (packer, Plan::Seeded(sweep, Box::new(seeded), trained))
             }
-            Method::Auto(..) => {
-                return Err(GpuError::Refused(
-                    "the sharpness of depth, which chooses between sweep and network, is measured on the CPU only; one of them alone is right"
-                        .into(),
-                ));
+            Method::Auto(sweep, network) => {
+                let packer = Packer::new(device, Form::Surfaces, size, source, None)?;
+                let surfaces = &packer.input.first;
+                let at_midpoint = |sweep| SweepPlan::new(height, width, display, sweep, 0.0);
+                let seed = match network.input() {
+                    InputKind::Seeded => {
+                        let plan = at_midpoint(seed(network, display))?;
+                        Some(Sweeper::new(device, &plan, display, surfaces)?)
+                    }
+                    _ => None,
+                };
+                let source = match &seed {
+                    Some(seed) => Source::Seeded(surfaces, &seed.field),
+                    None => Source::Surfaces(surfaces),
+                };
+                let how = how(network)?;
+                let form = Form::Chain(network.chain(), how.0, how.1);
+                let input = Packer::new(device, form, size, source, None)?;
+                let trained = Trained::new(device, network, how, size, &input, options)?;
+                let field = trained.chain.field.clone();
+                let auto = Auto {
+                    softness: Softness::new(device, surfaces, size)?,
+                    is_soft: None,
+                    sweep: Sweeper::into_field(device, &at_midpoint(*sweep)?, display, surfaces, field)?,
+                    seed,
+                    packer: input,
+                    trained,
+                };
+                (packer, Plan::Auto(Box::new(auto)))
             }
             _ => return Err(GpuError::Refused("this method runs on the CPU only".into())),
         };
@@ -128,7 +175,7 @@ impl MethodPlan {
         }
         let form = match &self.plan {
             Plan::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers, trained.depth_scale),
-            Plan::Sweep(_) | Plan::Seeded(..) => Form::Surfaces,
+            Plan::Sweep(_) | Plan::Seeded(..) | Plan::Auto(_) => Form::Surfaces,
         };
         let source = Source::Frame(formats.0, formats.1);
         let input = Some(self.packer.input.clone());
@@ -148,9 +195,45 @@ impl MethodPlan {
         self.packer.run(pass);
     }
 
-    /// Adds depth that comes as readings.
+    /// Adds depth that comes as readings, and measures the depth if the method depends on it.
     pub(super) fn condition(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.packer.condition(pass);
+        if let Plan::Auto(auto) = &self.plan {
+            auto.softness.run(pass);
+        }
+    }
+
+    /// Returns the measure of the depth, if the method depends on it. [`Self::choose`] must then be called before
+    /// [`Self::run`].
+    pub(super) fn softness(&self) -> Option<&Softness> {
+        match &self.plan {
+            Plan::Auto(auto) => Some(&auto.softness),
+            _ => None,
+        }
+    }
+
+    /// Chooses the method for a frame whose depth was measured by `submission`, as
+    /// [`phasefront_core::method::MethodPlan`] does.
+    pub(super) async fn choose(
+        &mut self,
+        device: &Device,
+        follows: bool,
+        submission: &wgpu::SubmissionIndex,
+    ) -> Result<()> {
+        if let Plan::Auto(auto) = &mut self.plan {
+            let share = auto.softness.sharp_edges(device, submission).await?;
+            auto.is_soft = Some(is_soft(share, auto.is_soft.filter(|_| follows)));
+        }
+        Ok(())
+    }
+
+    /// Returns whether the plane sweep alone makes the frame, without a network.
+    pub(super) fn is_swept(&self) -> bool {
+        match &self.plan {
+            Plan::Network(_) | Plan::Seeded(..) => false,
+            Plan::Sweep(_) => true,
+            Plan::Auto(auto) => auto.is_soft != Some(true),
+        }
     }
 
     /// Computes the field from the converted input.
@@ -163,6 +246,14 @@ impl MethodPlan {
                 seeded.run(pass);
                 trained.chain.run(pass);
             }
+            Plan::Auto(auto) if auto.is_soft == Some(true) => {
+                if let Some(seed) = &auto.seed {
+                    seed.run(pass);
+                }
+                auto.packer.run(pass);
+                auto.trained.chain.run(pass);
+            }
+            Plan::Auto(auto) => auto.sweep.run(pass),
         }
     }
 
@@ -171,21 +262,24 @@ impl MethodPlan {
         match &self.plan {
             Plan::Network(trained) | Plan::Seeded(_, _, trained) => &trained.chain.field,
             Plan::Sweep(sweep) => &sweep.field,
+            Plan::Auto(auto) => &auto.trained.chain.field,
         }
     }
 
-    /// Returns the sums of the field, three complex f32 for each workgroup, and the number of workgroups.
-    pub(super) fn sums(&self) -> (&wgpu::Buffer, usize) {
+    /// Returns the sums of the field that the network writes and of the one that the sweep writes, as far as the method
+    /// has them: three complex f32 for each workgroup, and the number of workgroups.
+    pub(super) fn sums(&self) -> [Option<(&wgpu::Buffer, usize)>; 2] {
         match &self.plan {
-            Plan::Network(trained) | Plan::Seeded(_, _, trained) => (&trained.chain.partial, trained.chain.parts),
-            Plan::Sweep(sweep) => (&sweep.partial, sweep.parts),
+            Plan::Network(network) | Plan::Seeded(_, _, network) => [Some(network.sums()), None],
+            Plan::Sweep(sweep) => [None, Some((&sweep.partial, sweep.parts))],
+            Plan::Auto(auto) => [Some(auto.trained.sums()), Some((&auto.sweep.partial, auto.sweep.parts))],
         }
     }
 
     /// Returns the hologram's position in metres from the midpoint toward the viewer.
     pub(super) fn z_m(&self) -> f64 {
         match &self.plan {
-            Plan::Network(_) | Plan::Seeded(..) => 0.0,
+            Plan::Network(_) | Plan::Seeded(..) | Plan::Auto(_) => 0.0,
             Plan::Sweep(sweep) => sweep.z_m,
         }
     }
@@ -195,6 +289,7 @@ impl MethodPlan {
         match &self.plan {
             Plan::Network(trained) | Plan::Seeded(_, _, trained) => trained.numbers,
             Plan::Sweep(_) => Numbers::F32,
+            Plan::Auto(auto) => auto.trained.numbers,
         }
     }
 
@@ -212,6 +307,7 @@ impl MethodPlan {
             Plan::Network(network) => trained(network),
             Plan::Sweep(sweep) => swept(sweep),
             Plan::Seeded(sweep, _, network) => format!("{}, {}", swept(sweep), trained(network)),
+            Plan::Auto(auto) => format!("{}, or {}", trained(&auto.trained), swept(&auto.sweep)),
         }
     }
 
@@ -221,6 +317,8 @@ impl MethodPlan {
             Plan::Network(trained) => trained.chain.bytes,
             Plan::Sweep(sweep) => sweep.bytes,
             Plan::Seeded(sweep, _, trained) => sweep.bytes + trained.chain.bytes,
+            Plan::Auto(auto) if self.is_swept() => auto.sweep.bytes,
+            Plan::Auto(auto) => auto.seed.as_ref().map_or(0, |seed| seed.bytes) + auto.trained.chain.bytes,
         }
     }
 }

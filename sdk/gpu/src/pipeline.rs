@@ -123,8 +123,9 @@ pub struct GpuPipeline {
     device: Arc<Device>,
     size: (usize, usize),
     method: MethodPlan,
-    /// `None` for an encoding that was trained on the field's unmodified phase.
-    mean: Option<MeanPhase>,
+    /// Of a field that a network writes and of one that a sweep writes. Empty for an encoding that was trained on the
+    /// field's unmodified phase.
+    mean: [Option<MeanPhase>; 2],
     /// `None` if the modulator is at the midpoint.
     offset: Option<Convolution>,
     encoder: Encoder,
@@ -181,14 +182,21 @@ impl GpuPipeline {
         let (target, formats) = (&job.target, (job.colour, job.depth));
         let (display, encoder) = (&target.display, &job.encoder);
         let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
-        let (sums, parts) = method.sums();
-        let mean = if encoder.encoding.keeps_phase() {
+        let of_phase = if encoder.encoding.keeps_phase() {
             None
         } else {
-            Some(MeanPhase::new(device, sums, parts)?)
+            Some(device.buffer("the mean phase", 24)?)
         };
+        let mean = |sums: Option<(&wgpu::Buffer, usize)>| {
+            let Some(((sums, parts), turn)) = sums.zip(of_phase.clone()) else {
+                return Ok(None);
+            };
+            MeanPhase::new(device, sums, parts, turn).map(Some)
+        };
+        let [trained, swept] = method.sums();
+        let mean = [mean(trained)?, mean(swept)?];
         // The first stage that reads the field applies the turn.
-        let mut turn = mean.as_ref().map(|mean| &mean.turn);
+        let mut turn = of_phase.as_ref();
         // The distance from the method's plane to the modulator.
         let distance_m = display.offset_m() - method.z_m();
         let plans = target.propagators(size, 1, distance_m, target.correction.as_ref())?;
@@ -292,9 +300,18 @@ impl GpuPipeline {
         let work = || {
             self.method.upload(&device, frame)?;
             self.encoder.set_past(&device, past);
-            Ok(device.queue.submit([self.commands(slot, deliver)]))
+            let read = self.reading(slot);
+            if self.method.softness().is_some() {
+                return Ok((device.queue.submit([read]), true));
+            }
+            Ok((device.queue.submit([read, self.making(slot, deliver)]), false))
         };
-        let submission = device.guarded_async(work).await?;
+        let (mut submission, is_measured) = device.guarded_async(work).await?;
+        if is_measured {
+            self.method.choose(&device, past.is_some(), &submission).await?;
+            let work = || Ok(device.queue.submit([self.making(slot, deliver)]));
+            submission = device.guarded_async(work).await?;
+        }
         self.serial += 1;
         self.slots[slot].flight = Some(Flight {
             serial: self.serial,
@@ -311,51 +328,73 @@ impl GpuPipeline {
     ///
     /// # Errors
     /// Returns an error if the frame's byte lengths differ from the plan, or the device is lost.
-    pub async fn read_async(&mut self, frame: &Frame<'_>) -> Result<()> {
+    pub async fn read_async(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<()> {
         let device = self.device.clone();
         let work = || {
             self.method.upload(&device, frame)?;
-            let mut encoder = device.inner.create_command_encoder(&Default::default());
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            self.method.read(&mut pass);
-            self.method.condition(&mut pass);
-            drop(pass);
-            device.queue.submit([encoder.finish()]);
-            Ok(())
+            Ok(device.queue.submit([self.reading(0)]))
         };
-        device.guarded_async(work).await
+        let submission = device.guarded_async(work).await?;
+        self.method.choose(&device, past.is_some(), &submission).await
     }
 
-    fn commands(&self, at: usize, deliver: Deliver) -> wgpu::CommandBuffer {
+    /// Returns whether the plane sweep alone made the last frame, without a network.
+    pub fn is_swept(&self) -> bool {
+        self.method.is_swept()
+    }
+
+    /// Runs `work` as stage `index` of the frame in slot `at`.
+    fn stage(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        at: usize,
+        index: u32,
+        work: impl FnOnce(&mut wgpu::ComputePass<'_>),
+    ) {
+        let stamps = self.slots[at].stamps.as_ref();
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: None,
+            timestamp_writes: stamps.map(|(set, _)| wgpu::ComputePassTimestampWrites {
+                query_set: set,
+                beginning_of_pass_write_index: Some(2 * index),
+                end_of_pass_write_index: Some(2 * index + 1),
+            }),
+        });
+        work(&mut pass);
+    }
+
+    /// Returns the commands that read the frame in slot `at` and measure its depth, if the method depends on it.
+    fn reading(&self, at: usize) -> wgpu::CommandBuffer {
+        let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
+        if let Some(softness) = self.method.softness() {
+            softness.reset(&mut encoder);
+        }
+        self.stage(&mut encoder, at, 0, |pass| self.method.read(pass));
+        self.stage(&mut encoder, at, 1, |pass| self.method.condition(pass));
+        if let Some(softness) = self.method.softness() {
+            softness.copy(&mut encoder);
+        }
+        encoder.finish()
+    }
+
+    /// Returns the commands that make the hologram of the frame in slot `at`, which was read.
+    fn making(&self, at: usize, deliver: Deliver) -> wgpu::CommandBuffer {
         let slot = &self.slots[at];
         let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
         self.encoder.reset(&mut encoder);
-        let mut stage = |index: u32, work: &dyn Fn(&mut wgpu::ComputePass<'_>)| {
-            let stamps = slot.stamps.as_ref();
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: None,
-                timestamp_writes: stamps.map(|(set, _)| wgpu::ComputePassTimestampWrites {
-                    query_set: set,
-                    beginning_of_pass_write_index: Some(2 * index),
-                    end_of_pass_write_index: Some(2 * index + 1),
-                }),
-            });
-            work(&mut pass);
-        };
-        stage(0, &|pass| self.method.read(pass));
-        stage(1, &|pass| self.method.condition(pass));
-        stage(2, &|pass| {
+        let mean = &self.mean[usize::from(self.method.is_swept())];
+        self.stage(&mut encoder, at, 2, |pass| {
             self.method.run(pass);
-            if let Some(mean) = &self.mean {
+            if let Some(mean) = mean {
                 mean.run(pass);
             }
         });
-        stage(3, &|pass| {
+        self.stage(&mut encoder, at, 3, |pass| {
             if let Some(offset) = &self.offset {
                 offset.run(pass);
             }
         });
-        stage(4, &|pass| self.encoder.run(pass, at));
+        self.stage(&mut encoder, at, 4, |pass| self.encoder.run(pass, at));
         encoder.copy_buffer_to_buffer(&self.encoder.largest, 0, &slot.readable, 0, 16);
         if let Some((set, resolved)) = &slot.stamps {
             let bytes = u64::from(STAMPS) * 8;

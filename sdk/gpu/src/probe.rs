@@ -10,6 +10,7 @@ use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
 use phasefront_core::frame::{Crop, RgbdFrame};
+use phasefront_core::method::Method;
 use phasefront_core::pipeline::Pipeline;
 use std::sync::Arc;
 
@@ -19,12 +20,23 @@ const SIZE: (usize, usize) = (37, 43);
 const READINGS: (usize, usize) = (9, 11);
 
 /// Runs small frames of `job`, with depth of their size and with readings, on `device` and on the CPU and compares
-/// their phases.
+/// their phases. Tries both methods of an automatic choice.
 ///
 /// # Errors
 /// Returns [`GpuError::Wrong`] if the phases differ by more than the rounding of the numbers, [`GpuError::Lost`] if the
 /// device does not respond, and the errors of [`GpuPipeline::new_async`].
 pub async fn probe_async(device: &Arc<Device>, job: &Job) -> Result<()> {
+    let methods = match &job.method {
+        Method::Auto(sweep, network) => vec![Method::Sweep(*sweep), Method::trained(network.clone())],
+        method => vec![method.clone()],
+    };
+    for method in methods {
+        compare_small(device, &Job { method, ..job.clone() }).await?;
+    }
+    Ok(())
+}
+
+async fn compare_small(device: &Arc<Device>, job: &Job) -> Result<()> {
     let job = Job {
         shape: SIZE,
         target: Target {
@@ -134,7 +146,6 @@ mod tests {
     use super::*;
     use crate::probe;
     use phasefront_core::display::Display;
-    use phasefront_core::method::Method;
     use phasefront_core::method::network::Network;
     use pollster::block_on;
 

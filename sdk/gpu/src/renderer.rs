@@ -137,13 +137,13 @@ impl Renderer {
     ///
     /// # Errors
     /// Returns the errors of [`Renderer::submit`].
-    pub async fn read(&mut self, frame: &Frame<'_>) -> Result<()> {
+    pub async fn read(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<()> {
         loop {
             let pipeline = match &mut self.pipeline {
                 Some(pipeline) => pipeline,
                 None => self.open(None).await?,
             };
-            match pipeline.read_async(frame).await {
+            match pipeline.read_async(past, frame).await {
                 Ok(()) => return Ok(()),
                 Err(why) => self.note(why)?,
             }

@@ -993,7 +993,7 @@ fn every_program_agrees_with_the_cpu_on_readings() {
             let mut levels = vec![0; 3 * out.0 * out.1];
             // The second frame is only read, and the third has it as its past.
             match time {
-                1 => block_on(gpu.read_async(&frame)).unwrap(),
+                1 => block_on(gpu.read_async(None, &frame)).unwrap(),
                 _ => assert!(gpu.process(&frame, &mut levels).unwrap().scale > 0.0),
             }
             let mut decided = display.clone();

@@ -124,14 +124,7 @@ impl Engine {
             Processor::Gpu(gpu) => gpu.report(),
         };
         if let Some(refusal) = &self.refusal {
-            if report.name.is_empty() {
-                report.name = "cpu".into();
-            }
-            report.why = if report.why.is_empty() {
-                refusal.clone()
-            } else {
-                format!("{refusal}; {}", report.why)
-            };
+            report.why = format!("{refusal}; {}", report.why);
         }
         report
     }
@@ -145,15 +138,16 @@ impl Engine {
     ///
     /// # Errors
     /// Returns an error if the frame is invalid. Of a GPU that is lost, the next frame tells.
-    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only a GPU has a state.
-    pub(super) async fn replay(&mut self, input: &FrameInput<'_>) -> Result<()> {
-        #[cfg(feature = "gpu")]
-        if let Processor::Gpu(gpu) = &mut self.processor
-            && let Err(Failure::Frame(why)) = gpu.read(input).await
-        {
-            return Err(why);
+    pub(super) async fn replay(&mut self, input: &mut FrameInput<'_>, brightness: &BrightnessTracker) -> Result<()> {
+        let past = brightness.past(input.elapsed);
+        match &mut self.processor {
+            Processor::Cpu(cpu) => cpu.skip(past, input.rgbd()),
+            #[cfg(feature = "gpu")]
+            Processor::Gpu(gpu) => match gpu.read(input, past).await {
+                Err(Failure::Frame(why)) => Err(why),
+                Ok(()) | Err(Failure::Gpu(_)) => Ok(()),
+            },
         }
-        Ok(())
     }
 
     /// Computes the levels of a frame. If the GPU turns out to be unusable, switches to the CPU from this frame on.

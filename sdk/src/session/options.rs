@@ -9,8 +9,6 @@ use phasefront_core::depth_network::DepthNetwork;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::method::Method;
-#[cfg(feature = "models")]
-use phasefront_core::method::sweep::Sweep;
 use phasefront_core::runtime::error::{Error, Result};
 use std::num::NonZeroUsize;
 #[cfg(feature = "tract")]
@@ -61,15 +59,12 @@ impl SessionOptions {
     /// The default of [`Self::most_pixels`]: 8192×4096, which includes 8K UHD.
     pub const MOST_PIXELS: usize = 1 << 25;
 
-    /// Returns the default options for `target` with a bundled network if one was trained for its display, otherwise
-    /// with the plane sweep.
+    /// Returns the default options for `target`. The method is [`Method::Auto`] with a bundled network if one was
+    /// trained for the display, otherwise the plane sweep.
     #[cfg(feature = "models")]
     pub fn for_target(target: impl Into<Target>) -> Self {
         let target = target.into();
-        let method = match phasefront_models::default_network(&target.display) {
-            Some(network) => Method::Network(network),
-            None => Method::Sweep(Sweep::for_display(&target.display)),
-        };
+        let method = phasefront_models::default_method(&target.display);
         SessionOptions::new(target, method)
     }
 

@@ -37,8 +37,8 @@ pub enum Backend {
     #[default]
     Cpu,
     /// Computes on the GPU if the library was built with the feature `gpu`, a GPU exists and its results agree with the
-    /// CPU's; otherwise on the CPU. The CPU also computes levels over 8 bits, sweeps whose steps have over 21 taps, and
-    /// methods chosen automatically. [`super::Statistics::backend`] reports the backend in use and the reason.
+    /// CPU's; otherwise on the CPU. The CPU also computes levels over 8 bits and sweeps whose steps have over 21 taps.
+    /// [`super::Statistics::backend`] reports the backend in use and the reason.
     Gpu,
 }
 

@@ -361,6 +361,7 @@ impl Stages {
         let mut plan = self.take_plan().await?;
         let Stages {
             pool,
+            brightness,
             estimates,
             cancel,
             ..
@@ -368,8 +369,8 @@ impl Stages {
         let mut times = FrameTimes::default();
         let work = async || {
             plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
-            let (engine, input) = plan.input(frame, elapsed);
-            engine.replay(&input).await
+            let (engine, mut input) = plan.input(frame, elapsed);
+            engine.replay(&mut input, brightness).await
         };
         let replayed = pool.run(work).await;
         self.plan = Some(plan);

@@ -131,6 +131,67 @@ fn sweeps_are_those_of_the_cpu() {
     }
 }
 
+/// Chooses the method of each frame as the CPU does, from depth of the frame's size and from readings.
+#[test]
+fn the_automatic_choice_is_that_of_the_cpu() {
+    let (height, width) = (96, 128);
+    let mut plain = options(width, height);
+    // Where the modulator is at the midpoint, either method alone ends there too.
+    plain.target.display = Display::from_toml("width = 128\nheight = 96\noffset_mm = 0").unwrap();
+    let Method::Network(network) = plain.quality_levels[0].method.clone() else {
+        panic!("the tests' network");
+    };
+    let sweep = Sweep::for_display(&plain.target.display);
+    plain.quality_levels[0].method = Method::Auto(sweep, network.clone());
+    let alone = |method: Method| {
+        let mut options = plain.clone();
+        options.quality_levels[0].method = method;
+        options
+    };
+    let methods = [Method::Sweep(sweep), Method::Network(network)];
+    let scene = Scene::new(height, width, 40);
+    let gpu = VideoSession::new(on_gpu(plain.clone())).unwrap();
+    let cpu = VideoSession::new(plain.clone()).unwrap();
+    let resumed = VideoSession::new(on_gpu(plain.clone())).unwrap();
+    for (i, (soft, rows)) in [(false, 96), (true, 96), (true, 48), (false, 24), (true, 96)]
+        .into_iter()
+        .enumerate()
+    {
+        let columns = rows * 4 / 3;
+        let metres = |x: usize, y: usize| {
+            let (x, y) = (x as f32 / columns as f32 - 0.5, y as f32 / rows as f32 - 0.5);
+            let r = (x * x + y * y).sqrt();
+            let share = if soft {
+                ((r - 0.1) / 0.2).clamp(0.0, 1.0)
+            } else {
+                f32::from(r > 0.25)
+            };
+            0.6 + 1.2 * share * share * (3.0 - 2.0 * share)
+        };
+        let bytes: Vec<u8> = (0..rows * columns)
+            .flat_map(|i| metres(i % columns, i / columns).to_le_bytes())
+            .collect();
+        let depth = depth(&bytes, DepthFormat::MetresF32, columns, rows);
+        let time = (i as u64 + 1) * 33_000_000;
+        let frame = CameraFrame::new(time, scene.colour(), depth);
+        let expected = cpu.process(&frame).unwrap();
+        let made = gpu.process(&frame).unwrap();
+        let share = differing(made.levels(), expected.levels(), 0.01);
+        assert!(share < 0.1, "{i}: {share}");
+        let single = ImageSession::new(alone(methods[usize::from(soft)].clone())).unwrap();
+        let single = single.process(&frame).unwrap();
+        let image = ImageSession::new(plain.clone()).unwrap().process(&frame).unwrap();
+        assert!(image.levels() == single.levels(), "{i}: soft is {soft}");
+        // A frame that is replayed counts.
+        match i {
+            0..4 => resumed.replay(&frame, made.scale()).unwrap(),
+            _ => assert_eq!(resumed.process(&frame).unwrap().levels(), made.levels()),
+        }
+    }
+    let why = gpu.statistics().backend.why;
+    assert!(why.contains("int8") && why.contains("the sweep"), "{why}");
+}
+
 /// Runs each colour format, rotated and not, as frames of one session, which plans only its input again.
 #[test]
 fn cameras_may_change_their_format() {
@@ -331,11 +392,6 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         ..Sweep::for_display(&sweep.target.display)
     });
     cases.push((sweep, "31 taps"));
-    let mut either = gpu.clone();
-    let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
-    let sweep = Sweep::for_display(&either.target.display);
-    either.quality_levels[0].method = Method::Auto(sweep, Arc::new(network));
-    cases.push((either, "sharpness"));
     let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
     let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.quality_levels[0].method.clone());
     (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());

@@ -15,15 +15,12 @@ use crate::flags::encoder::Encoder;
 use crate::flags::method::{CoreMethod, Parts};
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::RgbdFrame;
 use phasefront_command::flags::sweep_for;
-use phasefront_core::depth::softness;
 use phasefront_core::method::network::Engine;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};
-use phasefront_models::default_network;
 use std::time::Duration;
 
 impl HologramRequest {
@@ -41,24 +38,16 @@ impl HologramRequest {
         }
         match (method, image) {
             (Method::Core(method), Image::Rgbd(frame)) => {
-                let chosen = match method {
-                    CoreMethod::Auto => self.automatic(frame, &display.target.display)?,
-                    method => method,
-                };
-                // If edges are sharp, auto does not use its network.
-                let trained = method == chosen || chosen == CoreMethod::Network;
-                let method = chosen;
                 let (core, encoder) = method.of(&Parts {
-                    network: self.network.as_deref().filter(|_| trained),
-                    precision: self.precision.filter(|_| trained),
+                    network: self.network.as_deref(),
+                    precision: self.precision,
                     display: &display.target.display,
                     sweep: sweep_for(&display.target.display, self.planes, self.taps),
                     encoder: &self.encoder,
                 })?;
-                let stage = method.name();
                 match &device {
-                    Some(options) => self.on_gpu(stage, core, frame, display, encoder, options),
-                    None => self.on_cpu(stage, core, frame, display, encoder),
+                    Some(options) => self.on_gpu(core, frame, display, encoder, options),
+                    None => self.on_cpu(core, frame, display, encoder),
                 }
             }
             (method, Image::Rgbd(frame)) => {
@@ -67,17 +56,6 @@ impl HologramRequest {
             }
             (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.encoder.read()?),
         }
-    }
-
-    /// Chooses the method for the frame: the network if the edges of its depth are soft and one suits the display, else
-    /// the sweep.
-    fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
-        let trained = self.network.is_some() || default_network(display).is_some();
-        Ok(if trained && softness::is_soft(softness::sharp_edges(frame), None) {
-            CoreMethod::Network
-        } else {
-            CoreMethod::Sweep
-        })
     }
 }
 
@@ -103,6 +81,15 @@ impl HologramResult {
 /// Makes a stack of `shape` from `values`.
 fn stack(values: Vec<Complex32>, shape: (usize, usize, usize)) -> Array3<Complex32> {
     Array3::from_shape_vec(shape, values).expect("a stack of the frame's shape")
+}
+
+/// Returns the name of the method that made a frame's field.
+fn name(is_swept: bool) -> &'static str {
+    if is_swept {
+        CoreMethod::Sweep.name()
+    } else {
+        CoreMethod::Network.name()
+    }
 }
 
 /// Describes the engine of a network and why it was chosen.

@@ -60,7 +60,14 @@ function target(source: TargetSource): Target | Display {
 }
 
 function method(said: Method<NetworkSource>): Method {
-  return "network" in said ? { ...said, network: network(said.network) } : said;
+  switch (said.kind) {
+    case "trained":
+      return { ...said, network: network(said.network) };
+    case "auto":
+      return said.network === undefined ? { kind: "auto" } : { ...said, network: network(said.network) };
+    default:
+      return said;
+  }
 }
 
 function encoding(said: Encoding<NetworkSource>): Encoding {

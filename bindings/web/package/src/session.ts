@@ -15,12 +15,13 @@ export type RunningMode = "image" | "video";
 
 /**
  * The method that computes holograms: a trained network; the plane sweep, for any display; or an automatic choice by
- * each frame's depth.
+ * each frame's depth. Without a network, the automatic choice takes the built-in one, or the plane sweep alone if that
+ * network was not trained for the display.
  */
 export type Method<N = Network> =
   | { readonly kind: "trained"; readonly network: N }
   | { readonly kind: "sweep" }
-  | { readonly kind: "auto"; readonly network: N };
+  | { readonly kind: "auto"; readonly network?: N };
 
 /** The encoding of the field as phases. Omitted values are those of the publication. */
 export type Encoding<N = Network> =
@@ -54,7 +55,7 @@ export interface QualityLevel<N = Network> {
 export interface SessionOptions<N = Network, T = Target | Display> {
   /** The target of the holograms; the paper's display by default. */
   readonly target?: T;
-  /** The method; by default the built-in network if it was trained for the display, otherwise the plane sweep. */
+  /** The method; by default the automatic choice with the built-in network. */
   readonly method?: Method<N>;
   /** The quality levels, best first; by default only `method` at the modulator's resolution. */
   readonly qualityLevels?: readonly QualityLevel<N>[];
@@ -121,7 +122,7 @@ function rawMethod(method: Method): RawMethod {
     case "trained":
       return RawMethod.trained(method.network.raw);
     case "auto":
-      return RawMethod.auto(method.network.raw);
+      return method.network ? RawMethod.autoWith(method.network.raw) : RawMethod.auto();
     case "sweep":
       return RawMethod.sweep();
     default: {

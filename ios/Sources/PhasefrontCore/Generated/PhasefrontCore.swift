@@ -961,6 +961,14 @@ public protocol HologramTargetProtocol: AnyObject, Sendable {
      */
     func display()  -> HologramDisplay
     
+    /**
+     * Returns the bytes of a calibration file, which [`Self::from_bytes`] reads.
+     *
+     * # Errors
+     * Returns an error if the target cannot be written.
+     */
+    func toBytes() throws  -> Data
+    
 }
 /**
  * The target of holograms: a display and its calibration, if there is one: the modulator's response to phases, the
@@ -1090,6 +1098,21 @@ open func display() -> HologramDisplay  {
     return try!  FfiConverterTypeHologramDisplay_lift(try! rustCall() {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_hologramtarget_display(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Returns the bytes of a calibration file, which [`Self::from_bytes`] reads.
+     *
+     * # Errors
+     * Returns an error if the target cannot be written.
+     */
+open func toBytes()throws  -> Data  {
+    return try  FfiConverterData.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_hologramtarget_to_bytes(
             self.uniffiCloneHandle(),uniffiCallStatus
     )
 })
@@ -1493,6 +1516,27 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
         try! rustCall { uniffi_phasefront_ffi_fn_free_rawhologram(handle, $0) }
     }
 
+    
+    /**
+     * Restores a hologram from its levels, the planes of the target's colours one after another without gaps, and its
+     * properties, of which it keeps the size and the scale.
+     *
+     * # Errors
+     * Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target
+     * has more than 8 bits.
+     */
+public static func fromLevels(levels: Data, info: HologramInfo, target: HologramTarget)throws  -> RawHologram  {
+    return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(levels) { levelsFb in
+    uniffi_phasefront_ffi_fn_constructor_rawhologram_from_levels(
+        levelsFb,
+        FfiConverterTypeHologramInfo_lower(info),
+        FfiConverterTypeHologramTarget_lower(target),uniffiCallStatus
+    )
+        }
+})
+}
     
     /**
      * Makes the hologram of a complex field of `height` × `width` pixels at `z_mm`, 0 the midpoint: the real and the
@@ -6537,22 +6581,23 @@ public func FfiConverterTypeEncoding_lower(_ value: Encoding) -> RustBuffer {
 public enum HologramMethod {
     
     /**
-     * A trained network.
+     * The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
+     * estimated, and the plane sweep for all others. This is the default.
      */
-    case trained(
+    case auto(
         /**
-         * The network, which must suit the session's display.
-         */network: HologramNetwork
+         * The network, which must suit the session's display; none for the built-in one, or for the plane sweep alone
+         * if that network was not trained for the display.
+         */network: HologramNetwork? = nil
     )
     /**
-     * The plane sweep, which suits any display. It is slower and needs no training.
+     * The plane sweep, which suits any display and needs no training.
      */
     case sweep
     /**
-     * The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
-     * estimated, and the plane sweep for all others.
+     * A trained network.
      */
-    case auto(
+    case trained(
         /**
          * The network, which must suit the session's display.
          */network: HologramNetwork
@@ -6578,12 +6623,12 @@ public struct FfiConverterTypeHologramMethod: FfiConverterRustBuffer {
         let variant: Int32 = try readInt(&buf)
         switch variant {
         
-        case 1: return .trained(network: try FfiConverterTypeHologramNetwork.read(from: &buf)
+        case 1: return .auto(network: try FfiConverterOptionTypeHologramNetwork.read(from: &buf)
         )
         
         case 2: return .sweep
         
-        case 3: return .auto(network: try FfiConverterTypeHologramNetwork.read(from: &buf)
+        case 3: return .trained(network: try FfiConverterTypeHologramNetwork.read(from: &buf)
         )
         
         default: throw UniffiInternalError.unexpectedEnumCase
@@ -6594,16 +6639,16 @@ public struct FfiConverterTypeHologramMethod: FfiConverterRustBuffer {
         switch value {
         
         
-        case let .trained(network):
+        case let .auto(network):
             writeInt(&buf, Int32(1))
-            FfiConverterTypeHologramNetwork.write(network, into: &buf)
+            FfiConverterOptionTypeHologramNetwork.write(network, into: &buf)
             
         
         case .sweep:
             writeInt(&buf, Int32(2))
         
         
-        case let .auto(network):
+        case let .trained(network):
             writeInt(&buf, Int32(3))
             FfiConverterTypeHologramNetwork.write(network, into: &buf)
             
@@ -7851,6 +7896,30 @@ fileprivate struct FfiConverterOptionTypeDepthNetwork: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionTypeHologramNetwork: FfiConverterRustBuffer {
+    typealias SwiftType = HologramNetwork?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeHologramNetwork.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeHologramNetwork.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeLogListener: FfiConverterRustBuffer {
     typealias SwiftType = LogListener?
 
@@ -8340,8 +8409,8 @@ public func phoneOptions(target: HologramTarget, rateHz: Double = Double(30.0), 
 }
 /**
  * Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
- * correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
- * built-in network, or the plane sweep if that network was not trained for the display.
+ * correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session chooses
+ * between the built-in network and the plane sweep by each frame's depth, as `Auto` does.
  */
 public func sessionOptions(target: HologramTarget, method: HologramMethod? = nil)throws  -> SessionOptions  {
     return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -8400,7 +8469,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_phone_options() != 23382) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_session_options() != 44888) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 3146) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 4710) {
@@ -8523,10 +8592,16 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_hologramtarget_display() != 62232) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_hologramtarget_to_bytes() != 23254) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin() != 26666) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 39953) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_from_levels() != 11793) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field() != 1349) {

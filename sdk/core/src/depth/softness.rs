@@ -9,7 +9,8 @@ use crate::frame::RgbdFrame;
 use rayon::prelude::*;
 
 /// The change of depth over a window above which it holds an edge, as a share of the volume.
-const EDGE: f32 = 0.1;
+#[doc(hidden)]
+pub const EDGE: f32 = 0.1;
 /// The least number of steps of a window.
 const LEAST_WINDOW: usize = 25;
 /// The number of windows along the longer side of a large frame: a sensor's reading grows with the display.
@@ -17,13 +18,15 @@ const WINDOWS: usize = 41;
 /// The number of lines along the longer side of a large frame that are measured.
 const MEASURED: usize = 480;
 /// The share of a window's change that a sharp edge makes in one step.
-const ONE_STEP: f32 = 0.75;
+#[doc(hidden)]
+pub const ONE_STEP: f32 = 0.75;
 /// The least share of sharp edges in depth that is not soft.
 const SHARP: f32 = 0.5;
 /// The distance from [`SHARP`] within which a video frame stays what the previous frame was.
 const HYSTERESIS: f32 = 0.05;
-/// The number of lines in a thread's unit of work.
-const LINES: usize = 32;
+/// The number of lines in a thread's unit of work. The first of each is measured.
+#[doc(hidden)]
+pub const LINES: usize = 32;
 
 /// Returns whether depth of which `sharp_edges` of the edges are sharp is soft. `was` says it of the previous frame of
 /// a video, so that a video does not alternate between two methods.
@@ -44,14 +47,27 @@ pub fn is_soft(sharp_edges: f32, was: Option<bool>) -> bool {
 pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
     let depth = frame.values().1;
     let (height, width) = frame.shape();
-    let window = (height.max(width) / WINDOWS).max(LEAST_WINDOW);
-    let every = (height.max(width) / MEASURED).max(1);
+    let (window, every) = scale(height, width);
     let part = |part: usize, of: usize| (part * LINES..((part + 1) * LINES).min(of)).step_by(every);
     let rows = (0..height.div_ceil(LINES)).into_par_iter();
     let rows = rows.map(|i| edges(depth, part(i, height), width, (1, width), window));
     let columns = (0..width.div_ceil(LINES)).into_par_iter();
     let columns = columns.map(|i| edges(depth, part(i, width), 1, (width, height), window));
     let (sharp, all) = rows.chain(columns).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    share(sharp, all)
+}
+
+/// Returns the number of steps of a window of frames of (`height`, `width`), and the number of lines of which one is
+/// measured.
+#[doc(hidden)]
+pub fn scale(height: usize, width: usize) -> (usize, usize) {
+    let longer = height.max(width);
+    ((longer / WINDOWS).max(LEAST_WINDOW), (longer / MEASURED).max(1))
+}
+
+/// Returns the share of `sharp` among `all` edges, and 1 if there are none.
+#[doc(hidden)]
+pub fn share(sharp: u32, all: u32) -> f32 {
     if all == 0 { 1.0 } else { sharp as f32 / all as f32 }
 }
 

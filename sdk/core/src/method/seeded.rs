@@ -16,6 +16,7 @@ use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use num_complex::Complex32;
+use phasefront_kernels::Isa;
 
 /// Returns the sweep that `network` was trained to correct. The number of planes is the one in the network's file, or
 /// the default for `display`.
@@ -71,6 +72,11 @@ impl SeededPlan {
     /// Returns the engine that runs the network and the reason for the choice.
     pub fn engine(&self) -> &Engine {
         self.network.engine()
+    }
+
+    /// Returns the instruction set of the sweep.
+    pub fn swept_on(&self) -> Isa {
+        self.sweep.isa()
     }
 
     /// Returns working memory for one frame at a time, sized for the current thread pool.

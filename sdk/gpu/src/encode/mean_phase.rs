@@ -4,29 +4,25 @@
 use crate::Result;
 use crate::device::{Device, Dispatch};
 
-/// Finds the mean phase of a field from the sums of the workgroups that computed it.
-pub(crate) struct MeanPhase {
-    step: Dispatch,
-    /// Three complex f32, the factors that remove the mean phase of each colour.
-    pub(crate) turn: wgpu::Buffer,
-}
+/// Finds the mean phase of a field from the sums of the workgroups that computed it, as three complex f32: the factors
+/// that remove the mean phase of each colour.
+pub(crate) struct MeanPhase(Dispatch);
 
 impl MeanPhase {
-    pub(crate) fn new(device: &Device, partial: &wgpu::Buffer, parts: usize) -> Result<Self> {
+    /// Plans the stage for the sums of `parts` workgroups. It writes to `turn`, 24 bytes.
+    pub(crate) fn new(device: &Device, partial: &wgpu::Buffer, parts: usize, turn: wgpu::Buffer) -> Result<Self> {
         let parts = device.constants("parts", bytemuck::cast_slice(&[parts as u32, 0, 0, 0]))?;
-        let turn = device.buffer("the mean phase", 24)?;
         let program = device.program("the mean phase", include_str!("mean_phase.wgsl").into(), "find");
         let arguments = [
             (0, parts.buffer.as_entire_binding()),
             (1, partial.as_entire_binding()),
             (2, turn.as_entire_binding()),
         ];
-        let step = program.on(device, &arguments, [1, 1, 1])?;
-        Ok(MeanPhase { step, turn })
+        Ok(MeanPhase(program.on(device, &arguments, [1, 1, 1])?))
     }
 
     pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
-        self.step.run(pass);
+        self.0.run(pass);
     }
 }
 
@@ -46,9 +42,10 @@ mod tests {
             let mut sums = field(parts);
             let partial: Vec<Complex32> = (0..3 * parts).map(|i| sums[i % 3 * parts + i / 3]).collect();
             let buffer = upload(&device, &partial);
-            let mean = device.guarded(|| MeanPhase::new(&device, &buffer, parts)).unwrap();
+            let turn = device.buffer("the mean phase", 24).unwrap();
+            let mean = (device.guarded(|| MeanPhase::new(&device, &buffer, parts, turn.clone()))).unwrap();
             run(&device, |pass| mean.run(pass));
-            let turn = read(&device, &mean.turn, 3);
+            let turn = read(&device, &turn, 3);
             let expected: Vec<Complex32> = sums
                 .chunks_exact(parts)
                 .map(|plane| {
@@ -61,8 +58,9 @@ mod tests {
         }
         // A dark field has no phase and is left unchanged.
         let buffer = upload(&device, &[Complex32::ZERO; 3]);
-        let mean = device.guarded(|| MeanPhase::new(&device, &buffer, 1)).unwrap();
+        let turn = device.buffer("the mean phase", 24).unwrap();
+        let mean = (device.guarded(|| MeanPhase::new(&device, &buffer, 1, turn.clone()))).unwrap();
         run(&device, |pass| mean.run(pass));
-        assert_eq!(read(&device, &mean.turn, 3), [Complex32::ONE; 3]);
+        assert_eq!(read(&device, &turn, 3), [Complex32::ONE; 3]);
     }
 }

@@ -42,9 +42,22 @@ pub(crate) struct Sweeper {
 
 impl Sweeper {
     /// Plans the sweep of `plan`, made for `display`, on a frame's `surfaces`: (H, W) of red, green, blue and depth,
-    /// f32.
+    /// f32. It writes to new memory.
     pub(crate) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
-        Self::planned(device, plan, display, surfaces, device.measures())
+        let (height, width) = plan.shape();
+        let field = device.buffer("the field", 24 * height * width)?;
+        Self::into_field(device, plan, display, surfaces, field)
+    }
+
+    /// Plans the sweep as [`Self::new`] does. It writes to `field`, (3, H, W) complex f32.
+    pub(crate) fn into_field(
+        device: &Device,
+        plan: &SweepPlan,
+        display: &Display,
+        surfaces: &wgpu::Buffer,
+        field: wgpu::Buffer,
+    ) -> Result<Self> {
+        Self::planned(device, plan, display, (surfaces, field), device.measures())
     }
 
     /// Plans the sweep with the number of planes per dispatch that is measured to be faster, or the most that fit.
@@ -52,7 +65,7 @@ impl Sweeper {
         device: &Device,
         plan: &SweepPlan,
         display: &Display,
-        surfaces: &wgpu::Buffer,
+        (surfaces, field): (&wgpu::Buffer, wgpu::Buffer),
         measured: bool,
     ) -> Result<Self> {
         let radius = plan.sweep().taps / 2;
@@ -95,7 +108,6 @@ impl Sweeper {
         };
         let crossings = plan.sweep().planes.div_ceil(together);
         let (last, other) = (&fields[crossings % 2], &fields[(crossings + 1) % 2]);
-        let field = device.buffer("the field", 24 * area)?;
         let partial = device.buffer("sums", 24 * tiles.0 * tiles.1)?;
         let home = maker.home([last, other, &field], &partial)?;
         let searched = match search {
@@ -365,7 +377,10 @@ mod tests {
             .collect();
         let surfaces = device.buffer("surfaces", 16 * values.len()).unwrap();
         let sweeper = device
-            .guarded(|| Sweeper::planned(&device, plan, display, &surfaces, measured))
+            .guarded(|| {
+                let field = device.buffer("the field", 24 * height * width)?;
+                Sweeper::planned(&device, plan, display, (&surfaces, field), measured)
+            })
             .unwrap();
         (device.queue).write_buffer(&surfaces, 0, bytemuck::cast_slice(&values));
         // Two runs, because the state that one frame leaves must not affect the next.

@@ -45,11 +45,19 @@ impl OnCpu {
     }
 
     pub(in crate::session) fn report(&self) -> BackendReport {
-        let engine = self.pipeline.method().engine();
-        engine.map_or_else(BackendReport::default, |engine| BackendReport {
-            name: engine.name.into(),
-            why: engine.why.clone(),
-        })
+        let method = self.pipeline.method();
+        let (engine, sweep) = (method.engine(), method.swept_on());
+        let name = engine.map(|engine| engine.name).or(sweep.map(|isa| isa.name()));
+        let sweep = sweep.map(|isa| format!("the plane sweep in f32 on {isa}"));
+        let why: Vec<_> = engine
+            .map(|engine| engine.why.clone())
+            .into_iter()
+            .chain(sweep)
+            .collect();
+        BackendReport {
+            name: name.unwrap_or_default().into(),
+            why: why.join("; "),
+        }
     }
 
     /// Computes the levels of `frame`, which follows another frame if there is a `past`.
@@ -60,5 +68,10 @@ impl OnCpu {
         levels: LevelsMut<'_>,
     ) -> Result<FrameReport> {
         self.pipeline.process_after(past, frame, levels, &mut self.scratch)
+    }
+
+    /// Updates the state as [`Self::process`] does, without computing the levels of `frame`.
+    pub(in crate::session) fn skip(&mut self, past: Option<Past>, frame: &RgbdFrame) -> Result<()> {
+        self.pipeline.skip(past, frame, &mut self.scratch)
     }
 }

@@ -5,6 +5,7 @@ use crate::session::engine::brightness::BrightnessTracker;
 use crate::session::engine::frame_input::FrameInput;
 use crate::session::quality::QualityLevel;
 use crate::session::statistics::BackendReport;
+use phasefront_core::encode::brightness::Past;
 use phasefront_core::pipeline::{FrameReport, FrameTimes};
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
@@ -133,10 +134,10 @@ impl OnGpu {
     }
 
     /// Reads a frame without computing its levels, so that the next one has its past.
-    pub(in crate::session) async fn read(&mut self, input: &FrameInput<'_>) -> Result<(), Failure> {
+    pub(in crate::session) async fn read(&mut self, input: &FrameInput<'_>, past: Option<Past>) -> Result<(), Failure> {
         let (colour, depth, frame) = Self::frame(input);
         self.0.expect(colour, depth).await?;
-        Ok(self.0.read(&frame).await?)
+        Ok(self.0.read(past, &frame).await?)
     }
 
     /// Returns the formats of a frame, and the frame. The camera's colour is read directly.

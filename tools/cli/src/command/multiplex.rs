@@ -22,9 +22,9 @@ use std::path::PathBuf;
 pub(crate) struct MultiplexCommand {
     #[command(flatten)]
     frame: FrameFlags,
-    /// Method for the wave
-    #[arg(long, value_enum, default_value_t = CoreMethod::Sweep)]
-    method: CoreMethod,
+    /// Method for the wave [default: auto; network with --network or --encoder deep]
+    #[arg(long, value_enum)]
+    method: Option<CoreMethod>,
     /// A bundled network, or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
@@ -78,8 +78,10 @@ impl MultiplexCommand {
             ));
         }
         let frame = self.frame.read(&target.display, self.display.is_given())?;
-        let (method, encoder) = self.method.of(&Parts {
-            network: self.network.as_deref(),
+        let network = self.network.as_deref();
+        let method = CoreMethod::or_default(self.method, network, &self.encoder);
+        let (method, encoder) = method.of(&Parts {
+            network,
             precision: self.precision,
             display: &target.display,
             sweep: sweep_for(&target.display, None, None),

@@ -53,9 +53,9 @@ pub(crate) struct Video {
     raw_depth: Option<(usize, usize)>,
     #[command(flatten)]
     depth: DepthFlags,
-    /// Method for the holograms
-    #[arg(long, value_enum, default_value_t = CoreMethod::Network)]
-    method: CoreMethod,
+    /// Method for the holograms [default: auto; network with --network or --encoder deep]
+    #[arg(long, value_enum)]
+    method: Option<CoreMethod>,
     /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
@@ -195,7 +195,8 @@ impl Video {
         let mut record = RunRecord::new("video");
         seen.record(&mut record)?;
         depth.record(&mut record);
-        record.choice("--method", Some(method));
+        let method = CoreMethod::or_default(*method, network.as_deref(), encoder);
+        record.choice("--method", Some(&method));
         record.name_or_file("--network", network.as_deref())?;
         record.choice("--precision", Some(&precision.unwrap_or_default()));
         encoder.record(&mut record)?;
@@ -259,8 +260,10 @@ impl Video {
             ..target
         };
         let display = target.display.clone();
-        let (method, encoder) = self.method.of(&Parts {
-            network: self.network.as_deref(),
+        let network = self.network.as_deref();
+        let method = CoreMethod::or_default(self.method, network, &self.encoder);
+        let (method, encoder) = method.of(&Parts {
+            network,
             precision: self.precision,
             display: &display,
             sweep: Sweep::for_display(&display),
@@ -325,8 +328,8 @@ impl Video {
             let written = if resuming { sink.written(&read)? } else { None };
             resuming = written.is_some();
             match written {
-                // These sessions keep more state than a replay restores, so their frames are made again.
-                Some(scale) if self.method == CoreMethod::Auto || midpoint_steps > 0 => {
+                // Steps at the midpoint keep more state than a replay restores, so such frames are made again.
+                Some(scale) if midpoint_steps > 0 => {
                     session.process(&image).map_err(named)?;
                     sink.skip(scale);
                 }

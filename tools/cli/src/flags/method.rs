@@ -6,6 +6,7 @@ use phasefront::{Display, Method, Sweep};
 use phasefront_command::flags::{PrecisionName, check_used};
 use phasefront_command::networks;
 use phasefront_io::Result;
+use phasefront_models::default_network;
 
 /// A method for RGB-D images.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -30,6 +31,15 @@ pub(crate) struct Parts<'a> {
 }
 
 impl CoreMethod {
+    /// Returns the method that was asked for, or the default: a network if flags name one, otherwise [`Self::Auto`].
+    pub(crate) fn or_default(asked: Option<Self>, network: Option<&str>, encoder: &EncoderFlags) -> Self {
+        asked.unwrap_or(if network.is_some() || encoder.is_deep() {
+            CoreMethod::Network
+        } else {
+            CoreMethod::Auto
+        })
+    }
+
     pub(crate) fn name(self) -> &'static str {
         match self {
             CoreMethod::Network => "network",
@@ -61,8 +71,15 @@ impl CoreMethod {
             }
             CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
             CoreMethod::Auto => {
-                let network = networks::network(network.unwrap_or("8"), precision)?;
-                (Method::Auto(sweep, network), encoder.read()?)
+                let method = match network.or(default_network(display).map(|_| "8")) {
+                    Some(network) => Method::Auto(sweep, networks::network(network, precision)?),
+                    None => {
+                        let right = "--network FILE.onnx: the bundled networks are for another display";
+                        check_used(&[("--precision", precision.is_some(), false, right)])?;
+                        Method::Sweep(sweep)
+                    }
+                };
+                (method, encoder.read()?)
             }
         })
     }

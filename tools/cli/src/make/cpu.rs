@@ -1,6 +1,6 @@
 //! The core's methods for RGB-D images, on the CPU.
 
-use super::{HologramRequest, HologramResult, described, stack};
+use super::{HologramRequest, HologramResult, described, name, stack};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -12,7 +12,6 @@ use phasefront_io::hologram::Levels;
 impl HologramRequest {
     pub(super) fn on_cpu(
         &self,
-        stage: &'static str,
         method: phasefront::Method,
         frame: &RgbdFrame,
         display: &DisplayFile,
@@ -31,7 +30,8 @@ impl HologramRequest {
         let kept = self.keeps_field.then(|| values.to_vec());
         let mut levels = Levels::zeros(&target.display, (height, width));
         let modulation = pipeline.modulate(None, values, levels.view_mut(), &mut scratch);
-        let engine = pipeline.method().engine();
+        let stage = name(scratch.is_swept());
+        let engine = pipeline.method().engine().filter(|_| !scratch.is_swept());
         Ok(HologramResult {
             method: stage,
             field: kept.map(|values| stack(values, shape)),

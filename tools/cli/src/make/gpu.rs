@@ -1,6 +1,6 @@
 //! The core's methods for RGB-D images, on a GPU.
 
-use super::{HologramRequest, HologramResult};
+use super::{HologramRequest, HologramResult, name};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use phasefront::RgbdFrame;
@@ -15,7 +15,6 @@ impl HologramRequest {
     /// Makes a hologram on a GPU, after a test of the GPU.
     pub(super) fn on_gpu(
         &self,
-        stage: &'static str,
         method: phasefront::Method,
         frame: &RgbdFrame,
         display: &DisplayFile,
@@ -37,6 +36,7 @@ impl HologramRequest {
         let bytes = levels.as_slice_mut().expect("standard layout");
         let report = pipeline.process(&Frame::of(frame), bytes)?;
         gpu::keep_programs(&device);
+        let stage = name(pipeline.is_swept());
         let times = report.times.unwrap_or_default();
         Ok(HologramResult {
             method: stage,

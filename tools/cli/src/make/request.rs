@@ -230,11 +230,14 @@ impl HologramRequest {
 
     /// Returns the method that the flags select.
     pub(super) fn method(&self) -> Method {
-        self.method.unwrap_or(match (&self.ldi, &self.network) {
+        if let Some(method) = self.method {
+            return method;
+        }
+        match (&self.ldi, self.network.as_deref()) {
             (Some(_), None) => Method::Layers,
-            (None, None) if !self.encoder.is_deep() => Method::Core(CoreMethod::Auto),
-            _ => Method::Core(CoreMethod::Network),
-        })
+            (Some(_), Some(_)) => Method::Core(CoreMethod::Network),
+            (None, network) => Method::Core(CoreMethod::or_default(None, network, &self.encoder)),
+        }
     }
 
     /// Refuses flags that the method does not take.

@@ -707,7 +707,7 @@ fn a_flag_of_other_calls_is_refused() {
     ldi::write(&folder.path("ldi"), 5, (48, 32), 1);
     folder.succeeds(&made(&["--method", "sweep", "--planes", "4"]));
     fs::rename(folder.path("h.png"), folder.path("there.png")).unwrap();
-    let sweep = "multiplex --rgb rgb.png --depth depth.png --network 8 -o maps";
+    let sweep = "multiplex --rgb rgb.png --depth depth.png --method sweep --network 8 -o maps";
     let cases = [
         (sweep, "not with sweep"),
         ("compare rgb.png rgb.png --z-mm 1", "two images"),

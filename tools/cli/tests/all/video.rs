@@ -606,14 +606,14 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
     let before = contents(&out);
     let refused = |more: &[&str]| refusal(&[&call[..], &["--resume"], more].concat());
     for (more, earlier, now) in [
-        (&["--method", "sweep"][..], "--method network", "--method sweep"),
+        (&["--method", "sweep"][..], "--method auto", "--method sweep"),
         (
             &["--dark-threshold", "0.2"],
             "no --dark-threshold",
             "--dark-threshold 0.2",
         ),
         (&["--local-steps", "3"], "no --local-steps", "--local-steps 3"),
-        (&["--network", "15"], "no --network", "--network 15"),
+        (&["--method", "auto", "--network", "15"], "no --network", "--network 15"),
         (&["--precision", "f32"], "--precision int8", "--precision f32"),
         (&["--brightness", "max"], "--brightness smoothed", "--brightness max"),
         (&["--rate", "24"], "--rate 30", "--rate 24"),

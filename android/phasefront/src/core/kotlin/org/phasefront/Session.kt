@@ -153,8 +153,7 @@ public sealed interface SessionEvent {
 
 /**
  * Returns the default options for [display]: holograms at its resolution by [method] and AA-DPM. Without a method, the
- * built-in network is used, or the plane sweep if that network was not trained for the display. Change fields with
- * `copy`.
+ * session chooses between the built-in network and the plane sweep by each frame's depth. Change fields with `copy`.
  *
  * @throws PhasefrontException.Display for an impossible display.
  */

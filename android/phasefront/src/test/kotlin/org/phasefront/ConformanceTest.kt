@@ -73,7 +73,8 @@ class ConformanceTest {
         )
     }
 
-    private fun method(case: JSONObject): HologramMethod = when (val name = case.getString("method")) {
+    private fun method(case: JSONObject): HologramMethod? = when (val name = case.getString("method")) {
+        "default" -> null
         "network" -> HologramMethod.Trained(network)
         "sweep" -> HologramMethod.Sweep
         "auto" -> HologramMethod.Auto(network)

@@ -404,7 +404,7 @@ class SessionTest {
     fun theNetworkThatIsBuiltInIsTheDefault() {
         for (offset in listOf(0.0, 3.0, 12.0)) {
             val defaults = sessionOptions(display.copy(offsetMm = offset))
-            assertIs<HologramMethod.Trained>(defaults.qualityLevels[0].method)
+            assertEquals(HologramMethod.Auto(), defaults.qualityLevels[0].method)
             assertTrue(defaults.encoding is Encoding.AntiAlias)
             HologramSession(defaults, RunningMode.IMAGE).use { session -> session.processBlocking(still()).close() }
         }
@@ -434,8 +434,10 @@ class SessionTest {
     @Test
     fun withoutANetworkTheSweepIsTheDefault() {
         val defaults = sessionOptions(display.copy(pitchUm = 3.74))
-        assertIs<HologramMethod.Sweep>(defaults.qualityLevels[0].method)
-        HologramSession(defaults, RunningMode.IMAGE).use { session -> session.processBlocking(still()).close() }
+        HologramSession(defaults, RunningMode.IMAGE).use { session ->
+            session.processBlocking(still()).close()
+            assertTrue(session.statistics.backendWhy.startsWith("the plane sweep"))
+        }
     }
 
     @Test
