@@ -138,6 +138,21 @@ impl RawHologram {
         })
     }
 
+    /// Restores a hologram from its levels, the planes of the target's colours one after another without gaps, and its
+    /// properties, of which it keeps the size and the scale.
+    ///
+    /// # Errors
+    /// Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target
+    /// has more than 8 bits.
+    #[uniffi::constructor]
+    pub fn from_levels(levels: &[u8], info: HologramInfo, target: Arc<Target>) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| {
+            let shape = (info.height, info.width);
+            let core = session::Hologram::from_levels(levels, shape, info.scale, &target.core)?;
+            Ok(RawHologram::new(core))
+        })
+    }
+
     /// Returns the properties of the hologram.
     pub fn info(&self) -> HologramInfo {
         let (height, width) = self.core.shape();

@@ -77,6 +77,14 @@ impl Target {
         })
     }
 
+    /// Returns the bytes of a calibration file, which [`Self::from_bytes`] reads.
+    ///
+    /// # Errors
+    /// Returns an error if the target cannot be written.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, PhasefrontError> {
+        guard(|| Ok(self.core.to_bytes()?))
+    }
+
     /// Returns the display.
     pub fn display(&self) -> Display {
         self.core.display.clone().into()

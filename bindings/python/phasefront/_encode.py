@@ -9,13 +9,14 @@ import numpy
 from numpy.typing import ArrayLike, NDArray
 
 from . import _ffi
-from ._ffi import Brightness, Display, EncoderOptions, Encoding, FrameError, RawMemory, SettingError
+from ._ffi import Brightness, EncoderOptions, Encoding, FrameError, RawMemory, SettingError
 from ._hologram import Hologram, Purpose
 from ._memory import MOST_BYTES, NO_ARRAY, Memory, as_array, image
-from ._target import Target
+from ._take import forbid_copies, shown, take
+from ._target import Modulated, Targeted, target_of
 
 
-class Modulator:
+class Modulator(Modulated):
     """A modulator: its display, the phases of its levels, and the frames that its input takes.
 
     Args:
@@ -26,9 +27,14 @@ class Modulator:
     target: _ffi.Target
 
     def __init__(self, raw: _ffi.RawModulator):
+        if not isinstance(raw, _ffi.RawModulator):
+            raise SettingError(f"raw is {shown(raw)}; Modulator.named and Modulator.from_toml make a modulator")
         self._raw = raw
         self.target = raw.target()
         self._size = raw.output_size()
+
+    def __repr__(self) -> str:
+        return f"Modulator({self.target.display()})"
 
     @classmethod
     def named(cls, name: str) -> Modulator:
@@ -88,12 +94,15 @@ class Modulator:
         return levels
 
 
+forbid_copies(Modulator)
+
+
 def encode(
     field: ArrayLike,
-    target: Display | _ffi.Target | Modulator | None = None,
+    target: Targeted | None = None,
     *,
     z_mm: float = 0.0,
-    encoding: Encoding | None = None,
+    encoding: Encoding | str | None = None,
     scale: float | None = None,
     dark_threshold: float | None = None,
     local_steps: int | None = None,
@@ -104,7 +113,7 @@ def encode(
     Args:
         field: Complex, (H, W) for one laser or (C, H, W) for C lasers, red first: an array, a tensor or an object with
             DLPack. It may be smaller than the modulator, and then lies in its middle.
-        target: A display, a calibrated target or a modulator. By default the display of 1920×1080.
+        target: A display, a calibrated target, or a modulator or its name. By default the display of 1920×1080.
         z_mm: z of the field from the middle of the volume, in mm toward the viewer.
         encoding: How the field becomes phases. By default a small Gaussian blur comes first (AA-DPM).
         scale: The amplitude that full light stands for. By default the largest of the field.
@@ -115,13 +124,10 @@ def encode(
     The result's depth is not known: its `z_at` returns 0. Raises `FrameError` for a field of another type or
     shape, or with values that are NaN or infinite, and `SettingError` for an option out of its range.
     """
-    if isinstance(target, Modulator):
-        target = target.target
-    elif not isinstance(target, _ffi.Target):
-        target = Target.of_display(Display() if target is None else target)
+    target = target_of(target)
     array = _field(field, 3 if target.display().laser_nm is None else 1)
     options = EncoderOptions(
-        encoding=encoding or Encoding.anti_alias(sigma=0.7, width=3),
+        encoding=take("encoding", encoding or "anti-alias", Encoding),
         brightness=Brightness.frame_max() if scale is None else Brightness.fixed(scale=scale),
         dark_threshold=dark_threshold,
         local_steps=local_steps,
@@ -130,7 +136,7 @@ def encode(
     _, height, width = array.shape
     memory: Any = Memory(array)
     raw = _ffi.RawHologram.of_field(memory, width, height, z_mm, target, options)
-    return Hologram(raw, Purpose(target, options.encoding))
+    return Hologram(raw, Purpose.of(target, options.encoding))
 
 
 def _field(field: ArrayLike, colours: int) -> NDArray[numpy.complex64]:

@@ -4,6 +4,7 @@ types."""
 import dataclasses as _dataclasses
 from typing import Any as _Any
 
+from . import _display, _meant, _take  # noqa: F401
 from ._documents import DOCUMENTS as _DOCUMENTS
 from .ffi import phasefront_ffi as _generated
 from .ffi.phasefront_ffi import *  # noqa: F403
@@ -33,7 +34,19 @@ def _rename_values(owner: type) -> None:
             setattr(owner, name.lower(), kind)
 
 
+def _show_network(self: _Any) -> str:
+    info = self.info()
+    return f"Network(layers={info.layers}, filters={info.filters}, precision={info.precision!r})"
+
+
 _rename_errors()
+_generated.Network.__repr__ = _show_network
+_take.install(
+    ["Cameras", "Display", "EncoderOptions", "Intrinsics", "Orientation", "Placement", "Pose", "QualityLevel", "SessionOptions"]
+)
+_display.install()
+for _name in _generated.__all__:
+    globals()[_name] = getattr(_generated, _name)
 for _owner in list(vars(_generated).values()):
     if isinstance(_owner, type):
         _rename_values(_owner)

@@ -189,10 +189,23 @@ class Method:
     """The method that computes holograms.
 
     One of:
+        auto: The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network estimated, and the plane sweep for all others. This is the default.
+        sweep: The plane sweep, which suits any display and needs no training.
         trained: A trained network.
-        sweep: The plane sweep, which suits any display. It is slower and needs no training.
-        auto: The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network estimated, and the plane sweep for all others.
     """
+    class auto(Method):
+        """The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
+        estimated, and the plane sweep for all others. This is the default.
+
+        Fields:
+            network: The network, which must suit the session's display; none for the built-in one, or for the plane sweep alone
+        if that network was not trained for the display.
+        """
+        network: Network | None
+        def __init__(self, network: Network | None = ...) -> None: ...
+    class sweep(Method):
+        """The plane sweep, which suits any display and needs no training."""
+        def __init__(self) -> None: ...
     class trained(Method):
         """A trained network.
 
@@ -201,21 +214,47 @@ class Method:
         """
         network: Network
         def __init__(self, network: Network) -> None: ...
-    class sweep(Method):
-        """The plane sweep, which suits any display. It is slower and needs no training."""
-        def __init__(self) -> None: ...
-    class auto(Method):
-        """The trained network for frames whose depth has soft edges, such as depth from motion or depth that a network
-        estimated, and the plane sweep for all others.
-
-        Fields:
-            network: The network, which must suit the session's display.
-        """
-        network: Network
-        def __init__(self, network: Network) -> None: ...
-    def is_trained(self) -> bool: ...
-    def is_sweep(self) -> bool: ...
     def is_auto(self) -> bool: ...
+    def is_sweep(self) -> bool: ...
+    def is_trained(self) -> bool: ...
+
+class PhasefrontError(Exception):
+    """The error of a call. The message is one line that names what is wrong and what would be right.
+
+    Kinds:
+        DisplayError: The physics of a display is impossible or out of range.
+        FrameError: A frame, plane or image has the wrong shape or unusable values.
+        TimestampError: A frame is not later than the previous one. It is refused; later frames are not affected.
+        SettingError: A setting or an argument is invalid or cannot be planned.
+        NetworkError: A file is not a hologram network, or the network is for another display.
+        FileError: A file cannot be read.
+        SessionError: A session cannot answer the call in its mode or state.
+        InternalError: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
+    """
+
+class DisplayError(PhasefrontError):
+    """The physics of a display is impossible or out of range."""
+
+class FrameError(PhasefrontError):
+    """A frame, plane or image has the wrong shape or unusable values."""
+
+class TimestampError(PhasefrontError):
+    """A frame is not later than the previous one. It is refused; later frames are not affected."""
+
+class SettingError(PhasefrontError):
+    """A setting or an argument is invalid or cannot be planned."""
+
+class NetworkError(PhasefrontError):
+    """A file is not a hologram network, or the network is for another display."""
+
+class FileError(PhasefrontError):
+    """A file cannot be read."""
+
+class SessionError(PhasefrontError):
+    """A session cannot answer the call in its mode or state."""
+
+class InternalError(PhasefrontError):
+    """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
 
 class Quality:
     """Determines whether a session may change its quality level.
@@ -318,44 +357,6 @@ class LogLevel(enum.Enum):
     WARNING = 1
     INFO = 2
     DEBUG = 3
-
-class PhasefrontError(Exception):
-    """The error of a call. The message is one line that names what is wrong and what would be right.
-
-    Kinds:
-        DisplayError: The physics of a display is impossible or out of range.
-        FrameError: A frame, plane or image has the wrong shape or unusable values.
-        TimestampError: A frame is not later than the previous one. It is refused; later frames are not affected.
-        SettingError: A setting or an argument is invalid or cannot be planned.
-        NetworkError: A file is not a hologram network, or the network is for another display.
-        FileError: A file cannot be read.
-        SessionError: A session cannot answer the call in its mode or state.
-        InternalError: Phasefront has a bug. The call had no effect, or the frame is lost. Please report it.
-    """
-
-class DisplayError(PhasefrontError):
-    """The physics of a display is impossible or out of range."""
-
-class FrameError(PhasefrontError):
-    """A frame, plane or image has the wrong shape or unusable values."""
-
-class TimestampError(PhasefrontError):
-    """A frame is not later than the previous one. It is refused; later frames are not affected."""
-
-class SettingError(PhasefrontError):
-    """A setting or an argument is invalid or cannot be planned."""
-
-class NetworkError(PhasefrontError):
-    """A file is not a hologram network, or the network is for another display."""
-
-class FileError(PhasefrontError):
-    """A file cannot be read."""
-
-class SessionError(PhasefrontError):
-    """A session cannot answer the call in its mode or state."""
-
-class InternalError(PhasefrontError):
-    """Phasefront has a bug. The call had no effect, or the frame is lost. Please report it."""
 
 class RunningMode(enum.Enum):
     """The running mode of a session. It is fixed when the session is created.
@@ -553,6 +554,7 @@ class Display:
         offset_mm: The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
         bits: The number of bits of a modulator level.
         aperture_radius: The radius of the aperture in the Fourier plane; 1 is the whole first order.
+        wavelengths_nm: The wavelengths of the lasers, in nm: red, green and blue, or that of the only one. They replace the four fields of single wavelengths.
     """
     width: int
     height: int
@@ -565,7 +567,11 @@ class Display:
     offset_mm: float
     bits: int
     aperture_radius: float
-    def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, laser_nm: float | None = ..., volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0) -> None: ...
+    def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, laser_nm: float | None = ..., volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0, wavelengths_nm: list[float] | tuple[float, ...] | None = ...) -> None: ...
+    @property
+    def wavelengths_nm(self) -> list[float]: ...
+    @classmethod
+    def named(cls, name: str) -> Display: ...
 
 class Drops:
     """The number of dropped frames for each reason.
@@ -849,8 +855,8 @@ def phone_options(target: Target, rate_hz: float = 30.0, method: Method | None =
 
 def session_options(target: Target, method: Method | None = ...) -> SessionOptions:
     """Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
-    correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session uses the
-    built-in network, or the plane sweep if that network was not trained for the display.
+    correction step, smoothed brightness, near and far limits by percentiles. Without a method, the session chooses
+    between the built-in network and the plane sweep by each frame's depth, as `Auto` does.
     """
 
 def set_log_listener(level: LogLevel, listener: LogListener | None) -> None:
@@ -927,6 +933,11 @@ class Target:
     def __init__(self, *args: object, **kwargs: object) -> None: ...
     def display(self) -> Display:
         """Returns the display."""
+    def to_bytes(self) -> bytes:
+        """Returns the bytes of a calibration file, which `from_bytes` reads.
+
+        Errors: Returns an error if the target cannot be written.
+        """
 
 class DepthNetwork:
     """A network that estimates relative inverse depth from colour alone, for frames without depth. It is immutable and can
@@ -975,6 +986,14 @@ class RawHologram:
     """The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its
     planes are read.
     """
+    @classmethod
+    def from_levels(cls, levels: bytes, info: HologramInfo, target: Target) -> RawHologram:
+        """Restores a hologram from its levels, the planes of the target's colours one after another without gaps, and its
+        properties, of which it keeps the size and the scale.
+
+        Errors: Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target
+        has more than 8 bits.
+        """
     @classmethod
     def of_field(cls, field: bytes, width: int, height: int, z_mm: float, target: Target, options: EncoderOptions) -> RawHologram:
         """Makes the hologram of a complex field of `height` × `width` pixels at `z_mm`, 0 the midpoint: the real and the

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from . import _ffi
 from ._ffi import Cameras, ColourFormat, ConfidenceFormat, DepthFormat, FrameError, Orientation, Rotation, YuvMatrix
 from ._memory import MOST_BYTES, NO_ARRAY, Memory, as_array
+from ._take import forbid_copies, shown, take
 
 _Array = numpy.ndarray[Any, Any]
 
@@ -49,12 +50,12 @@ def _array(what: str, values: ArrayLike) -> _Array:
 
 def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _ffi.PlaneInfo, int, int]:
     """Returns the memory, strides, width and height of an image of (H, W) or (H, W, pixel) values."""
-    if array.dtype != dtype or array.dtype.byteorder == ">":
-        raise FrameError(f"frame: {what} holds {array.dtype}; {dtype} is needed{_remedy(what, array, dtype)}")
     dimensions = 2 if pixel == 1 else 3
     if array.ndim != dimensions or (pixel > 1 and array.shape[2] != pixel):
         right = "(H, W)" if pixel == 1 else f"(H, W, {pixel})"
-        raise FrameError(f"frame: {what} is {array.shape}; {right} is right")
+        raise FrameError(f"frame: {what} is {array.shape}; {right} is right{_order(what, array, pixel)}")
+    if array.dtype != dtype or array.dtype.byteorder == ">":
+        raise FrameError(f"frame: {what} holds {array.dtype}; {dtype} is needed{_remedy(what, array, dtype)}")
     # The library reads images row by row, as from cameras. Rotated or mirrored arrays are copied.
     rows, pixels = array.strides[:2]
     value = pixel * array.itemsize
@@ -68,6 +69,17 @@ def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _f
             f"frame: {what} is {array.shape} over {memory.size} bytes; {MOST_BYTES} bytes are the most"
         )
     return memory, _ffi.PlaneInfo(row_stride=rows, pixel_stride=pixels), array.shape[1], array.shape[0]
+
+
+def _order(what: str, array: _Array, pixel: int) -> str:
+    """Returns a hint that brings the axes of a tensor into order, or nothing."""
+    if pixel > 1 and array.ndim == 3 and array.shape[0] == pixel:
+        return f": {what}.permute(1, 2, 0) of a tensor, {what}.transpose(1, 2, 0) of an array"
+    if pixel > 1 and array.ndim == 4 and array.shape[:2] == (1, pixel):
+        return f": {what}[0].permute(1, 2, 0) of a tensor, {what}[0].transpose(1, 2, 0) of an array"
+    if array.ndim > 2 and pixel == 1 and set(array.shape[:-2]) == {1}:
+        return f": {what}.reshape({what}.shape[-2:])"
+    return ""
 
 
 def _remedy(what: str, array: _Array, dtype: str) -> str:
@@ -89,8 +101,8 @@ def _colour(colour: ArrayLike, colour_format: ColourFormat | None) -> tuple[list
         grey = images[0].ndim == 2
         if grey:
             images = [numpy.stack(3 * [images[0]], axis=2)]
-        rgb = images[0].ndim == 3 and images[0].shape[2] == 3
-        colour_format = ColourFormat.RGB if rgb else ColourFormat.RGBA
+        rgba = images[0].ndim > 2 and (images[0].shape[-1] == 4 or images[0].shape[-3] == 4)
+        colour_format = ColourFormat.RGBA if rgba else ColourFormat.RGB
     if len(images) != len(_CHANNELS[colour_format]):
         needed = len(_CHANNELS[colour_format])
         raise FrameError(f"frame: {len(images)} colour planes are given; {colour_format.name} has {needed}")
@@ -111,6 +123,16 @@ def _depth(depth: ArrayLike, depth_format: DepthFormat | None) -> tuple[_Array, 
             "millimetres are uint16: depth.astype(numpy.uint16)"
         )
     return array, depth_format
+
+
+def arguments(frame: Frame) -> tuple[Any, ...]:
+    """Returns the arguments of the generated calls that take `frame`.
+
+    Raises `FrameError` for anything else.
+    """
+    if not isinstance(frame, Frame):
+        raise FrameError(f"frame is {shown(frame)}; Frame(colour, depth) makes one of arrays")
+    return frame._arguments()
 
 
 class FrameOptions(TypedDict, total=False):
@@ -170,6 +192,8 @@ class Frame:
         orientation: Orientation | None = None,
         cameras: Cameras | None = None,
     ):
+        colour_format = take("colour_format", colour_format, ColourFormat | None)
+        depth_format = take("depth_format", depth_format, DepthFormat | None)
         images, colour_format = _colour(colour, colour_format)
         channels = _CHANNELS[colour_format]
         planes = [_plane(what, image, "uint8", pixel) for (what, pixel), image in zip(channels, images)]
@@ -185,23 +209,32 @@ class Frame:
         if confidence is not None:
             array = _array("confidence", confidence)
             self._confidence, plane, width, height = _plane("confidence", array, "uint8", 1)
-            confidence_info = _ffi.ConfidenceInfo(format=confidence_format, width=width, height=height, plane=plane)
+            confidence_info = _ffi.ConfidenceInfo(format=take("confidence_format", confidence_format, ConfidenceFormat), width=width, height=height, plane=plane)
 
         self._info = _ffi.FrameInfo(
-            timestamp_ns=timestamp_ns,
+            timestamp_ns=take("timestamp_ns", timestamp_ns, int),
             colour=_ffi.ColourInfo(
                 format=colour_format,
                 width=planes[0][2],
                 height=planes[0][3],
                 planes=[plane[1] for plane in planes],
-                matrix=matrix,
-                video_range=video_range,
+                matrix=take("matrix", matrix, YuvMatrix),
+                video_range=take("video_range", video_range, bool),
             ),
             depth=depth_info,
             confidence=confidence_info,
-            orientation=orientation or Orientation(rotation=Rotation.UPRIGHT, mirrored=False),
-            cameras=cameras,
+            orientation=take("orientation", orientation or Orientation(rotation=Rotation.UPRIGHT, mirrored=False), Orientation),
+            cameras=take("cameras", cameras, Cameras | None),
         )
+
+    def __repr__(self) -> str:
+        colour, depth = self._info.colour, self._info.depth
+        told = f"{colour.width}×{colour.height} {colour.format.name}"
+        told += f", depth {depth.width}×{depth.height} {depth.format.name}" if depth else ", no depth"
+        return f"Frame({told}, timestamp_ns={self._info.timestamp_ns})"
 
     def _arguments(self) -> tuple[Any, ...]:
         return (*self._colour, self._depth, self._confidence, self._info)
+
+
+forbid_copies(Frame)

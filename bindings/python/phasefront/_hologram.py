@@ -14,10 +14,17 @@ from numpy.typing import NDArray
 
 from . import _ffi, _png
 from ._ffi import Display, Encoding, FileError, HologramInfo, Layout, Placement, SettingError
-from ._memory import array_at, image
+from ._memory import NO_ARRAY, Memory, array_at, image
+from ._take import shown, take
 from ._target import Target
 
 Number = TypeVar("Number", numpy.float32, numpy.complex64)
+
+
+#: The longest side of the picture of a notebook, in pixels.
+_NOTEBOOK = 640
+#: The longest side of a preview, in pixels.
+_LONGEST_SIDE = 2**14
 
 
 @dataclass(frozen=True)
@@ -25,13 +32,19 @@ class Purpose:
     """The target and the encoding of a session's holograms."""
 
     target: _ffi.Target
-    encoding: Encoding
+    #: The name on the command line.
+    encoder: str
+
+    @classmethod
+    def of(cls, target: _ffi.Target, encoding: Encoding) -> Purpose:
+        """Returns the purpose of holograms for `target` by `encoding`."""
+        return cls(target, _encoder(encoding))
 
     def told(self, scale: float) -> str:
         """Returns the metadata of a hologram's file in the format of the command `phasefront`."""
         target = self.target
         display = target.display()
-        told: dict[str, object] = {"display": _display(display), "encoder": _encoder(self.encoding), "scale": scale}
+        told: dict[str, object] = {"display": _display(display), "encoder": self.encoder, "scale": scale}
         if isinstance(target, Target) and target._table is not None:
             told["lut"] = list(target._table)
         if not isinstance(target, Target) or target._calibrated:
@@ -42,9 +55,9 @@ class Purpose:
 def _display(display: Display) -> dict[str, object]:
     """Returns a display with the keys of its TOML form."""
     fields = dict(vars(display))
-    three = [fields.pop(f"{colour}_nm") for colour in ("red", "green", "blue")]
-    laser = fields.pop("laser_nm")
-    return fields | {"wavelengths_nm": three if laser is None else [laser]}
+    for name in ("red_nm", "green_nm", "blue_nm", "laser_nm"):
+        del fields[name]
+    return fields | {"wavelengths_nm": display.wavelengths_nm}
 
 
 def _encoder(encoding: Encoding) -> str:
@@ -54,14 +67,18 @@ def _encoder(encoding: Encoding) -> str:
 
 
 class Hologram:
-    """The hologram of one frame. The session reuses its memory when the hologram and all its arrays are gone."""
+    """The hologram of one frame. The session reuses its memory when the hologram and all its arrays are gone.
+
+    `numpy.asarray` takes its levels. Notebooks show its preview. Pickling keeps the levels with their metadata, but not
+    the scene's depth: the `z_at` of a copy returns 0.
+    """
 
     #: The metadata of the hologram.
     info: HologramInfo
 
-    def __init__(self, raw: _ffi.RawHologram, purpose: Purpose):
+    def __init__(self, raw: _ffi.RawHologram, purpose: Purpose, info: HologramInfo | None = None):
         self._raw, self._purpose = raw, purpose
-        self.info = raw.info()
+        self.info = info or raw.info()
         self._shape = (self.info.colours, self.info.height, self.info.width)
 
     @property
@@ -70,15 +87,47 @@ class Hologram:
         only."""
         return array_at(self._raw, self._raw.plane_address(0), self._shape, numpy.uint8)
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Returns the levels. NumPy calls it."""
+        if dtype is not None and numpy.dtype(dtype) != numpy.uint8:
+            return self.levels.astype(dtype)
+        return self.levels.copy() if copy else self.levels
+
+    def __repr__(self) -> str:
+        colours, height, width = self._shape
+        return f"Hologram({width}×{height}, {colours} colours, scale={self.info.scale:.4g}, timestamp_ns={self.info.timestamp_ns})"
+
+    def _repr_png_(self) -> bytes:
+        """Returns the preview in the middle of the volume as a PNG. Notebooks call it."""
+        _, height, width = self._shape
+        part = min(1, _NOTEBOOK / max(height, width))
+        size = (max(1, round(part * side)) for side in (width, height))
+        return _png.encoded(self.preview(0.0, *size), {})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Returns the levels and their metadata. `pickle` and `copy` call it.
+
+        Raises `SettingError` if the display has more than 8 bits, because a byte cannot hold its levels.
+        """
+        target, encoder = self._purpose.target, self._purpose.encoder
+        self._check_bits("pickle holds")
+        state = (target._table, target._calibrated) if isinstance(target, Target) else None
+        return _restored, (numpy.array(self.levels), self.info, target.to_bytes(), state, encoder)
+
+    def _check_bits(self, what: str) -> None:
+        bits = self._purpose.target.display().bits
+        if bits > 8:
+            raise SettingError(f"{what} levels of up to 8 bits; the display has {bits}; take output()")
+
     def z_at(self, x: float, y: float) -> float:
         """Returns the z in mm of the scene point at (x, y) of the image, each 0 to 1 from the upper left corner."""
         return self._raw.z_at(x, y)
 
     def preview(
         self,
-        z_mm: float,
-        width: int,
-        height: int,
+        z_mm: float = 0.0,
+        width: int | None = None,
+        height: int | None = None,
         *,
         layout: Layout = Layout.RGB,
         out: NDArray[numpy.uint8] | None = None,
@@ -86,17 +135,21 @@ class Hologram:
         """Returns the displayed image for an eye focused at `z_mm`: red, green, blue, uint8, (height, width, 3).
 
         Args:
-            z_mm: The z of the focus.
-            width: The width in pixels.
-            height: The height in pixels.
+            z_mm: The z of the focus. By default the middle of the volume.
+            width: The width in pixels. By default that of the hologram.
+            height: The height in pixels. By default that of the hologram.
             layout: RGB, or RGBA or BGRA with (height, width, 4).
             out: The array to write into and to return, for example one for all frames. Its rows may have gaps.
 
         Raises `SettingError` if the image is empty or too large, if z is too far away, or if `out` does not
         fit.
         """
-        if width < 1 or height < 1:
-            raise SettingError(f"a preview of {width}×{height} is empty; each side must be at least 1")
+        width = take("width", self.info.width if width is None else width, int)
+        height = take("height", self.info.height if height is None else height, int)
+        if not (1 <= width <= _LONGEST_SIDE and 1 <= height <= _LONGEST_SIDE):
+            wrong = "empty" if width < 1 or height < 1 else "too large"
+            raise SettingError(f"a preview of {width}×{height} is {wrong}; each side must be 1 to {_LONGEST_SIDE}")
+        layout = take("layout", layout, Layout)
         array, memory = image(out, (height, width, 3 if layout == Layout.RGB else 4), numpy.uint8)
         self._raw.write_preview(z_mm, width, height, layout, memory)
         return array
@@ -107,7 +160,12 @@ class Hologram:
 
         Raises `SettingError` if a z is too far away.
         """
-        foci = numpy.asarray(z_mm, numpy.float64)
+        try:
+            foci = numpy.asarray(z_mm, numpy.float64)
+        except NO_ARRAY:
+            raise SettingError(f"z_mm is {shown(z_mm)}; a number or several are right") from None
+        if foci.ndim > 1:
+            raise SettingError(f"z_mm is {shown(z_mm)}; a number or several in a row are right")
         if foci.ndim == 0:
             return self._numbers(self._raw.refocus(float(foci)), numpy.float32)
         stack = numpy.empty((len(foci), *self._shape), numpy.float32)
@@ -140,7 +198,7 @@ class Hologram:
 
         Raises `SettingError` if the layout has no such image or `out` does not fit.
         """
-        placement = placement or Placement(layout=Layout.RGB)
+        placement = take("placement", placement or Placement(layout=Layout.RGB), Placement)
         size = self._raw.output_size(placement.layout)
         kind: type[Any] = {Layout.GREY16: numpy.uint16, Layout.RGB10: numpy.uint32}.get(placement.layout, numpy.uint8)
         array, memory = image(out, (size.height, size.width, size.pixel_bytes // numpy.dtype(kind).itemsize), kind)
@@ -154,13 +212,24 @@ class Hologram:
         Raises `FileError` if the file cannot be written or its name does not end in .png, and
         `SettingError` if the display has more than 8 bits, because a byte cannot hold its levels.
         """
-        file = Path(path)
+        file = Path(take("path", path, str))
         if file.suffix.lower() != ".png":
             raise FileError(f"{file}: the name must end in .png")
-        bits = self._purpose.target.display().bits
-        if bits > 8:
-            raise SettingError(f"save writes levels of up to 8 bits; the display has {bits}; take output()")
+        self._check_bits("save writes")
+        texts = {"phasefront": self._purpose.told(self.info.scale)}
         try:
-            _png.write(file, self.levels.transpose(1, 2, 0), "phasefront", self._purpose.told(self.info.scale))
+            _png.write(file, _png.encoded(self.levels.transpose(1, 2, 0), texts))
         except OSError as error:
             raise FileError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def _restored(
+    levels: NDArray[numpy.uint8], info: HologramInfo, target: bytes, state: tuple[bytes | None, bool] | None, encoder: str
+) -> Hologram:
+    """Returns the hologram that was pickled."""
+    made = (_ffi.Target if state is None else Target).from_bytes(target)
+    if isinstance(made, Target) and state is not None:
+        made._table, made._calibrated = state
+    memory: Any = Memory(levels)
+    raw = _ffi.RawHologram.from_levels(memory, info, made)
+    return Hologram(raw, Purpose(made, encoder), info)

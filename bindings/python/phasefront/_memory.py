@@ -9,6 +9,7 @@ import numpy
 from numpy.typing import ArrayLike
 
 from ._ffi import RawMemory, SettingError
+from ._take import forbid_copies
 from .ffi import phasefront_ffi as _generated
 
 Kind = TypeVar("Kind", bound=numpy.generic)
@@ -40,6 +41,9 @@ class Memory:
         if array is not None and array.size > 0:
             self.address = array.ctypes.data
             self.size = sum((n - 1) * s for n, s in zip(array.shape, array.strides)) + array.itemsize
+
+
+forbid_copies(Memory)
 
 
 class _ByRefBytes:

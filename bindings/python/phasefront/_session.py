@@ -34,9 +34,10 @@ from ._ffi import (
     Statistics,
     Thermal,
 )
-from ._frame import Frame, FrameOptions, batch
+from ._frame import Frame, FrameOptions, arguments, batch
 from ._hologram import Hologram, Purpose
-from ._target import Target
+from ._take import forbid_copies, shown, take
+from ._target import Modulated, Targeted, target_of
 
 
 @dataclass(frozen=True)
@@ -128,39 +129,41 @@ class Changes(TypedDict, total=False):
     """Any fields of `SessionOptions`."""
 
     quality_levels: list[QualityLevel]
-    quality: Quality
+    quality: Quality | int | str
     target_rate_hz: float | None
-    encoding: Encoding
-    brightness: Brightness
+    encoding: Encoding | str
+    brightness: Brightness | float | str
     dark_threshold: float | None
     local_steps: int | None
     midpoint_steps: int
-    depth_range: DepthRange
+    depth_range: DepthRange | tuple[float, float] | str
     least_confidence: float
     threads: int | None
     most_pixels: int
-    backend: Backend
+    backend: Backend | str
     depth_network: DepthNetwork | None
 
 
 def session_options(
-    method: Network | Method | None = None, target: Display | _ffi.Target | None = None, **changes: Unpack[Changes]
+    method: Network | Method | str | None = None, target: Targeted | None = None, **changes: Unpack[Changes]
 ) -> SessionOptions:
     """Returns the default options for `target`, with changes.
 
     Args:
-        method: A network or another method. By default the built-in network, or the plane sweep if that network was not
-            trained for the display.
-        target: A display or a calibrated target. By default the display of 1920×1080. Holograms have its resolution.
-        changes: Fields of `SessionOptions`, which documents each of them.
+        method: A network or another method, also by name: "auto", "sweep", "network". By default the choice between the
+            built-in network and the plane sweep by each frame's depth, "auto".
+        target: A display, a calibrated target, or a modulator or its name, as `modulator_names` lists them. By default
+            the display of 1920×1080. Holograms have its resolution.
+        changes: Fields of `SessionOptions`, which documents each of them. A number stands for a fixed brightness or
+            quality level, a pair for a range of depth in metres, and a name for a value without fields.
 
-    Raises `DisplayError` for an impossible display.
+    Raises `DisplayError` for an impossible display, and `SettingError` for a value of another type.
     """
-    if not isinstance(target, _ffi.Target):
-        target = Target.of_display(Display() if target is None else target)
-    if isinstance(method, Network):
-        method = Method.trained(network=method)
-    fields: dict[str, Any] = vars(_ffi.session_options(target, method)) | {"target": target} | changes
+    if isinstance(method, (Display, _ffi.Target, Modulated)):
+        raise SettingError(f"method is {shown(method)}; a target is right as target=…")
+    target = target_of(target)
+    defaults: Any = method
+    fields: dict[str, Any] = vars(_ffi.session_options(target, defaults)) | {"target": target} | changes
     return SessionOptions(**fields)
 
 
@@ -169,7 +172,7 @@ class Session:
 
     Args:
         options: The options. `session_options` returns the defaults.
-        mode: The running mode. Image and video sessions accept `process`. A live stream accepts `submit` and never
+        mode: The running mode, also by name: "image", "video", "live". Image and video sessions accept `process`. A live stream accepts `submit` and never
             waits.
         listener: A listener for a live stream. The session calls it with `Processed`, `Dropped`, `Failed` and
             `QualityChanged` on its own thread and processes no frame during a call. The statistics count its
@@ -182,13 +185,20 @@ class Session:
     def __init__(
         self,
         options: SessionOptions,
-        mode: RunningMode = RunningMode.IMAGE,
+        mode: RunningMode | str = RunningMode.IMAGE,
         listener: Callable[[Event], object] | None = None,
     ):
-        self._purpose = Purpose(options.target, options.encoding)
-        self._raw = _ffi.RawSession(options, mode, None if listener is None else _Listener(listener, self._purpose))
+        options = take("options", options, SessionOptions)
+        self._mode = take("mode", mode, RunningMode)
+        if listener is not None and not callable(listener):
+            raise SettingError(f"listener is {shown(listener)}; a function of one event is right")
+        self._purpose = Purpose.of(options.target, options.encoding)
+        self._raw = _ffi.RawSession(options, self._mode, None if listener is None else _Listener(listener, self._purpose))
         # Also closes it when Python exits. A later call from the session's thread would abort the process.
         weakref.finalize(self, self._raw.shut_down)
+
+    def __repr__(self) -> str:
+        return f"Session(mode={self._mode}, backend={self.statistics().backend!r})"
 
     def process(self, frame: Frame) -> Hologram:
         """Returns the hologram of `frame`, in an image or a video session. Blocks until it is done; other Python
@@ -197,7 +207,7 @@ class Session:
         Raises `FrameError` if the frame is unusable, `TimestampError` if it is not later than the previous frame
         of a video, and `SessionError` if the session is live, paused or closed. Later frames are not affected.
         """
-        return Hologram(self._raw.process(*frame._arguments()), self._purpose)
+        return Hologram(self._raw.process(*arguments(frame)), self._purpose)
 
     def process_batch(
         self,
@@ -242,7 +252,7 @@ class Session:
 
         Raises the same errors as `process`.
         """
-        return self._raw.submit(*frame._arguments())
+        return self._raw.submit(*arguments(frame))
 
     def warm_up(self) -> None:
         """Processes an empty frame, so that the first real frame is as fast as the later ones. Blocks until it is
@@ -288,6 +298,9 @@ class Session:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+forbid_copies(Session)
 
 
 class _LogHandler(_ffi.LogListener):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeAlias
+
 from . import _ffi
+from ._ffi import Display, SettingError
+from ._take import MEANT, shown
 
 
 class Target(_ffi.Target):
@@ -34,3 +38,35 @@ class Target(_ffi.Target):
         assert isinstance(target, cls)
         target._calibrated, target._table = False, bytes(levels)
         return target
+
+    def __repr__(self) -> str:
+        return f"Target({self.display()})"
+
+
+class Modulated:
+    """Whatever has a target: `Modulator`."""
+
+    target: _ffi.Target
+
+
+#: What stands for a target: itself, a display, a modulator or its name.
+Targeted: TypeAlias = _ffi.Target | Display | Modulated | str
+
+
+def target_of(value: Any) -> _ffi.Target:
+    """Returns the target that `value` is or stands for; for None, the display of 1920×1080.
+
+    Raises `DisplayError` for an impossible display or an unknown modulator, and `SettingError` for anything else.
+    """
+    if isinstance(value, _ffi.Target):
+        return value
+    if isinstance(value, Modulated):
+        return value.target
+    if isinstance(value, str):
+        return _ffi.RawModulator.named(value).target()
+    if value is None or isinstance(value, Display):
+        return Target.of_display(Display() if value is None else value)
+    raise SettingError(f"target is {shown(value)}; a Display, a Target, a Modulator or the name of a modulator is right")
+
+
+MEANT[_ffi.Target] = target_of

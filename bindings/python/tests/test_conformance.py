@@ -109,7 +109,7 @@ def made_of(case, memory, network):
     if case["depth_network"] is not None:
         onnx = (SUITE / case["depth_network"]).read_bytes()
         changes["depth_network"] = DepthNetwork.from_bytes(onnx, ColourScale.UNIT)
-    methods = {"network": network, "sweep": Method.sweep(), "auto": Method.auto(network=network)}
+    methods = {"default": None, "network": network, "sweep": Method.sweep(), "auto": Method.auto(network=network)}
     method = methods[case["method"]] if case["method"] in methods else model(case["method"])
     options = session_options(method, target_of(case), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]

@@ -335,7 +335,7 @@ def test_modes_are_not_mixed(options):
     [
         (numpy.zeros((0, 64, 3), "u1"), numpy.ones((4, 4), "f4"), "64×0"),
         (numpy.zeros((48, 64, 3), "u1"), numpy.ones((0, 0), "f4"), "depth"),
-        (numpy.zeros((48, 64, 2), "u1"), numpy.ones((4, 4), "f4"), "(H, W, 4)"),
+        (numpy.zeros((48, 64, 2), "u1"), numpy.ones((4, 4), "f4"), "(H, W, 3)"),
         (numpy.zeros(48, "u1"), numpy.ones((4, 4), "f4"), "(48,)"),
         (numpy.zeros((48, 64, 3), "f4"), numpy.ones((4, 4), "f4"), "(255 * colour).round().astype(numpy.uint8)"),
         (numpy.zeros((48, 64, 3), "u2"), numpy.ones((4, 4), "f4"), "(colour >> 8).astype(numpy.uint8)"),
@@ -472,14 +472,15 @@ def test_networks_that_are_none_are_named(tmp_path):
     assert (info.layers, info.pitch_um) == (8, 8.0)
 
 
-def test_the_network_that_is_built_in_is_the_default():
+def test_the_choice_with_the_network_that_is_built_in_is_the_default():
     for offset_mm in (0, 3, 12):
         display = phasefront.Display(width=64, height=48, offset_mm=offset_mm)
         options = session_options(target=display)
-        assert isinstance(options.quality_levels[0].method, Method.trained)
+        assert options.quality_levels[0].method == Method.auto()
         assert isinstance(options.encoding, Encoding.anti_alias)
         with Session(options) as session:
             assert session.process(still()).levels.shape == (3, 48, 64)
+            assert "8 layers" in session.statistics().backend_why and "sweep" in session.statistics().backend_why
 
 
 def test_the_pair_that_is_built_in_can_be_taken():
@@ -507,9 +508,9 @@ def test_steps_and_dark_can_be_set(display):
 
 def test_without_a_network_the_sweep_is_the_default():
     options = session_options(target=phasefront.Display(width=64, height=48, pitch_um=3.74))
-    assert isinstance(options.quality_levels[0].method, Method.sweep)
     with Session(options) as session:
         assert session.process(still()).levels.shape == (3, 48, 64)
+        assert session.statistics().backend_why.startswith("the plane sweep")
 
 
 def test_targets_that_cannot_be_are_named(display, tmp_path):

@@ -200,7 +200,55 @@ impl Hologram {
         })
     }
 
-    /// Returns the timestamp of the frame; 0 for a hologram of a field.
+    /// Returns the hologram whose levels, (C, H, W) for (H, W) = `shape`, are known, for example from a file. `scale` is
+    /// the amplitude that full light represents. C is the number of the target's lasers. Its depth is not known.
+    ///
+    /// # Errors
+    /// Returns an error if the target is invalid or has more than 8 bits, if there is another number of levels or the
+    /// shape is larger than the modulator, or if the scale is not positive and finite.
+    pub fn from_levels(levels: &[u8], shape: (usize, usize), scale: f32, target: &Target) -> Result<Self> {
+        target.check()?;
+        let (height, width) = target.modulator();
+        let (bits, colours) = (target.display.bits(), target.display.colours());
+        if bits > 8 {
+            return Err(Error::Setting(format!(
+                "levels of a byte each; the display has {bits} bits, at most 8 are right"
+            )));
+        }
+        if shape.0 > height || shape.1 > width || levels.len() != colours * shape.0 * shape.1 || levels.is_empty() {
+            return Err(Error::Setting(format!(
+                "{} levels of {}×{} pixels and {colours} colours; the modulator has {width}×{height} pixels at most",
+                levels.len(),
+                shape.1,
+                shape.0
+            )));
+        }
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(Error::Setting(format!(
+                "a scale of {scale} is no hologram's; it must be positive and finite"
+            )));
+        }
+        let mut own = Pool::default().take(levels.len());
+        own.values.copy_from_slice(levels);
+        Ok(Hologram {
+            timestamp_ns: 0,
+            shape,
+            levels: own,
+            words: None,
+            depth: Pool::default().take(0),
+            depth_shape: (0, 0),
+            scale,
+            times: FrameTimes::default(),
+            range_m: None,
+            valid_depth: 0.0,
+            quality_level: 0,
+            viewer: Arc::new(Viewer::new(target.clone(), Threads::shared()?)),
+            #[cfg(feature = "gpu")]
+            on_gpu: None,
+        })
+    }
+
+    /// Returns the timestamp of the frame; 0 for a hologram that no session made.
     pub fn timestamp_ns(&self) -> u64 {
         self.timestamp_ns
     }
