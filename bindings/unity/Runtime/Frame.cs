@@ -209,13 +209,14 @@ namespace Phasefront
         /// <summary>The cameras, or null if depth and colour have the same field of view.</summary>
         public Cameras? Cameras;
 
-        /// Calls `call` with this frame in the form of the C interface, and pins its memory during the call.
-        internal T Pinned<T>(Func<NativeFrame, T> call)
+        /// Calls `call` with `frame` in the form of the C interface, and pins its memory during the call.
+        internal static T Pinned<T>(CameraFrame frame, Func<NativeFrame, T> call)
         {
+            if (frame == null) throw new PhasefrontException(Status.Frame, "frame: it is null; a CameraFrame with a colour image is right");
             var pins = new List<GCHandle>();
             try
             {
-                return call(Write(pins));
+                return call(frame.Write(pins));
             }
             finally
             {

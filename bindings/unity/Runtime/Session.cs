@@ -173,7 +173,7 @@ namespace Phasefront
         /// <summary>Returns the hologram of a frame, in an image or a video session.</summary>
         public Hologram Process(CameraFrame frame)
         {
-            return frame.Pinned(native =>
+            return CameraFrame.Pinned(frame, native =>
             {
                 Check(Native.pf_session_process(this, ref native, out var hologram));
                 return new Hologram(hologram);
@@ -184,7 +184,7 @@ namespace Phasefront
         /// once.</summary>
         public DropReason Submit(CameraFrame frame)
         {
-            return frame.Pinned(native =>
+            return CameraFrame.Pinned(frame, native =>
             {
                 Check(Native.pf_session_submit(this, ref native, out var dropped));
                 return dropped;
