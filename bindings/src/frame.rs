@@ -30,8 +30,9 @@ pub enum YuvMatrix {
     Bt709,
 }
 
-/// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers
-/// and numbers that are not finite mean no reading.
+/// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
+/// NaN, numbers of 10⁹ or more, the largest code of an integer format and the largest finite 16-bit float mean no
+/// reading.
 #[uniffi::remote(Enum)]
 #[non_exhaustive]
 pub enum DepthFormat {
@@ -52,8 +53,8 @@ pub enum DepthFormat {
     NormalizedU8,
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16,
-    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
-    /// that are not finite mean no reading.
+    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. NaN
+    /// and numbers from ±10⁹ on mean no reading.
     RelativeF32,
     /// Relative inverse depth as 16-bit floats.
     RelativeF16,

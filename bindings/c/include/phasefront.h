@@ -109,8 +109,9 @@ typedef enum PfYuvMatrix {
   PF_YUV_MATRIX_BT709 = 1,
 } PfYuvMatrix;
 
-// The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
-// are not finite mean no reading.
+// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
+// NaN, numbers of 1e9 or more, the largest code of an integer format and the largest finite 16-bit float mean no
+// reading.
 typedef enum PfDepthFormat {
   // Metres as 32-bit floats.
   PF_DEPTH_FORMAT_METRES_F32 = 0,
@@ -128,8 +129,8 @@ typedef enum PfDepthFormat {
   PF_DEPTH_FORMAT_NORMALIZED_U8 = 6,
   // 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
   PF_DEPTH_FORMAT_NORMALIZED_U16 = 7,
-  // Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
-  // that are not finite mean no reading.
+  // Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. NaN
+  // and numbers beyond 1e9 in magnitude mean no reading.
   PF_DEPTH_FORMAT_RELATIVE_F32 = 8,
   // Relative inverse depth as 16-bit floats.
   PF_DEPTH_FORMAT_RELATIVE_F16 = 9,

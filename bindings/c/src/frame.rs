@@ -43,8 +43,9 @@ pub enum PfYuvMatrix {
 
 const YUV_MATRICES: [YuvMatrix; 2] = [YuvMatrix::Bt601, YuvMatrix::Bt709];
 
-/// The memory layout of a depth image. In all formats except the normalized ones, 0, negative numbers and numbers that
-/// are not finite mean no reading.
+/// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
+/// NaN, numbers of 1e9 or more, the largest code of an integer format and the largest finite 16-bit float mean no
+/// reading.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfDepthFormat {
@@ -64,8 +65,8 @@ pub enum PfDepthFormat {
     NormalizedU8 = 6,
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16 = 7,
-    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
-    /// that are not finite mean no reading.
+    /// Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. NaN
+    /// and numbers beyond 1e9 in magnitude mean no reading.
     RelativeF32 = 8,
     /// Relative inverse depth as 16-bit floats.
     RelativeF16 = 9,

@@ -159,8 +159,9 @@ class Frame:
         colour: uint8: (H, W) for grey, (H, W, 3) for RGB, (H, W, 4) for RGBA or BGRA; for NV12 the pair of luma (H, W)
             and chroma (H/2, W/2, 2), for YUV 420 the three planes. Halves are rounded up.
         depth: (h, w): metres in float32, float16 or float64, millimetres in uint16, or normalized in uint8 (0 nearest,
-            255 farthest), unless `depth_format` is given. Except in normalized and relative depth, a value that is not finite
-            or not over 0 is no reading. Without depth, the session's depth network estimates it.
+            255 farthest), unless `depth_format` is given. Except in normalized and relative depth, 0, negative
+            numbers, NaN, 10⁹ and more, 65535 in uint16 and 65504 in float16 are no reading. Without depth, the
+            session's depth network estimates it.
         timestamp_ns: The capture time in nanoseconds of any monotonic clock. Image sessions ignore it.
         colour_format: The memory layout of the colour image. Required for BGRA and for planes.
         depth_format: The meaning of the depth's numbers, if the default is wrong.

@@ -28,8 +28,9 @@ namespace Phasefront
         Bt709 = 1,
     }
 
-    /// <summary>The memory layout of a depth image. Except in normalized formats, a value that is not finite or not
-    /// over 0 means no reading.</summary>
+    /// <summary>The memory layout of a depth image. Except in normalized and relative formats, 0, negative numbers,
+    /// NaN, numbers of 10⁹ or more, the largest code of an integer format and the largest finite 16-bit float mean no
+    /// reading.</summary>
     public enum DepthFormat : uint
     {
         /// <summary>Metres, 32-bit floats.</summary>

@@ -16,9 +16,13 @@ pub mod stream;
 use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, ArrayView2};
 
+/// The least number that is no reading in depth of any unit but the normalized one. Renderers write 1e10 or the largest
+/// finite number where there is no surface.
+pub(crate) const NO_READING_FROM: f32 = 1e9;
+
 /// The unit of the numbers in a depth image.
 ///
-/// In all units except [`DepthUnit::Normalized`], 0, negative numbers and numbers that are not finite mean no reading.
+/// In all units except [`DepthUnit::Normalized`], 0, negative numbers, numbers of 10⁹ or more and NaN mean no reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthUnit {
     /// Normalized depth, from 0 nearest to 1 farthest. Only NaN means no reading.
@@ -39,13 +43,14 @@ pub enum DepthUnit {
 impl DepthUnit {
     /// Returns the distance of a reading in metres, or `None` if `value` is not a valid reading.
     pub fn metres(self, value: f32) -> Option<f32> {
-        let valid = value.is_finite() && value > 0.0;
-        valid.then(|| match self {
+        let is_reading = |value: &f32| *value > 0.0 && *value < NO_READING_FROM;
+        let metres = Some(value).filter(is_reading).map(|value| match self {
             DepthUnit::Normalized | DepthUnit::Metres => value,
             DepthUnit::Millimetres => value / 1000.0,
             DepthUnit::Disparity => 1.0 / value,
             DepthUnit::Raw { units_per_m } => (f64::from(value) / units_per_m) as f32,
-        })
+        });
+        metres.filter(is_reading)
     }
 }
 
@@ -71,8 +76,9 @@ const MOST_CLIPPED: f64 = 0.99;
 /// the 1st and 99th percentile of the readings. Values beyond them are clamped.
 ///
 /// # Errors
-/// Returns an error if the image is empty or has no reading, if a normalized value lies outside \[0, 1], if near or far
-/// is given for normalized depth, or if the range is invalid or contains almost no reading.
+/// Returns an error if the image is empty or has no reading, if more values are negative than positive, if a normalized
+/// value lies outside \[0, 1], if near or far is given for normalized depth, or if the range is invalid or contains
+/// almost no reading.
 pub fn normalize(
     depth: ArrayView2<'_, f32>,
     unit: DepthUnit,
@@ -96,6 +102,7 @@ pub fn normalize(
             "near and far are metres and normalized depth has no unit; leave them out, or name the unit of the depth's numbers".into(),
         ));
     }
+    check_sign(depth)?;
     let metres = depth.mapv(|v| match normalized {
         true => v,
         false => unit.metres(v).unwrap_or(f32::NAN),
@@ -148,6 +155,22 @@ pub fn normalize(
         holes,
         clipped,
     })
+}
+
+/// Refuses depth whose values are mostly negative: z of a camera that looks along −z, as in OpenGL. A single negative
+/// value, such as −1, stands for no reading.
+fn check_sign(depth: ArrayView2<'_, f32>) -> Result<()> {
+    let negative = depth.iter().filter(|v| **v < 0.0).count();
+    let positive = depth.iter().filter(|v| **v > 0.0).count();
+    let ends = depth.iter().filter(|v| **v < 0.0);
+    let (least, most) = ends.fold((0.0f32, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    if negative <= positive || least == most {
+        return Ok(());
+    }
+    Err(Error::Frame(format!(
+        "the sign of the depth is wrong: {:.0} % of it is negative, down to {least}, as the z of OpenGL is; distances are positive, so give −z",
+        100.0 * negative as f64 / depth.len() as f64
+    )))
 }
 
 fn no_reading() -> Error {
@@ -225,9 +248,47 @@ mod tests {
         assert_eq!(DepthUnit::Millimetres.metres(2500.0), Some(2.5));
         assert_eq!(DepthUnit::Disparity.metres(0.4), Some(2.5));
         assert_eq!(raw.metres(12500.0), Some(2.5));
-        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(DepthUnit::Metres.metres(bad), None);
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e9, 1e10, f32::MAX] {
+            for unit in [DepthUnit::Metres, DepthUnit::Millimetres, DepthUnit::Disparity, raw] {
+                assert_eq!(unit.metres(bad), None, "{unit:?} {bad}");
+            }
         }
+        assert_eq!(DepthUnit::Disparity.metres(1e-10), None);
+        assert_eq!(DepthUnit::Metres.metres(9e8), Some(9e8));
+    }
+
+    #[test]
+    fn numbers_for_no_surface_do_not_widen_the_range() {
+        // A fifth of the picture is background.
+        for background in [1e10, f32::MAX, f32::INFINITY, 1e9] {
+            let depth = Array2::from_shape_fn((10, 100), |(y, x)| match y {
+                0 | 1 => background,
+                _ => 1.0 + x as f32 / 100.0,
+            });
+            let n = normalize(depth.view(), DepthUnit::Metres, None, None).unwrap();
+            assert_eq!(n.holes, 200, "{background}");
+            let (near, far) = n.range_m.unwrap();
+            assert!(near < 1.02 && (1.97..2.0).contains(&far), "{background}: {near} {far}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_sign_is_named() {
+        let z = Array2::from_shape_fn((4, 4), |(y, x)| -1.0 - (4 * y + x) as f32 / 10.0);
+        for unit in [DepthUnit::Metres, DepthUnit::Millimetres, DepthUnit::Normalized] {
+            let why = normalize(z.view(), unit, None, None).unwrap_err().to_string();
+            assert!(why.contains("sign") && why.contains("-2.5"), "{why}");
+        }
+        // A few negative numbers among readings are no readings.
+        let mut mixed = z.mapv(f32::abs);
+        mixed[(0, 0)] = -1.0;
+        assert_eq!(normalize(mixed.view(), DepthUnit::Metres, None, None).unwrap().holes, 1);
+        // Sparse depth may have −1 where it has no reading.
+        let sparse = Array2::from_shape_fn((4, 4), |(y, x)| if x == 0 { 1.0 + y as f32 } else { -1.0 });
+        assert_eq!(
+            normalize(sparse.view(), DepthUnit::Metres, None, None).unwrap().holes,
+            12
+        );
     }
 
     #[test]

@@ -39,6 +39,29 @@ pub struct Captured {
     pub rgb: Array3<f32>,
     /// The normalized depth of the same field of view, (h, w). NaN means no reading.
     pub depth: Array2<f32>,
+    /// The distances that the depth shows, unless the file has normalized depth.
+    pub shown: Option<ShownDepth>,
+}
+
+/// The distances that normalized depth shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShownDepth {
+    /// The distance at d = 0, in metres.
+    pub near_m: f32,
+    /// The distance at d = 1, in metres.
+    pub far_m: f32,
+    /// The share of the pixels without a reading.
+    pub holes: f64,
+}
+
+impl std::fmt::Display for ShownDepth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "depth from {:.3} m to {:.3} m", self.near_m, self.far_m)?;
+        if self.holes > 0.0 {
+            write!(f, ", {:.1} % of it without a reading", 100.0 * self.holes)?;
+        }
+        Ok(())
+    }
 }
 
 /// Reads colour, and depth of the same aspect ratio.
@@ -58,14 +81,11 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
         );
     }
     let readings = file.depth;
-    if normalized && let Some(bad) = readings.iter().find(|v| v.is_infinite()) {
-        return Err(Error::file(
-            depth_path,
-            format!("holds {bad}; normalized depth must lie in 0..=1, NaN where there is no reading"),
-        ));
-    }
-    if normalized && let Some(doubt) = doubt(&readings) {
-        log::warn!("{}: {doubt}", depth_path.display());
+    if normalized {
+        check_normalized(&readings).map_err(|why| Error::file(depth_path, why))?;
+        if let Some(doubt) = doubt(&readings) {
+            log::warn!("{}: {doubt}", depth_path.display());
+        }
     }
     let (depth_height, depth_width) = readings.dim();
     if !has_aspect((depth_height, depth_width), (height, width)) {
@@ -78,25 +98,85 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     }
     let normalized = depth::normalize(readings.view(), options.unit, options.near_m, options.far_m)
         .map_err(|e| Error::file(depth_path, e))?;
-    if let Some((near, far)) = normalized.range_m {
+    let shown = normalized.range_m.map(|(near_m, far_m)| ShownDepth {
+        near_m,
+        far_m,
+        holes: normalized.holes as f64 / readings.len() as f64,
+    });
+    if let Some(shown) = shown {
         let clipped = normalized.clipped as f64 / readings.len() as f64;
         if clipped > DOUBTFULLY_CLIPPED {
             log::warn!(
-                "{}: {:.0} % of the depth lies before near {near} m or beyond far {far} m and is shown there; both are metres",
+                "{}: {:.0} % of the depth lies before near {} m or beyond far {} m and is shown there; both are metres",
                 depth_path.display(),
-                100.0 * clipped
+                100.0 * clipped,
+                shown.near_m,
+                shown.far_m
             );
         }
-        log::info!(
-            "{}: near {near:.3} m, far {far:.3} m, {} pixels without a reading",
-            depth_path.display(),
-            normalized.holes
-        );
+        let is_chosen = options.near_m.is_some() && options.far_m.is_some();
+        if let Some(crowd) = crowd(&normalized.depth, shown).filter(|_| !is_chosen) {
+            log::warn!("{}: {crowd}", depth_path.display());
+        }
     }
     Ok(Captured {
         rgb,
         depth: normalized.depth,
+        shown,
     })
+}
+
+/// Refuses numbers that normalized depth cannot have.
+fn check_normalized(depth: &Array2<f32>) -> std::result::Result<(), String> {
+    if let Some(bad) = depth.iter().find(|v| v.is_infinite()) {
+        return Err(format!(
+            "holds {bad}; normalized depth must lie in 0..=1, NaN where there is no reading"
+        ));
+    }
+    let most = depth.iter().copied().fold(0.0, f32::max);
+    if most > 1.0 {
+        return Err(format!(
+            "holds {most}; normalized depth lies in 0..=1: --depth-unit says what its numbers are; a network's relative inverse depth, larger where nearer, is divided by its largest number and takes --invert"
+        ));
+    }
+    Ok(())
+}
+
+/// Describes where most of `depth` lies if that is a small part of the range, as when numbers that stand for background
+/// or no reading make the range too large.
+fn crowd(depth: &Array2<f32>, shown: ShownDepth) -> Option<String> {
+    /// The number of parts of the range.
+    const PARTS: usize = 1000;
+    /// The number of parts that are little of it, 3 %.
+    const FEW: usize = 30;
+    /// A plain background at the far end is common. It does not make the range this many times its near end.
+    const DEEP: f32 = 8.0;
+    let (near, far) = (shown.near_m, shown.far_m);
+    let mut counts = [0usize; PARTS];
+    for d in depth.iter().filter(|d| !d.is_nan()) {
+        counts[((d * PARTS as f32) as usize).min(PARTS - 1)] += 1;
+    }
+    let all: usize = counts.iter().sum();
+    let windows = counts
+        .windows(FEW)
+        .map(|window| window.iter().sum::<usize>())
+        .enumerate();
+    let (start, most) = windows.max_by_key(|(start, count)| (*count, PARTS - start))?;
+    let is_background = start + FEW == PARTS && far < DEEP * near;
+    if near >= far || 2 * most <= all || is_background {
+        return None;
+    }
+    let occupied = |at: &usize| counts[*at] > 0;
+    let first = (start..start + FEW).find(occupied)?;
+    let last = (start..start + FEW).rev().find(occupied)?;
+    let metres = |part: usize| near + (far - near) * part as f32 / PARTS as f32;
+    Some(format!(
+        "{:.0} % of the depth lies from {:.3} m to {:.3} m, in {:.1} % of the range from {near:.3} m to {far:.3} m that is shown; if farther numbers mean background or no reading, --far says what is farthest",
+        100.0 * most as f64 / all as f64,
+        metres(first),
+        metres(last + 1),
+        100.0 * (last + 1 - first) as f64 / PARTS as f64
+    ))
 }
 
 /// Checks whether two shapes, (H, W), have the same aspect ratio.
@@ -203,6 +283,47 @@ mod tests {
         // Depths of an indoor scene in millimetres, stored in 16 bits.
         assert!(doubt(&plane(&|i| (800.0 + 40.0 * i as f32) / 65535.0)).is_some_and(|d| d.contains("7.3 %")));
         assert!(doubt(&plane(&|i| if i % 5 == 0 { 0.0 } else { 0.9 })).is_some_and(|d| d.contains("20 % of it is 0")));
+    }
+
+    #[test]
+    fn a_range_that_most_of_the_depth_leaves_empty_is_named() {
+        let shown = |near_m, far_m| ShownDepth {
+            near_m,
+            far_m,
+            holes: 0.0,
+        };
+        // A scene from 1 m to 2 m, as part of a range to `far`, and a share of pixels at its far end.
+        let scene = |far: f32, background: usize| {
+            Array2::from_shape_fn((10, 100), |(y, x)| match 10 * x < background {
+                true => 1.0,
+                false => (x + 100 * y) as f32 / 1000.0 / (far - 1.0),
+            })
+        };
+        assert_eq!(crowd(&scene(2.0, 0), shown(1.0, 2.0)), None);
+        assert_eq!(crowd(&scene(2.0, 700), shown(1.0, 2.0)), None);
+        assert_eq!(crowd(&scene(4.0, 600), shown(1.0, 4.0)), None);
+        for far in [65.535, 100.0, 1000.0, 65535.0] {
+            let crowd = crowd(&scene(far, 50), shown(1.0, far)).unwrap_or_default();
+            assert!(
+                crowd.starts_with("95 % of the depth") && crowd.contains(&format!("{far:.3} m")),
+                "{crowd}"
+            );
+        }
+        assert!(crowd(&scene(1000.0, 600), shown(1.0, 1000.0)).is_some_and(|crowd| crowd.starts_with("60 %")));
+        assert_eq!(crowd(&Array2::from_elem((4, 4), 0.5), shown(2.0, 2.0)), None);
+    }
+
+    #[test]
+    fn numbers_of_a_network_are_no_normalized_depth() {
+        let why = check_normalized(&Array2::from_elem((2, 2), 523.25))
+            .err()
+            .unwrap_or_default();
+        assert!(
+            why.contains("523.25") && why.contains("--depth-unit") && why.contains("--invert"),
+            "{why}"
+        );
+        assert!(check_normalized(&Array2::from_elem((2, 2), f32::INFINITY)).is_err());
+        assert!(check_normalized(&Array2::from_elem((2, 2), 1.0)).is_ok());
     }
 
     #[test]

@@ -3,12 +3,14 @@
 pub mod packed;
 mod views;
 
-pub use views::AberratedOptics;
+pub use views::{AberratedOptics, check_z};
 
 use crate::display::{DisplayFile, lut_of};
+use crate::fingerprint::Fingerprint;
+use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PICTURE, npy};
 use crate::output::{self, Pending, has_extension};
-use crate::picture::{PngShape, interleaved, open_image, write_png_of};
+use crate::picture::{PngShape, interleaved, write_png_of};
 use crate::{Error, Result};
 use image::DynamicImage;
 use ndarray::{Array3, ArrayView3, CowArray, Ix3};
@@ -57,10 +59,24 @@ const SCALES: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 /// The maximum length, in characters, of an encoder name or a key of a display file.
 const MOST_NAME: usize = 64;
 
+/// The content of a PNG's text chunk.
+#[derive(Serialize, Deserialize)]
+struct Description {
+    #[serde(flatten)]
+    info: HologramInfo,
+    /// The fingerprint of the levels, which reveals a picture that was resized, turned or edited but kept the chunk.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    levels: Option<String>,
+}
+
 impl HologramInfo {
-    /// Returns the PNG text chunk for this info.
-    fn chunk(&self, path: &Path) -> Result<(&'static str, String)> {
-        let text = serde_json::to_string(self).map_err(|e| Error::file(path, e))?;
+    /// Returns the PNG text chunk for `levels` with this info.
+    fn chunk(&self, path: &Path, levels: &Levels) -> Result<(&'static str, String)> {
+        let description = Description {
+            info: self.clone(),
+            levels: Some(levels.fingerprint().to_string()),
+        };
+        let text = serde_json::to_string(&description).map_err(|e| Error::file(path, e))?;
         Ok((PNG_CHUNK, text))
     }
 
@@ -155,6 +171,18 @@ impl Levels {
         }
     }
 
+    /// Returns a fingerprint of the shape and the levels.
+    fn fingerprint(&self) -> Fingerprint {
+        let (colours, height, width) = self.dim();
+        let mut all = Fingerprint::default();
+        all.numbers(&[colours, height, width]);
+        match self.view() {
+            levels::Levels::Bytes(levels) => all.bytes(levels),
+            levels::Levels::Words(levels) => levels.iter().for_each(|level| all.bytes(&level.to_le_bytes())),
+        }
+        all
+    }
+
     /// Returns the levels in memory.
     pub fn view(&self) -> levels::Levels<'_> {
         match self {
@@ -210,7 +238,7 @@ pub enum Hologram {
 /// Returns an error if the file cannot be written.
 pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
     match hologram {
-        Hologram::Levels(levels, info) => levels.write(path, &[info.chunk(path)?]),
+        Hologram::Levels(levels, info) => levels.write(path, &[info.chunk(path, levels)?]),
         Hologram::Complex(field, info) => write_complex(path, field.view(), info),
     }
 }
@@ -220,9 +248,11 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
 /// # Errors
 /// Returns an error if the file cannot be written or the hologram is a complex field.
 pub fn write_made_of(path: &Path, hologram: &Hologram, made_of: &str) -> Result<()> {
-    let texts = [hologram.info().chunk(path)?, (MADE_OF_CHUNK, made_of.to_owned())];
     match hologram {
-        Hologram::Levels(levels, _) => levels.write(path, &texts),
+        Hologram::Levels(levels, info) => {
+            let texts = [info.chunk(path, levels)?, (MADE_OF_CHUNK, made_of.to_owned())];
+            levels.write(path, &texts)
+        }
         Hologram::Complex(..) => Err(Error::file(path, "a complex field is no PNG")),
     }
 }
@@ -302,7 +332,8 @@ pub fn read_field(path: &Path, display: &DisplayFile) -> Result<Array3<Complex32
 /// Reads a hologram: a PNG of levels that contains its [`HologramInfo`], or a `.npy` with its `.json`.
 ///
 /// # Errors
-/// Returns an error if the file is missing, truncated, or not a hologram.
+/// Returns an error if the file is missing, truncated, or not a hologram, or if its levels are not those that it was
+/// written with.
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
         let field = npy::read_field(npy::open(path)?).map_err(|why| Error::file(path, why))?;
@@ -321,15 +352,22 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
         }
         return Ok(Hologram::Complex(field, info));
     }
-    let info = read_info(path)?.ok_or_else(|| {
+    let Description { info, levels: written } = read_description(path)?.ok_or_else(|| {
         Error::file(
             path,
             "carries no `phasefront` text chunk; it must be a hologram PNG as written by `phasefront hologram`",
         )
     })?;
-    levels_of(open_image(path)?, &info)
-        .map(|levels| Hologram::Levels(levels, info))
-        .map_err(|why| Error::file(path, why))
+    // Levels are for the pixels of a modulator, so that Exif data that viewers add turn nothing.
+    let (image, _) = decode::open_picture(path, Reading::AS_STORED)?;
+    let levels = levels_of(image, &info).map_err(|why| Error::file(path, why))?;
+    if written.is_some_and(|written| written != levels.fingerprint().to_string()) {
+        return Err(Error::file(
+            path,
+            "holds other levels than it was written with: another program resized, turned or edited it; take the file as `phasefront` wrote it",
+        ));
+    }
+    Ok(Hologram::Levels(levels, info))
 }
 
 /// Returns the levels in `image`.
@@ -368,14 +406,14 @@ fn words_of(levels: Vec<u16>, shape: Place, at: impl Fn(Place) -> usize) -> Leve
     Levels::Words(Array3::from_shape_fn(shape, |place| levels[at(place)]))
 }
 
-/// Reads the [`HologramInfo`] of a PNG. Returns `None` for other images.
-fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
+/// Reads the [`Description`] of a PNG. Returns `None` for other images.
+fn read_description(path: &Path) -> Result<Option<Description>> {
     let Some(text) = read_text(path, PNG_CHUNK)? else {
         return Ok(None);
     };
     serde_json::from_str(&text)
         .map_err(|e| Error::Input(e.to_string()))
-        .and_then(|info: HologramInfo| info.check().map(|()| Some(info)))
+        .and_then(|description: Description| description.info.check().map(|()| Some(description)))
         .map_err(|e| Error::file(path, format!("its `{PNG_CHUNK}` text chunk is broken: {e}")))
 }
 
@@ -386,7 +424,7 @@ fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
 /// Returns an error if the file cannot be read.
 pub fn read_made_of(path: &Path) -> Result<Option<(String, Option<f32>)>> {
     let made_of = read_text(path, MADE_OF_CHUNK)?;
-    let scale = read_info(path)?.and_then(|info| info.scale);
+    let scale = read_description(path)?.and_then(|description| description.info.scale);
     Ok(made_of.map(|made_of| (made_of, scale)))
 }
 
@@ -407,5 +445,5 @@ fn read_text(path: &Path, name: &str) -> Result<Option<String>> {
 /// # Errors
 /// Returns an error if the file cannot be read.
 pub fn is_hologram(path: &Path) -> Result<bool> {
-    Ok(has_extension(path, "npy") || read_info(path)?.is_some())
+    Ok(has_extension(path, "npy") || read_description(path)?.is_some())
 }

@@ -1,8 +1,12 @@
 //! Reading of files. All input is opened here or in [`decode`], which accept only regular files up to a maximum size.
 
+pub(crate) mod anymap;
 pub mod decode;
 mod jpeg;
+mod jpeg_end;
 pub mod npy;
+pub(crate) mod npz;
+mod openexr;
 pub mod quiet;
 
 use crate::{Error, Result, output};

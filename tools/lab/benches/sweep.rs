@@ -30,7 +30,7 @@ fn main() -> Result<()> {
         near_m: None,
         far_m: None,
     };
-    let Captured { rgb, depth } = frame::read(Path::new(rgb), Path::new(depth), options)?;
+    let Captured { rgb, depth, .. } = frame::read(Path::new(rgb), Path::new(depth), options)?;
     let frame = RgbdFrame::new(rgb, depth)?;
     let (height, width) = frame.shape();
     let display = Display::default();

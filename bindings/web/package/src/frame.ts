@@ -4,8 +4,8 @@ export type ColourFormat = PackedColour["format"] | PlanarColour["format"];
 /**
  * The meaning of a depth image's numbers: metres, inverse metres, millimetres, Android's DEPTH16; normalized, where 0 is
  * nearest and the largest number farthest; or relative inverse depth, as networks estimate it, which is larger where it
- * is nearer, on any scale. Except in normalized and relative formats, 0, negative and non-finite numbers mean that there
- * is no reading.
+ * is nearer, on any scale. Except in normalized and relative formats, these mean that there is no reading: 0, negative
+ * numbers, NaN, numbers of 10⁹ or more, the largest code of an integer format and the largest finite 16-bit float.
  */
 export type DepthFormat =
   | "metres-f32"

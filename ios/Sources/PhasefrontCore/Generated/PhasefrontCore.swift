@@ -6088,8 +6088,9 @@ public func FfiConverterTypeConfidenceFormat_lower(_ value: ConfidenceFormat) ->
 
 
 /**
- * The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers
- * and numbers that are not finite mean no reading.
+ * The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
+ * NaN, numbers of 10⁹ or more, the largest code of an integer format and the largest finite 16-bit float mean no
+ * reading.
  */
 
 public enum DepthFormat: Equatable, Hashable {
@@ -6128,8 +6129,8 @@ public enum DepthFormat: Equatable, Hashable {
      */
     case normalizedU16
     /**
-     * Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers
-     * that are not finite mean no reading.
+     * Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. NaN
+     * and numbers from ±10⁹ on mean no reading.
      */
     case relativeF32
     /**

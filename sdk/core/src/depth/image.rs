@@ -1,13 +1,14 @@
 //! Conversion of the depth images and confidence maps of phones to metres and confidences in 0..=1.
 
+use crate::depth::{DepthUnit, NO_READING_FROM};
 use crate::frame::{Plane, check_size};
 use crate::runtime::error::{Error, Result};
 use half::f16;
 
 /// The memory layout of a depth image: one plane of little-endian numbers.
 ///
-/// In all formats except the normalized and the relative ones, 0, negative numbers and numbers that are not finite mean
-/// no reading.
+/// In all formats except the normalized and the relative ones, 0, negative numbers, the largest code of an integer
+/// format, the largest finite 16-bit float, numbers of 10⁹ or more, and NaN mean no reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DepthFormat {
@@ -30,9 +31,10 @@ pub enum DepthFormat {
     /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16,
     /// Relative inverse depth as 32-bit floats, as networks estimate it from colour alone (MiDaS, Depth Anything; by
-    /// tract, Core ML or LiteRT): larger where nearer, on any scale. Numbers that are not finite mean no reading.
+    /// tract, Core ML or LiteRT): larger where nearer, on any scale. NaN and numbers beyond ±10⁹ mean no reading.
     RelativeF32,
-    /// Relative inverse depth as 16-bit floats.
+    /// Relative inverse depth as 16-bit floats. Numbers that are not finite, and the largest finite ones, mean no
+    /// reading.
     RelativeF16,
 }
 
@@ -64,30 +66,42 @@ impl DepthFormat {
         let u16_at = || u16::from_le_bytes([pixel[0], pixel[1]]);
         let f16_at = || f16::from_le_bytes([pixel[0], pixel[1]]).to_f32();
         let f32_at = || f32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
-        let farther = |nearer: f32| {
-            if nearer.is_finite() { -nearer } else { f32::NAN }
+        let f16_reading = || {
+            Some(f16_at())
+                .filter(|v| v.abs() < f16::MAX.to_f32())
+                .unwrap_or(f32::NAN)
         };
-        let metres = |m: f32| {
-            if m.is_finite() && m > 0.0 { m } else { f32::NAN }
+        let farther = |nearer: f32| {
+            if nearer.abs() < NO_READING_FROM {
+                -nearer
+            } else {
+                f32::NAN
+            }
+        };
+        let metres = |unit: DepthUnit, value: f32| unit.metres(value).unwrap_or(f32::NAN);
+        // The largest code stands for all that lies beyond, or for no reading.
+        let millimetres = |code: u16, most: u16| match code < most {
+            true => metres(DepthUnit::Millimetres, f32::from(code)),
+            false => f32::NAN,
         };
         match self {
-            DepthFormat::MetresF32 => (metres(f32_at()), 1.0),
-            DepthFormat::MetresF16 => (metres(f16_at()), 1.0),
-            DepthFormat::DisparityF32 => (metres(1.0 / f32_at()), 1.0),
-            DepthFormat::DisparityF16 => (metres(1.0 / f16_at()), 1.0),
-            DepthFormat::MillimetresU16 => (metres(f32::from(u16_at()) / 1000.0), 1.0),
+            DepthFormat::MetresF32 => (metres(DepthUnit::Metres, f32_at()), 1.0),
+            DepthFormat::MetresF16 => (metres(DepthUnit::Metres, f16_reading()), 1.0),
+            DepthFormat::DisparityF32 => (metres(DepthUnit::Disparity, f32_at()), 1.0),
+            DepthFormat::DisparityF16 => (metres(DepthUnit::Disparity, f16_reading()), 1.0),
+            DepthFormat::MillimetresU16 => (millimetres(u16_at(), u16::MAX), 1.0),
             DepthFormat::AndroidDepth16 => {
-                let (millimetres, code) = (u16_at() & 0x1fff, u16_at() >> 13);
+                let (distance, code) = (u16_at() & 0x1fff, u16_at() >> 13);
                 let confidence = match code {
                     0 => 1.0,
                     code => f32::from(code - 1) / 7.0,
                 };
-                (metres(f32::from(millimetres) / 1000.0), confidence)
+                (millimetres(distance, 0x1fff), confidence)
             }
             DepthFormat::NormalizedU8 => (f32::from(pixel[0]) / 255.0, 1.0),
             DepthFormat::NormalizedU16 => (f32::from(u16_at()) / 65535.0, 1.0),
             DepthFormat::RelativeF32 => (farther(f32_at()), 1.0),
-            DepthFormat::RelativeF16 => (farther(f16_at()), 1.0),
+            DepthFormat::RelativeF16 => (farther(f16_reading()), 1.0),
         }
     }
 }
@@ -243,8 +257,8 @@ mod tests {
             ),
             (
                 DepthFormat::AndroidDepth16,
-                (7 << 13 | 8191u16).to_le_bytes().to_vec(),
-                8.191,
+                (7 << 13 | 8190u16).to_le_bytes().to_vec(),
+                8.19,
                 6.0 / 7.0,
             ),
             (DepthFormat::NormalizedU8, vec![0], 0.0, 1.0),
@@ -261,11 +275,29 @@ mod tests {
                 "{format:?} {value}"
             );
         }
-        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert!(DepthFormat::MetresF32.reading(&bad.to_le_bytes()).0.is_nan());
-            assert!(DepthFormat::MetresF16.reading(&f16_bytes(bad)).0.is_nan());
-            assert!(DepthFormat::DisparityF16.reading(&f16_bytes(bad)).0.is_nan() || bad.is_infinite());
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e9, 1e10, f32::MAX] {
+            for format in [DepthFormat::MetresF32, DepthFormat::DisparityF32] {
+                assert!(format.reading(&bad.to_le_bytes()).0.is_nan(), "{format:?} {bad}");
+            }
+            // Halves hold infinity in the place of the largest of these.
+            for format in [DepthFormat::MetresF16, DepthFormat::DisparityF16] {
+                assert!(format.reading(&f16_bytes(bad)).0.is_nan(), "{format:?} {bad}");
+            }
         }
+        for format in [
+            DepthFormat::MetresF16,
+            DepthFormat::DisparityF16,
+            DepthFormat::RelativeF16,
+        ] {
+            assert!(format.reading(&f16_bytes(65504.0)).0.is_nan(), "{format:?}");
+            assert!(!format.reading(&f16_bytes(65472.0)).0.is_nan(), "{format:?}");
+        }
+        for bad in [f32::MAX, -f32::MAX, 1e10] {
+            assert!(DepthFormat::RelativeF32.reading(&bad.to_le_bytes()).0.is_nan());
+        }
+        assert!(DepthFormat::MillimetresU16.reading(&[0xff, 0xff]).0.is_nan());
+        assert_eq!(DepthFormat::MillimetresU16.reading(&[0xfe, 0xff]).0, 65.534);
+        assert!(DepthFormat::AndroidDepth16.reading(&[0xff, 0x1f]).0.is_nan());
         assert_eq!(DepthFormat::RelativeF32.reading(&[0; 4]).0, 0.0);
         assert!(DepthFormat::RelativeF16.reading(&f16_bytes(f32::INFINITY)).0.is_nan());
         assert!(DepthFormat::MillimetresU16.reading(&[0, 0]).0.is_nan());

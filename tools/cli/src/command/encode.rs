@@ -84,7 +84,7 @@ impl Encode {
             keeps_field: self.outputs.need_field(),
         };
         self.outputs
-            .finish(&self.output, &display, &encoding.of(field, stage), json)
+            .finish(&self.output, &display, &encoding.of(field, stage), None, json)
     }
 
     /// Checks whether the field has a `.json` beside it, as `--complex` writes it, which says that it is at the

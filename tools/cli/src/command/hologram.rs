@@ -7,12 +7,21 @@ use crate::flags::outputs::OutputFlags;
 use crate::make::HologramRequest;
 use crate::record::Before;
 use clap::Args;
+use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::{Error, Result, output};
 use std::path::PathBuf;
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
 #[derive(Args)]
+#[command(
+    mut_arg("rgb", |rgb| rgb.help(format!("Colour image: {COLOUR_FORMATS}; or a folder of them"))),
+    mut_arg("depth", |depth| depth.help(format!("Depth image: {DEPTH_FORMATS}; or a folder of them, with the names of those of --rgb"))),
+    mut_arg("photo", |photo| photo.help("A phone's JPEG with depth inside (GDepth or Dynamic Depth); or a folder of them"))
+)]
 pub(crate) struct Hologram {
+    /// A picture without a flag, which is refused with advice.
+    #[arg(hide = true)]
+    picture: Option<PathBuf>,
     #[command(flatten)]
     request: HologramRequest,
     #[command(flatten)]
@@ -30,6 +39,12 @@ pub(crate) struct Hologram {
 
 impl Hologram {
     pub(crate) fn run(mut self, json: bool) -> Result<()> {
+        if let Some(picture) = &self.picture {
+            return Err(Error::file(
+                picture,
+                "needs a flag that says what it is: --photo for a photo with depth inside, --rgb with --depth or --depth-network for other pictures",
+            ));
+        }
         if let Some(pictures) = self.request.pictures()? {
             return self.stills(json, pictures);
         }
@@ -43,8 +58,9 @@ impl Hologram {
         let display = self.request.display()?;
         self.outputs.declare(&display)?;
         self.request.keeps_field = self.outputs.need_field();
-        let made = self.request.make(&display, &self.request.image(&display)?)?;
-        self.outputs.finish(&self.output, &display, &made, json)
+        let (image, shown) = self.request.image(&display)?;
+        let made = self.request.make(&display, &image)?;
+        self.outputs.finish(&self.output, &display, &made, shown, json)
     }
 
     fn stills(self, json: bool, pictures: Vec<Picture>) -> Result<()> {

@@ -1,7 +1,7 @@
 //! `phasefront judge`: compares methods and encoders on an image and a display.
 
 use crate::flags::encoder::EncoderFlags;
-use crate::flags::frame::FrameFlags;
+use crate::flags::frame::{FrameFlags, shown_json, shown_text};
 use crate::flags::method::CoreMethod;
 use crate::make::{HologramRequest, HologramResult, Image, Method, infos};
 use clap::Args;
@@ -89,8 +89,8 @@ impl Judge {
         let file = self.display.read()?;
         let display = &file.target.display;
         let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
-        let frame = match &layers {
-            Some(ldi) => truth::visible_frame(ldi, display)?,
+        let (frame, depth_shown) = match &layers {
+            Some(ldi) => (truth::visible_frame(ldi, display)?, None),
             None => self.frame.read(display, self.display.is_given())?,
         };
         let (height, width) = frame.shape();
@@ -149,9 +149,9 @@ impl Judge {
         }
         let value = json!({
             "truth": what, "width": width, "height": height, "output": self.output.as_ref().map(|path| path.display().to_string()),
-            "rows": rows.iter().map(Row::json).collect::<Vec<_>>(),
+            "depth": shown_json(depth_shown), "rows": rows.iter().map(Row::json).collect::<Vec<_>>(),
         });
-        terminal::print(json, &value, table(&rows, &what));
+        terminal::print(json, &value, table(&rows, &what) + &shown_text(depth_shown));
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! `phasefront multiplex`: makes several phase maps of one image, for modulators that are faster than the eye.
 
 use crate::flags::encoder::EncoderFlags;
-use crate::flags::frame::FrameFlags;
+use crate::flags::frame::{FrameFlags, shown_json, shown_text};
 use crate::flags::method::{CoreMethod, Parts};
 use clap::Args;
 use ndarray::Array3;
@@ -77,7 +77,7 @@ impl MultiplexCommand {
                 "maps are made for levels of up to 8 bits, without a carrier, a lens or a flatness map".into(),
             ));
         }
-        let frame = self.frame.read(&target.display, self.display.is_given())?;
+        let (frame, depth) = self.frame.read(&target.display, self.display.is_given())?;
         let network = self.network.as_deref();
         let method = CoreMethod::or_default(self.method, network, &self.encoder);
         let (method, encoder) = method.of(&Parts {
@@ -122,12 +122,17 @@ impl MultiplexCommand {
                 f.amplitude_psnr, f.amplitude_ssim, f.focal_psnr, f.focal_ssim, f.brightness
             )
         });
-        let text = format!("{} maps of {width}×{height}{}", maps.len(), text.collect::<String>());
-        terminal::print(
-            json,
-            &json!({ "output": self.output, "packed": self.packed, "width": width, "height": height, "shown": rows }),
-            text,
+        let text = format!(
+            "{} maps of {width}×{height}{}{}",
+            maps.len(),
+            shown_text(depth),
+            text.collect::<String>()
         );
+        let value = json!({
+            "output": self.output, "packed": self.packed, "width": width, "height": height,
+            "depth": shown_json(depth), "shown": rows,
+        });
+        terminal::print(json, &value, text);
         Ok(())
     }
 

@@ -17,7 +17,7 @@ use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, parse_size};
 use phasefront_command::terminal;
 use phasefront_core::display::panel::Panel;
-use phasefront_io::hologram::HologramInfo;
+use phasefront_io::hologram::{self, HologramInfo};
 use phasefront_io::{Error, Result, film};
 use serde_json::json;
 use sink::Sink;
@@ -136,6 +136,9 @@ impl Video {
         let (mut source, (height, width)) = Source::open(&self)?;
         let (options, info) = self.options(height, width, threads, rate)?;
         let preview_mm = self.preview_mm();
+        if let Some(mm) = preview_mm {
+            hologram::check_z(&info.display, mm / 1e3)?;
+        }
         let record = self.record(&info.display, rate)?;
         let mut sink = Sink::new(
             self.output.as_deref(),

@@ -1,6 +1,6 @@
 //! `phasefront view`: makes one HTML file that shows holograms.
 
-use crate::flags::frame::FrameFlags;
+use crate::flags::frame::{FrameFlags, shown_json, shown_text};
 use crate::make::{HologramRequest, Image, Judged, infos, judge};
 use clap::Args;
 use image::RgbImage;
@@ -11,6 +11,7 @@ use phasefront_cli::viewer::{self, Depth, Phase, Scene};
 use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::display::DisplayFile;
+use phasefront_io::frame::ShownDepth;
 use phasefront_io::hologram::{self, Hologram, HologramInfo};
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
@@ -88,8 +89,11 @@ impl View {
         }
         let budget = budget as usize - BESIDE_VIEWS;
         let mut scenes = Vec::new();
+        let mut depth = None;
         if self.inputs.is_empty() {
-            scenes.push(self.of_image()?.scene(budget)?);
+            let (parts, shown) = self.of_image()?;
+            scenes.push(parts.scene(budget)?);
+            depth = shown;
         }
         for path in &self.inputs {
             if output::has_extension(path, "html") {
@@ -112,8 +116,15 @@ impl View {
         let views: usize = scenes.iter().map(|scene| scene.shown.len() + scene.field.len()).sum();
         terminal::print(
             json,
-            &json!({"output": self.output.display().to_string(), "scenes": scenes.len(), "views": views, "bytes": bytes}),
-            format!("{}: {views} views, {mb:.1} MB", terminal::name(&self.output)),
+            &json!({
+                "output": self.output.display().to_string(), "scenes": scenes.len(), "views": views, "bytes": bytes,
+                "depth": shown_json(depth),
+            }),
+            format!(
+                "{}: {views} views, {mb:.1} MB{}",
+                terminal::name(&self.output),
+                shown_text(depth)
+            ),
         );
         Ok(())
     }
@@ -159,10 +170,11 @@ impl View {
             .unwrap_or_else(|| name.to_string_lossy().into_owned())
     }
 
-    /// Makes the hologram of the image that the flags give, with its field for comparison.
-    fn of_image(&mut self) -> Result<Parts> {
+    /// Makes the hologram of the image that the flags give, with its field for comparison. Also returns the distances
+    /// that the image's depth shows.
+    fn of_image(&mut self) -> Result<(Parts, Option<ShownDepth>)> {
         let file = self.request.display()?;
-        let image = self.request.image(&file)?;
+        let (image, shown_depth) = self.request.image(&file)?;
         self.request.keeps_field = true;
         let made = self.request.make(&file, &image)?;
         let judged = judge(&file, &made)?;
@@ -176,11 +188,12 @@ impl View {
             ("Method".into(), format!("{}; {}", made.method, made.encoder.describe())),
         );
         figures.extend(judged_figures(&judged));
+        figures.extend(shown_depth.map(|shown| ("Distances".into(), shown.to_string())));
         let title = self.request.source().map_or("hologram".into(), |path| self.title(path));
         let phase = Some(Phase::new(made.levels.upper(file.target.display.bits()).view())?);
         let shown = made.hologram(levels);
         let wave = Hologram::Complex(made.field.expect("kept for this"), field);
-        Ok(Parts {
+        let parts = Parts {
             title,
             phase,
             depth: Some(match image {
@@ -192,7 +205,8 @@ impl View {
             field: views(&wave, &file, &z_m, &bar)?,
             z_m,
             figures,
-        })
+        };
+        Ok((parts, shown_depth))
     }
 
     /// Returns the display that a hologram file was made for.

@@ -9,28 +9,29 @@ use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::stage;
 use phasefront_io::film::sequence;
-use phasefront_io::frame::Captured;
 use phasefront_io::frame::fit::{Fit, Placement};
+use phasefront_io::frame::{Captured, ShownDepth};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::input::quiet;
 use phasefront_io::picture::{self, photo};
 use phasefront_io::{Error, Result, frame, output};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
 pub(crate) struct FrameFlags {
-    #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}; or a folder of them"))]
+    #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}"))]
     rgb: Option<PathBuf>,
     #[arg(
         long,
         value_name = "FILE",
         requires = "rgb",
         conflicts_with = "depth_network",
-        help = format!("Depth image: {DEPTH_FORMATS}; or a folder of them, with the names of those of --rgb")
+        help = format!("Depth image: {DEPTH_FORMATS}")
     )]
     depth: Option<PathBuf>,
-    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth); or a folder of them
+    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]
     photo: Option<PathBuf>,
     #[command(flatten)]
@@ -190,6 +191,19 @@ pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, n
     }
 }
 
+/// Returns the distances that depth shows as JSON.
+pub(crate) fn shown_json(shown: Option<ShownDepth>) -> serde_json::Value {
+    let rounded = |value: f64| (value * 1e6).round() / 1e6;
+    json!(shown.map(|shown| json!({
+        "near_m": rounded(shown.near_m.into()), "far_m": rounded(shown.far_m.into()), "holes": rounded(shown.holes),
+    })))
+}
+
+/// Returns the distances that depth shows as the end of a line.
+pub(crate) fn shown_text(shown: Option<ShownDepth>) -> String {
+    shown.map_or(String::new(), |shown| format!("; {shown}"))
+}
+
 impl FrameFlags {
     /// The names of the flags, for flags that conflict with them.
     pub(crate) const NAMES: [&str; 11] = [
@@ -239,7 +253,7 @@ impl FrameFlags {
         }
     }
 
-    /// Returns the folders that [`Self::pictures`] reads.
+    /// Returns the files, or the folders that [`Self::pictures`] reads.
     pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
         [&self.rgb, &self.depth, &self.photo]
             .into_iter()
@@ -262,13 +276,21 @@ impl FrameFlags {
         self.photo.as_deref().or(self.rgb.as_deref())
     }
 
-    /// Reads the frame for `display`, in the colours of its lasers. `named` tells whether the display was given by a
-    /// flag.
-    pub(crate) fn read(&self, display: &Display, named: bool) -> Result<RgbdFrame> {
+    /// Reads the frame for `display`, in the colours of its lasers, and the distances that its depth shows. `named`
+    /// tells whether the display was given by a flag.
+    pub(crate) fn read(&self, display: &Display, named: bool) -> Result<(RgbdFrame, Option<ShownDepth>)> {
+        if let Some(folder) = self.folders().find(|path| path.is_dir()) {
+            return Err(Error::file(
+                folder,
+                "is a folder; name one picture. `phasefront hologram` takes folders of pictures",
+            ));
+        }
+        let mut shown = None;
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
-                let Captured { rgb, depth } = frame::read(rgb, depth, self.depth_numbers.options()?)?;
-                self.conditioned(&rgb, depth, display)
+                let captured: Captured = frame::read(rgb, depth, self.depth_numbers.options()?)?;
+                shown = captured.shown;
+                self.conditioned(&captured.rgb, captured.depth, display)
             }
             (Some(rgb), None, _) => self.by_network(&picture::read_rgb(rgb)?, display),
             (None, _, Some(path)) => {
@@ -283,7 +305,7 @@ impl FrameFlags {
             )),
         }?;
         warn_of_size(frame.shape(), display, named, "--fit contain, cover or centre");
-        Ok(frame.for_display(display))
+        Ok((frame.for_display(display), shown))
     }
 
     fn placement(&self, picture: (usize, usize), display: &Display) -> Placement {

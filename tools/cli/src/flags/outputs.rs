@@ -1,11 +1,13 @@
 //! The files that are made of a hologram beside its levels.
 
+use crate::flags::frame::{shown_json, shown_text};
 use crate::make::{HologramResult, Judged, infos, judge};
 use clap::Args;
 use phasefront::Encoding;
 use phasefront_command::terminal;
 use phasefront_io::Result;
 use phasefront_io::display::DisplayFile;
+use phasefront_io::frame::ShownDepth;
 use phasefront_io::hologram::{self, packed};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -23,6 +25,15 @@ pub(crate) struct OutputFlags {
     /// Also write what the modulator's input takes: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
     #[arg(long, value_name = "FRAME.png")]
     packed: Option<PathBuf>,
+}
+
+/// What is reported of a hologram beside its levels.
+struct Reported<'a> {
+    /// The files of --packed.
+    packed: &'a [PathBuf],
+    /// The distances that depth shows.
+    depth: Option<ShownDepth>,
+    judged: Option<&'a Judged>,
 }
 
 impl OutputFlags {
@@ -49,11 +60,24 @@ impl OutputFlags {
         self.packed.iter().try_for_each(|path| packed::declare(path, display))
     }
 
-    /// Writes the levels of `made` to `output`, and the other files, and reports them.
-    pub(crate) fn finish(&self, output: &Path, display: &DisplayFile, made: &HologramResult, json: bool) -> Result<()> {
+    /// Writes the levels of `made` to `output`, and the other files, and reports them and the distances that depth
+    /// shows.
+    pub(crate) fn finish(
+        &self,
+        output: &Path,
+        display: &DisplayFile,
+        made: &HologramResult,
+        depth: Option<ShownDepth>,
+        json: bool,
+    ) -> Result<()> {
         let packed = self.write(output, display, made)?;
         let judged = self.judge.then(|| judge(display, made)).transpose()?;
-        self.report(output, &packed, made, judged.as_ref(), json);
+        let reported = Reported {
+            packed: &packed,
+            depth,
+            judged: judged.as_ref(),
+        };
+        self.report(output, made, reported, json);
         Ok(())
     }
 
@@ -78,7 +102,8 @@ impl OutputFlags {
         Ok(packed)
     }
 
-    fn report(&self, output: &Path, packed: &[PathBuf], made: &HologramResult, judged: Option<&Judged>, json: bool) {
+    fn report(&self, output: &Path, made: &HologramResult, reported: Reported<'_>, json: bool) {
+        let Reported { packed, depth, judged } = reported;
         let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
         let stages: serde_json::Map<_, _> = (made.stages.iter())
             .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
@@ -95,14 +120,15 @@ impl OutputFlags {
                 "width": width, "height": height,
                 "method": made.method, "encoder": made.encoder.name, "dark_threshold": made.encoder.options.dark_threshold,
                 "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
-                "stage_ms": stages, "total_ms": ms(&total), "shown": judged,
+                "stage_ms": stages, "total_ms": ms(&total), "depth": shown_json(depth), "shown": judged,
             }),
             format!(
-                "{}: {width}×{height} by {}; {}: {}{}",
+                "{}: {width}×{height} by {}; {}: {}{}{}",
                 terminal::name(output),
                 made.method,
                 made.encoder.describe(),
                 list.join(", "),
+                shown_text(depth),
                 judged.map_or(String::new(), Judged::describe)
             ),
         );

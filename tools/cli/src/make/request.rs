@@ -11,6 +11,7 @@ use phasefront::{Brightness, EncoderOptions, RgbdFrame};
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used};
 use phasefront_exact::point_based::Occlusion;
 use phasefront_io::display::DisplayFile;
+use phasefront_io::frame::ShownDepth;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -267,8 +268,8 @@ impl HologramRequest {
         ])
     }
 
-    /// Reads the image for `display`.
-    pub(crate) fn image(&self, display: &DisplayFile) -> Result<Image> {
+    /// Reads the image for `display`, and the distances that its depth shows.
+    pub(crate) fn image(&self, display: &DisplayFile) -> Result<(Image, Option<ShownDepth>)> {
         self.check_flags()?;
         if let (Some(Method::Core(method)), Some(_)) = (self.method, &self.ldi)
             && method != CoreMethod::Network
@@ -279,12 +280,14 @@ impl HologramRequest {
             ));
         }
         match &self.ldi {
-            Some(dir) => Ok(Image::Layers(
-                Ldi::read(dir)?.for_display(&display.target.display).into_owned(),
-            )),
-            None => Ok(Image::Rgbd(
-                self.frame.read(&display.target.display, self.display.is_given())?,
-            )),
+            Some(dir) => {
+                let ldi = Ldi::read(dir)?.for_display(&display.target.display).into_owned();
+                Ok((Image::Layers(ldi), None))
+            }
+            None => {
+                let (frame, shown) = self.frame.read(&display.target.display, self.display.is_given())?;
+                Ok((Image::Rgbd(frame), shown))
+            }
         }
     }
 

@@ -166,6 +166,15 @@ fn depth_is_the_same_from_every_format() {
     let stack = want.clone().insert_axis(ndarray::Axis(2));
     write_npy(folder.path("last.npy"), &stack).unwrap();
     write_npy(folder.path("first.npy"), &want.clone().insert_axis(ndarray::Axis(0))).unwrap();
+    let batch = want.clone().insert_axis(ndarray::Axis(0)).insert_axis(ndarray::Axis(0));
+    write_npy(folder.path("batch.npy"), &batch).unwrap();
+    // A PGM, and a PFM, whose rows run from the bottom up.
+    let header = |kind: &str, last: &str| format!("{kind}\n{WIDTH} {HEIGHT}\n{last}\n").into_bytes();
+    let levels: Vec<u8> = words.iter().flat_map(|v| v.to_be_bytes()).collect();
+    fs::write(folder.path("grey.pgm"), [header("P5", "65535"), levels].concat()).unwrap();
+    let rows = want.rows().into_iter().rev().flatten();
+    let values: Vec<u8> = rows.flat_map(|v| v.to_le_bytes()).collect();
+    fs::write(folder.path("real.pfm"), [header("Pf", "-1"), values].concat()).unwrap();
     for name in [
         "grey.png",
         "rgb.png",
@@ -181,6 +190,9 @@ fn depth_is_the_same_from_every_format() {
         "real.npy",
         "last.npy",
         "first.npy",
+        "batch.npy",
+        "grey.pgm",
+        "real.pfm",
     ] {
         let read = depth_map::read_depth(&folder.path(name), true).unwrap();
         assert!((&read - &want).iter().all(|v| v.abs() < 1e-6), "{name}");
@@ -366,7 +378,7 @@ fn pictures_that_are_not_read_say_what_to_do() {
     for (name, word) in [
         ("p.heic", "heif-convert"),
         ("p.avif", "save it as"),
-        ("p.gif", COLOUR_FORMATS),
+        ("p.gif", "save its picture as PNG"),
     ] {
         for flags in [
             &["--rgb", name, "--depth", "d.png"][..],

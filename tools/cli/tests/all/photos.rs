@@ -243,11 +243,7 @@ fn photos_that_cannot_be_used_get_one_line() {
     let marks = "<a/>".repeat(1 << 16);
     let marks = self::extended(marks.as_bytes(), 60_000);
     let cases = [
-        (
-            "gif.jpg",
-            broken(&STANDARD.encode(gif)),
-            "the depth inside is not a picture",
-        ),
+        ("gif.jpg", broken(&STANDARD.encode(gif)), "the depth inside is a GIF"),
         ("png.jpg", broken(&STANDARD.encode(png)), "16777216 in all are the most"),
         (
             "long.jpg",

@@ -15,7 +15,9 @@ const TUM_UNITS_PER_M: f64 = 5000.0;
 /// The names of colour folders that may lie beside a folder `depth`.
 const COLOUR_FOLDERS: [&str; 3] = ["rgb", "color", "image"];
 /// The file extensions of colour and depth. Files with other extensions are ignored.
-const IMAGES: [&str; 9] = ["png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff", "exr", "npy"];
+const IMAGES: [&str; 12] = [
+    "png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff", "exr", "npy", "npz", "pgm", "pfm",
+];
 
 /// Frames in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +35,12 @@ pub struct Sequence {
 /// # Errors
 /// Returns an error if the folder has none of these layouts.
 pub fn of_folder(dir: &Path) -> Result<Sequence> {
+    if dir.is_file() {
+        return Err(Error::file(
+            dir,
+            "is neither a folder nor a film of a kind that is read; ffmpeg makes one of it: `ffmpeg -i INPUT film.mp4`",
+        ));
+    }
     if dir.join("rgb.txt").is_file() && dir.join("depth.txt").is_file() {
         return tum(dir);
     }
@@ -45,10 +53,45 @@ pub fn of_folder(dir: &Path) -> Result<Sequence> {
     {
         return two_folders(&colour, &dir.join("depth"));
     }
+    if let Some(why) = other_folders(dir)? {
+        return Err(Error::file(dir, why));
+    }
     Ok(Sequence {
         frames: video::frames_of_folder(dir)?,
         unit: None,
     })
+}
+
+/// Returns advice if `dir` holds folders of pictures with other names, and no pictures beside them.
+fn other_folders(dir: &Path) -> Result<Option<String>> {
+    let is_image = |path: &PathBuf| IMAGES.iter().any(|ending| output::has_extension(path, ending));
+    let mut paths = files_of(dir)?;
+    paths.sort();
+    let mut patterns = Vec::new();
+    for path in &paths {
+        if path.is_dir()
+            && let Some(image) = files_of(path)?.into_iter().find(is_image)
+        {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let ending = image.extension().unwrap_or_default().to_string_lossy().into_owned();
+            patterns.push(format!("{name}/*.{ending}"));
+        }
+    }
+    if patterns.len() < 2 || paths.iter().any(is_image) {
+        return Ok(None);
+    }
+    // What is called depth comes last.
+    let is_depth = |pattern: &String| {
+        ["depth", "disp"]
+            .iter()
+            .any(|word| pattern.to_lowercase().contains(word))
+    };
+    patterns.sort_by_key(is_depth);
+    Ok(Some(format!(
+        "holds folders of other names than rgb, color or image, and depth; --pairs names their files, as --pairs '{},{}'",
+        patterns[0],
+        patterns[patterns.len() - 1]
+    )))
 }
 
 /// Returns the frames of `dir` whose names match the patterns `colour` and `depth`, for example `left_*.png` and
@@ -435,6 +478,17 @@ mod tests {
         std::fs::remove_file(dir.path().join("left_2_z.png")).unwrap();
         let refused = by_pattern(dir.path(), "left_*.png", "left_*_z.png").unwrap_err();
         assert!(refused.to_string().contains("left_2.png"));
+    }
+
+    #[test]
+    fn folders_of_other_names_are_told_how_to_name_them() {
+        let dir = folder(&[("depth_maps/1.png", ""), ("images/1.jpg", ""), ("notes.txt", "")]);
+        let why = of_folder(dir.path()).unwrap_err().to_string();
+        assert!(why.contains("--pairs 'images/*.jpg,depth_maps/*.png'"), "{why}");
+        let pairs = by_pattern(dir.path(), "images/*.jpg", "depth_maps/*.png").unwrap();
+        assert_eq!(names(&pairs), self::pairs(&[("1.jpg", "1.png")]));
+        let why = of_folder(&dir.path().join("notes.txt")).unwrap_err().to_string();
+        assert!(why.contains("neither a folder nor a film"), "{why}");
     }
 
     #[test]

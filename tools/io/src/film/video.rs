@@ -250,12 +250,12 @@ fn of_numbers(depth: Vec<u8>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
         DepthUnit::Millimetres => (DepthFormat::MillimetresU16, depth),
         DepthUnit::Normalized => (DepthFormat::NormalizedU16, depth),
         unit => {
-            let numbers = depth
-                .as_chunks::<2>()
-                .0
-                .iter()
-                .map(|n| f32::from(u16::from_le_bytes(*n)));
-            let metres = numbers.flat_map(|n| unit.metres(n).unwrap_or(f32::NAN).to_le_bytes());
+            let numbers = depth.as_chunks::<2>().0.iter().map(|n| u16::from_le_bytes(*n));
+            // The largest code is no reading, as in `DepthFormat::MillimetresU16`.
+            let metres = numbers.flat_map(|n| {
+                let reading = (n < u16::MAX).then(|| unit.metres(n.into())).flatten();
+                reading.unwrap_or(f32::NAN).to_le_bytes()
+            });
             (DepthFormat::MetresF32, metres.collect())
         }
     }

@@ -103,7 +103,7 @@ impl Hologram {
     /// Computes the amplitudes, (C, H, W), at each of `z_m`, in metres from the middle of the volume.
     ///
     /// # Errors
-    /// Returns an error if a z is too far to propagate to, if the look-up table is invalid, or if the hologram was made
+    /// Returns an error if a z is one that [`check_z`] refuses, if the look-up table is invalid, or if the hologram was made
     /// for a calibrated display.
     pub fn views(&self, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         self.views_on(&self.info().display_file()?, z_m)
@@ -120,6 +120,7 @@ impl Hologram {
         let (height, width) = shape;
         let info = self.info();
         self.check_display(file)?;
+        z_m.iter().try_for_each(|z| check_z(&info.display, *z))?;
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             Hologram::Levels(levels, _) => {
@@ -149,6 +150,27 @@ impl Hologram {
             })
             .collect())
     }
+}
+
+/// The distance from the middle of the volume to which views are made, in depths of the volume beyond the modulator's
+/// hologram.
+const MOST_DEPTHS: f64 = 10.0;
+
+/// Checks that a view at `z_m`, in metres from the middle of the volume, shows something of a hologram for `display`.
+///
+/// # Errors
+/// Returns an error if z is farther away than ten times the depth of the volume and the offset together.
+pub fn check_z(display: &Display, z_m: f64) -> Result<()> {
+    let most_m = MOST_DEPTHS * display.volume_depth_m() + display.offset_m().abs();
+    if z_m.abs() <= most_m {
+        return Ok(());
+    }
+    Err(Error::Input(format!(
+        "z = {} mm is far outside the volume, which reaches from -{half} mm to {half} mm; views reach {} mm",
+        rounded(z_m * 1e3),
+        rounded(most_m * 1e3),
+        half = rounded(display.volume_depth_m() * 500.0)
+    )))
 }
 
 /// Formats a number without the rounding noise of its last digits.

@@ -1,10 +1,8 @@
 //! Decoding of pictures and depth maps. All of them pass through `decode`, which limits their pixels, turns them
 //! upright according to their Exif data, and converts a decoder's panic to an error.
 
-use crate::input::{self, MOST_PICTURE, jpeg, quiet};
+use crate::input::{self, MOST_PICTURE, jpeg, jpeg_end, openexr, quiet};
 use crate::{Error, Result};
-use exr::meta::header::Header;
-use exr::meta::{BlockDescription, MetaData};
 use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
@@ -19,20 +17,20 @@ use tiff::tags::Tag;
 pub const COLOUR_FORMATS: &str = "PNG, JPEG, WebP, TIFF or BMP, of 8 or 16 bits";
 /// The supported depth formats, for messages.
 pub const DEPTH_FORMATS: &str =
-    "grey PNG, TIFF, WebP, JPEG or BMP of 8 or 16 bits, TIFF or OpenEXR of floating point, or .npy";
+    "grey PNG, TIFF, WebP, JPEG, BMP or PGM of 8 or 16 bits, TIFF, OpenEXR or PFM of floating point, .npy or .npz";
 
 /// The maximum number of pixels of an image, 8192²: more than two 8K frames.
 pub const MOST_PIXELS: u64 = 1 << 26;
 
 /// The maximum number of bytes of a PNG's colour profile, other metadata and a row of its pixels.
 const MOST_PNG_DATA: u64 = 1 << 25;
-/// The maximum number of bytes of all channels of an OpenEXR layer, and of one of its blocks, which is decoded whole.
-const MOST_LAYER: u64 = 1 << 31;
-const MOST_BLOCK: u64 = 1 << 28;
 
 /// Advice for HEIC and AVIF files, for which no maintained Rust decoder exists.
 const HEIC: &str = "is HEIC, which is not read; `heif-convert --with-aux photo.heic photo.jpg` of libheif writes the photo and its disparity as two pictures: give these to --rgb and --depth with --invert";
 const AVIF: &str = "is AVIF, which is not read; save it as PNG or JPEG";
+
+/// Advice for GIF files, which are read nowhere because they hold at most 256 colours.
+const GIF: &str = "is a GIF, which is not read; save its picture as PNG: `ffmpeg -i picture.gif frame_%04d.png` does so for all pictures of one that moves";
 
 /// Options for reading a picture.
 #[derive(Debug, Clone, Copy)]
@@ -60,8 +58,30 @@ impl Reading {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plane {
     pub(crate) values: Array2<f32>,
-    /// The largest value of its integer type, or `None` for floating point.
-    pub(crate) most: Option<f32>,
+    pub(crate) numbers: Numbers,
+}
+
+/// The type of the numbers in a file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Numbers {
+    /// Integers up to `most`.
+    Integers { most: f32 },
+    /// Floating point of 16 bits.
+    Halves,
+    /// Floating point of 32 or 64 bits.
+    Floats,
+}
+
+impl Numbers {
+    /// Returns the largest number, which files of distances hold where there is no reading. For types whose largest
+    /// number is over 10⁹, [`DepthUnit::metres`](phasefront_core::depth::DepthUnit::metres) finds it.
+    pub(crate) fn no_reading(self) -> f32 {
+        match self {
+            Numbers::Integers { most } => most,
+            Numbers::Halves => half::f16::MAX.to_f32(),
+            Numbers::Floats => f32::MAX,
+        }
+    }
 }
 
 /// The pixels of a file.
@@ -81,7 +101,7 @@ pub(crate) struct Decoded {
     pub(crate) orientation: Orientation,
 }
 
-type Said<T> = std::result::Result<T, String>;
+pub(crate) type Said<T> = std::result::Result<T, String>;
 
 /// Decodes the picture or depth map in `from`.
 ///
@@ -94,7 +114,10 @@ pub(crate) fn decode<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decod
         .map_err(|e| format!("cannot be read: {e}"))?;
     let decoded = quiet::caught(|| match kind(&head)? {
         Kind::Tiff => tiff(from, how),
-        Kind::Exr => exr(from, how),
+        Kind::Exr => openexr::depth(from, how.most_pixels).map(|plane| Decoded {
+            pixels: Pixels::Plane(plane),
+            orientation: Orientation::NoTransforms,
+        }),
         Kind::Image(format) => image(from, format, how),
     });
     let Decoded { pixels, orientation } = decoded.map_err(|why| broken(&why))??;
@@ -157,6 +180,7 @@ fn kind(head: &[u8]) -> Said<Kind> {
         return Ok(Kind::Exr);
     }
     match image::guess_format(head) {
+        Ok(ImageFormat::Gif) => Err(GIF.into()),
         Ok(ImageFormat::Tiff) => Ok(Kind::Tiff),
         Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Bmp | ImageFormat::WebP)) => {
             Ok(Kind::Image(format))
@@ -164,17 +188,17 @@ fn kind(head: &[u8]) -> Said<Kind> {
         // BigTIFF has another version number.
         _ if head.starts_with(b"II\x2b\0") || head.starts_with(b"MM\0\x2b") => Ok(Kind::Tiff),
         _ => Err(format!(
-            "is not a picture of a kind that is read: {COLOUR_FORMATS}; depth also as OpenEXR or .npy"
+            "is not a picture of a kind that is read: {COLOUR_FORMATS}; depth also as OpenEXR, PGM, PFM, .npy or .npz"
         )),
     }
 }
 
-fn broken(why: &dyn std::fmt::Display) -> String {
+pub(crate) fn broken(why: &dyn std::fmt::Display) -> String {
     format!("is not a whole picture: {why}")
 }
 
 /// Checks the number of pixels, because a small file may hold a large image.
-pub(super) fn check(width: u64, height: u64, most: u64) -> Said<()> {
+pub(crate) fn check(width: u64, height: u64, most: u64) -> Said<()> {
     if width.saturating_mul(height) > most {
         return Err(format!("has {width}×{height} pixels; {most} in all are the most"));
     }
@@ -192,8 +216,15 @@ fn image<R: BufRead + Seek>(mut from: R, format: ImageFormat, how: Reading) -> S
             return decoded(decoder.map_err(|e| broken(&e))?, limits, how);
         }
         ImageFormat::Jpeg => {
+            let unread = |e: std::io::Error| format!("cannot be read: {e}");
             jpeg::check(&mut from)?;
-            from.rewind().map_err(|e| format!("cannot be read: {e}"))?;
+            from.rewind().map_err(unread)?;
+            let mut bytes = Vec::new();
+            from.read_to_end(&mut bytes).map_err(unread)?;
+            if !jpeg_end::is_whole(&bytes) {
+                return Err(broken(&"its JPEG is cut short, without a mark of its end"));
+            }
+            from.rewind().map_err(unread)?;
         }
         _ => {}
     }
@@ -257,108 +288,19 @@ fn tiff_pixels(values: DecodingResult, colours: ColorType, width: u32, height: u
 
 fn tiff_plane(values: DecodingResult, shape: (usize, usize)) -> Option<Pixels> {
     use DecodingResult::{F16, F32, F64, I8, I16, I32, U32};
-    let (values, most) = match values {
-        F16(v) => (v.into_iter().map(f32::from).collect(), None),
-        F32(v) => (v, None),
-        F64(v) => (v.into_iter().map(|v| v as f32).collect(), None),
-        I8(v) => (v.into_iter().map(f32::from).collect(), Some(f32::from(i8::MAX))),
-        I16(v) => (v.into_iter().map(f32::from).collect(), Some(f32::from(i16::MAX))),
-        I32(v) => (v.into_iter().map(|v| v as f32).collect(), Some(i32::MAX as f32)),
-        U32(v) => (v.into_iter().map(|v| v as f32).collect(), Some(u32::MAX as f32)),
+    let integers = |most: f32| Numbers::Integers { most };
+    let (values, numbers) = match values {
+        F16(v) => (v.into_iter().map(f32::from).collect(), Numbers::Halves),
+        F32(v) => (v, Numbers::Floats),
+        F64(v) => (v.into_iter().map(|v| v as f32).collect(), Numbers::Floats),
+        I8(v) => (v.into_iter().map(f32::from).collect(), integers(i8::MAX.into())),
+        I16(v) => (v.into_iter().map(f32::from).collect(), integers(i16::MAX.into())),
+        I32(v) => (v.into_iter().map(|v| v as f32).collect(), integers(i32::MAX as f32)),
+        U32(v) => (v.into_iter().map(|v| v as f32).collect(), integers(u32::MAX as f32)),
         _ => return None,
     };
     let values = Array2::from_shape_vec(shape, values).ok()?;
-    Some(Pixels::Plane(Plane { values, most }))
-}
-
-/// Decodes an OpenEXR depth map from its depth channel, or from its colour channels if they are equal.
-fn exr<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
-    let broken = |e: exr::error::Error| broken(&e);
-    let about = MetaData::read_from_buffered(&mut from, false).map_err(broken)?;
-    for header in &about.headers {
-        check_layer(header, how.most_pixels)?;
-    }
-    let names = exr_channels(&about.headers)?;
-    let mut planes = names.iter().map(|name| exr_plane(&mut from, name));
-    let values = planes.next().unwrap_or_else(|| Err("has no channel".into()))?;
-    for other in planes {
-        if other? != values {
-            return Err(
-                "is OpenEXR of colours without a channel of depth (Z or depth), and is read as depth alone".into(),
-            );
-        }
-    }
-    Ok(Decoded {
-        pixels: Pixels::Plane(Plane { values, most: None }),
-        orientation: Orientation::NoTransforms,
-    })
-}
-
-/// Checks the number of pixels of an OpenEXR layer and the bytes of all its channels, which are decoded together.
-fn check_layer(header: &Header, most_pixels: u64) -> Said<()> {
-    let exr::math::Vec2(width, height) = header.layer_size;
-    check(width as u64, height as u64, most_pixels)?;
-    let bytes = |width: usize, height: usize| {
-        (width as u64 * height as u64).saturating_mul(header.channels.bytes_per_pixel as u64)
-    };
-    let block = match header.blocks {
-        BlockDescription::ScanLines => bytes(width, header.compression.scan_lines_per_block().min(height)),
-        BlockDescription::Tiles(tiles) => bytes(tiles.tile_size.0.min(width), tiles.tile_size.1.min(height)),
-    };
-    if bytes(width, height) > MOST_LAYER || block > MOST_BLOCK {
-        return Err(format!(
-            "is OpenEXR with {} channels of {width}×{height} pixels, {} bytes in blocks of {block}; {MOST_LAYER} in blocks of {MOST_BLOCK} are the most: save depth alone",
-            header.channels.list.len(),
-            bytes(width, height),
-        ));
-    }
-    Ok(())
-}
-
-/// Reads one channel of an OpenEXR file.
-fn exr_plane<R: BufRead + Seek>(from: &mut R, name: &str) -> Said<Array2<f32>> {
-    use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, Vec2};
-    from.seek(SeekFrom::Start(0))
-        .map_err(|e| format!("cannot be read: {e}"))?;
-    let channel = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .specific_channels()
-        .required(name)
-        .collect_pixels(
-            |size: Vec2<usize>, _: &_| Array2::<f32>::zeros((size.height(), size.width())),
-            |plane: &mut Array2<f32>, at: Vec2<usize>, (value,): (f32,)| plane[(at.y(), at.x())] = value,
-        );
-    let image = channel.first_valid_layer().all_attributes().non_parallel();
-    let image = image.from_buffered(from).map_err(|e| broken(&e))?;
-    Ok(image.layer_data.channel_data.pixels)
-}
-
-/// Returns the depth channel, or the three colour channels if there is no depth channel.
-fn exr_channels(headers: &[Header]) -> Said<Vec<String>> {
-    let flat = headers.iter().filter(|header| !header.deep);
-    let names: Vec<String> = flat
-        .flat_map(|header| header.channels.list.iter().map(|channel| channel.name.to_string()))
-        .collect();
-    // Layer names precede the name of a channel, as in `ViewLayer.Depth.Z`.
-    let last = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
-    for wanted in ["z", "depth", "y", "d"] {
-        if let Some(name) = names.iter().find(|name| last(name) == wanted) {
-            return Ok(vec![name.clone()]);
-        }
-    }
-    let colours = ["R", "G", "B"].map(str::to_owned);
-    if colours.iter().all(|colour| names.contains(colour)) {
-        return Ok(colours.into());
-    }
-    match names.len() {
-        0 => Err("is OpenEXR of deep data; save it flat".into()),
-        1 => Ok(names),
-        _ => Err(format!(
-            "is OpenEXR with the channels {}; a depth map has one, or one called Z or depth",
-            names.join(", ")
-        )),
-    }
+    Some(Pixels::Plane(Plane { values, numbers }))
 }
 
 fn turned(pixels: Pixels, orientation: Orientation) -> Pixels {
@@ -367,9 +309,9 @@ fn turned(pixels: Pixels, orientation: Orientation) -> Pixels {
             image.apply_orientation(orientation);
             Pixels::Image(image)
         }
-        Pixels::Plane(Plane { values, most }) => Pixels::Plane(Plane {
+        Pixels::Plane(Plane { values, numbers }) => Pixels::Plane(Plane {
             values: turned_plane(values, orientation),
-            most,
+            numbers,
         }),
     }
 }

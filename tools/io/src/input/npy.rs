@@ -3,7 +3,7 @@
 //! The header of a file may say anything. Its shape is compared with the bytes that are there before memory is
 //! allocated for the values, and its text is read in one pass, without nesting.
 
-use crate::input::decode::{self, MOST_PIXELS, Plane};
+use crate::input::decode::{self, MOST_PIXELS, Numbers, Plane};
 use crate::input::{self, MOST_ARRAY};
 use crate::{Error, Result};
 use half::f16;
@@ -48,7 +48,7 @@ macro_rules! number {
     )*};
 }
 
-number!(u8: "u1", u16: "u2", u32: "u4", i8: "i1", i16: "i2", i32: "i4", f16: "f2", f32: "f4", f64: "f8");
+number!(u8: "u1", u16: "u2", u32: "u4", u64: "u8", i8: "i1", i16: "i2", i32: "i4", i64: "i8", f16: "f2", f32: "f4", f64: "f8");
 
 macro_rules! complex {
     ($($part:ty: $name:literal),*) => {$(
@@ -292,39 +292,43 @@ pub(crate) fn read_field<R: Read>(npy: Npy<R>) -> Said<Array3<Complex32>> {
 pub(crate) fn read_plane<R: Read>(npy: Npy<R>) -> Said<Plane> {
     let shape @ (height, width) = match *npy.shape() {
         [height, width] | [height, width, 1] | [1, height, width] => (height, width),
+        [1, 1, height, width] | [1, height, width, 1] => (height, width),
         _ => {
             return Err(format!(
-                "has shape {:?}; a depth map is (H, W), (H, W, 1) or (1, H, W)",
+                "has shape {:?}; a depth map is (H, W), (H, W, 1), (1, H, W), (1, H, W, 1) or (1, 1, H, W)",
                 npy.shape()
             ));
         }
     };
     decode::check(width as u64, height as u64, MOST_PIXELS)?;
-    let (values, most) = numbers(npy)?;
+    let (values, numbers) = numbers(npy)?;
     let values = values.into_shape_with_order(shape).map_err(|e| e.to_string())?;
-    Ok(Plane { values, most })
+    Ok(Plane { values, numbers })
 }
 
-/// Reads numbers as f32. For integers, also returns the largest value of their type.
-fn numbers<R: Read>(npy: Npy<R>) -> Said<(ArrayD<f32>, Option<f32>)> {
+/// Reads numbers as f32, and returns their type.
+fn numbers<R: Read>(npy: Npy<R>) -> Said<(ArrayD<f32>, Numbers)> {
     macro_rules! whole {
-        ($type:ty) => {
-            (npy.converted(|v: $type| v as f32)?, Some(<$type>::MAX as f32))
-        };
+        ($type:ty) => {{
+            let most = <$type>::MAX as f32;
+            (npy.converted(|v: $type| v as f32)?, Numbers::Integers { most })
+        }};
     }
     Ok(match npy.kind() {
-        "f2" => (npy.converted(f16::to_f32)?, None),
-        "f4" => (npy.array()?, None),
-        "f8" => (npy.converted(|v: f64| v as f32)?, None),
+        "f2" => (npy.converted(f16::to_f32)?, Numbers::Halves),
+        "f4" => (npy.array()?, Numbers::Floats),
+        "f8" => (npy.converted(|v: f64| v as f32)?, Numbers::Floats),
         "u1" => whole!(u8),
         "u2" => whole!(u16),
         "u4" => whole!(u32),
+        "u8" => whole!(u64),
         "i1" => whole!(i8),
         "i2" => whole!(i16),
         "i4" => whole!(i32),
+        "i8" => whole!(i64),
         _ => {
             return Err(format!(
-                "holds numbers of the type {}; a depth map has float16, float32, float64 or whole numbers of 8 to 32 bits: depth.astype(numpy.float32) makes it so",
+                "holds numbers of the type {}; a depth map has float16, float32, float64 or whole numbers of 8 to 64 bits: depth.astype(numpy.float32) makes it so",
                 npy.header.descr
             ));
         }
@@ -452,18 +456,19 @@ mod tests {
                 "f8" => f64::from(*v).to_le_bytes().to_vec(),
                 "u1" | "i1" => vec![*v as u8],
                 "u2" | "i2" => (*v as u16).to_le_bytes().to_vec(),
-                _ => (*v as u32).to_le_bytes().to_vec(),
+                "u4" | "i4" => (*v as u32).to_le_bytes().to_vec(),
+                _ => (*v as u64).to_le_bytes().to_vec(),
             };
             values.iter().flat_map(bytes).collect()
         };
         let want = Array2::from_shape_vec((2, 3), values.to_vec()).unwrap();
-        for kind in ["f2", "f4", "f8", "u1", "u2", "u4", "i1", "i2", "i4"] {
+        for kind in ["f2", "f4", "f8", "u1", "u2", "u4", "u8", "i1", "i2", "i4", "i8"] {
             let header = |order: &str, columns: &str, shape: &str| {
                 format!("{{'descr': '{order}{kind}', 'fortran_order': {columns}, 'shape': {shape}, }}\n")
             };
             let size: usize = kind[1..].parse().unwrap();
             let be: Vec<u8> = le(kind).chunks(size).flat_map(|v| v.iter().rev().copied()).collect();
-            for shape in ["(2, 3)", "(2, 3, 1)", "(1, 2, 3)"] {
+            for shape in ["(2, 3)", "(2, 3, 1)", "(1, 2, 3)", "(1, 1, 2, 3)", "(1, 2, 3, 1)"] {
                 let little = file(&header("<", "False", shape), &le(kind));
                 assert_eq!(plane(&little).unwrap().values, want, "{kind} {shape}");
                 let big = file(&header(">", "False", shape), &be);
@@ -471,8 +476,9 @@ mod tests {
             }
             let columns = file(&header("<", "True", "(3, 2)"), &le(kind));
             assert_eq!(plane(&columns).unwrap().values, want.t(), "{kind}");
-            assert_eq!(plane(&columns).unwrap().most.is_none(), kind.starts_with('f'));
-            for shape in ["(6,)", "(2, 3, 2)", "(2, 4)", "(2, 2)", "(1, 2, 3, 1)", "(-2, 3)"] {
+            let is_integer = matches!(plane(&columns).unwrap().numbers, Numbers::Integers { .. });
+            assert_eq!(is_integer, !kind.starts_with('f'));
+            for shape in ["(6,)", "(2, 3, 2)", "(2, 4)", "(2, 2)", "(1, 1, 1, 2, 3)", "(-2, 3)"] {
                 assert!(
                     plane(&file(&header("<", "False", shape), &le(kind))).is_err(),
                     "{shape}"

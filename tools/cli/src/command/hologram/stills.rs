@@ -108,7 +108,7 @@ fn still(
         Error::File { ref path, .. } if picture.files.contains(path) => e,
         other => Error::file(&picture.files[0], other),
     };
-    let image = request.image(display).map_err(named)?;
+    let (image, _) = request.image(display).map_err(named)?;
     let made = request.make(display, &image).map_err(named)?;
     let (info, _) = infos(display, &made);
     hologram::write_made_of(path, &made.hologram(info), &made_of)?;
