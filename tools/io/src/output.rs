@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, Metadata};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
@@ -160,11 +160,38 @@ pub(crate) fn write_by_name(path: &Path, write: impl FnOnce(&Path) -> Result<()>
     pending.synced()?.place()
 }
 
+/// The temporary files that this process is writing.
+static WRITING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn writing() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files that this process is writing. While the result is held, none is created or put in place.
+/// A process calls this before it ends in the middle of its work.
+pub fn give_up() -> impl Sized {
+    let writing = writing();
+    for path in writing.iter() {
+        let _ = std::fs::remove_file(path);
+    }
+    writing
+}
+
+/// An entry of [`WRITING`].
+struct Written(PathBuf);
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        writing().remove(&self.0);
+    }
+}
+
 /// A temporary file that is not in its place yet. Dropping it deletes it.
 pub(crate) struct Pending {
     path: PathBuf,
     real: PathBuf,
     file: NamedTempFile,
+    written: Written,
 }
 
 impl Pending {
@@ -187,13 +214,18 @@ impl Pending {
         let real = Place::of_file(path)?.real;
         let parent = real.parent().unwrap_or(Path::new("."));
         remove_left_over(parent);
+        let mut all = writing();
         let file = temporary_in(parent).map_err(|e| cannot_write(path, &e))?;
+        all.insert(file.path().to_owned());
+        drop(all);
+        let written = Written(file.path().to_owned());
         // The lock tells other runs that the file is in use. Writing also works on file systems without locks.
         let _ = file.as_file().try_lock();
         Ok(Self {
             path: path.to_owned(),
             real,
             file,
+            written,
         })
     }
 
@@ -205,11 +237,17 @@ impl Pending {
 
     /// Renames the file to its final path. A file that is replaced passes on its permissions.
     pub(crate) fn place(self) -> Result<()> {
-        let Self { path, real, file } = self;
+        let Self {
+            path,
+            real,
+            file,
+            written: _written,
+        } = self;
         if let Ok(before) = std::fs::metadata(&real) {
             // Some file systems, such as FAT, have no permissions.
             let _ = file.as_file().set_permissions(before.permissions());
         }
+        let _all = writing();
         file.persist(real).map_err(|e| cannot_write(&path, &e.error))?;
         Ok(())
     }

@@ -40,7 +40,7 @@ pub(crate) struct Video {
     /// Film in grey with the depth of the input film
     #[arg(long, value_name = "FILE")]
     depth_video: Option<PathBuf>,
-    /// Take the depth of a film from the right half of its pictures, in grey
+    /// Take the depth of a film from the right half of its pictures, in grey; a margin in their middle is left out
     #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_beside: bool,
     #[command(flatten)]
@@ -125,15 +125,17 @@ fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
 }
 
 impl Video {
-    pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
+    pub(crate) fn run(mut self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
         if self.output.is_none() && !self.live && !json {
             return Err(Error::Input(
                 "no output is asked for: -o DIR writes the holograms; --json alone reports how long they took".into(),
             ));
         }
-        let rate = self.rate_hz()?;
+        check_rate(self.rate)?;
         let before = Before::of_flags(self.resume, self.overwrite);
-        let (mut source, (height, width)) = Source::open(&self)?;
+        let (mut source, (height, width)) = Source::open(&mut self)?;
+        let rate = self.rate.or(source.rate_hz()).unwrap_or(30.0);
+        check_rate(Some(rate))?;
         let (options, info) = self.options(height, width, threads, rate)?;
         let preview_mm = self.preview_mm();
         let record = self.record(&info.display, rate)?;
@@ -144,6 +146,7 @@ impl Video {
             before,
             record,
         )?;
+        sink.expect_interrupts(self.live);
         let bar = source.progress();
         let start = Instant::now();
         let memory = memory_mb();
@@ -208,19 +211,6 @@ impl Video {
         record.switch("--adaptive", *adaptive);
         record.set("--preview-mm", self.preview_mm());
         Ok(record)
-    }
-
-    /// Returns the frames per second of the input.
-    fn rate_hz(&self) -> Result<f64> {
-        let films = || film::is_film(&self.input).then(|| film::about(&self.input)).flatten();
-        let rate = self.rate.or_else(|| Some(films()?.rate_hz)).unwrap_or(30.0);
-        if rate.is_finite() && rate > 0.0 && rate <= 1000.0 {
-            Ok(rate)
-        } else {
-            Err(Error::Input(format!(
-                "--rate {rate}: it must lie above 0 and up to 1000"
-            )))
-        }
     }
 
     fn options(
@@ -453,6 +443,15 @@ impl Video {
             ),
         );
         Ok(())
+    }
+}
+
+fn check_rate(rate_hz: Option<f64>) -> Result<()> {
+    match rate_hz {
+        Some(rate) if !(rate.is_finite() && rate > 0.0 && rate <= 1000.0) => Err(Error::Input(format!(
+            "--rate {rate}: it must lie above 0 and up to 1000"
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -53,6 +53,23 @@ impl DepthFlags {
         record.set("--far", *far);
     }
 
+    /// Takes the unit that a folder's layout defines, unless --depth-unit is given.
+    pub(crate) fn take_layout(&mut self, unit: Option<DepthUnit>) {
+        let (Some(unit), None) = (unit, self.depth_unit) else {
+            return;
+        };
+        self.depth_unit = Some(match unit {
+            DepthUnit::Normalized => UnitName::Normalized,
+            DepthUnit::Metres => UnitName::M,
+            DepthUnit::Millimetres => UnitName::Mm,
+            DepthUnit::Disparity => UnitName::Disparity,
+            DepthUnit::Raw { units_per_m } => {
+                self.depth_scale = Some(units_per_m);
+                UnitName::Raw
+            }
+        });
+    }
+
     /// Returns --near and --far of video, in metres.
     pub(crate) fn range(&self) -> Result<Option<(f32, f32)>> {
         match (self.near, self.far) {
@@ -62,7 +79,8 @@ impl DepthFlags {
         }
     }
 
-    pub(crate) fn options(&self) -> Result<DepthOptions> {
+    /// Returns how depth is read. `inverted` tells whether --invert is given.
+    pub(crate) fn options(&self, inverted: bool) -> Result<DepthOptions> {
         let unit = self.depth_unit.unwrap_or_default();
         check_used(&[(
             "--depth-scale",
@@ -83,6 +101,7 @@ impl DepthFlags {
             unit,
             near_m: self.near,
             far_m: self.far,
+            inverted,
         })
     }
 }

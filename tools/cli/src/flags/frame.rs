@@ -8,7 +8,7 @@ use ndarray::{Array2, Array3};
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::stage;
-use phasefront_io::film::sequence;
+use phasefront_io::film::sequence::{self, Shows};
 use phasefront_io::frame::Captured;
 use phasefront_io::frame::fit::{Fit, Placement};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
@@ -154,11 +154,13 @@ pub(crate) struct Picture {
 }
 
 fn of_one_folder(folder: &Path) -> Result<Vec<Picture>> {
-    let found = sequence::images(folder)?.into_iter().map(|(name, path)| Picture {
-        name: name.text,
-        files: vec![path],
-        is_whole: true,
-    });
+    let found = sequence::images(folder, Shows::Colour)?
+        .into_iter()
+        .map(|(name, path)| Picture {
+            name: name.text,
+            files: vec![path],
+            is_whole: true,
+        });
     Ok(found.collect())
 }
 
@@ -267,7 +269,7 @@ impl FrameFlags {
     pub(crate) fn read(&self, display: &Display, named: bool) -> Result<RgbdFrame> {
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
-                let Captured { rgb, depth } = frame::read(rgb, depth, self.depth_numbers.options()?)?;
+                let Captured { rgb, depth } = frame::read(rgb, depth, self.depth_numbers.options(self.seen.invert)?)?;
                 self.conditioned(&rgb, depth, display)
             }
             (Some(rgb), None, _) => self.by_network(&picture::read_rgb(rgb)?, display),
@@ -306,7 +308,7 @@ impl FrameFlags {
 
     /// Makes the frame of a photo: from its distances if --near or --far is given, else from d_n unchanged.
     fn of_photo(&self, path: &Path, photo: &photo::Photo, display: &Display) -> Result<RgbdFrame> {
-        let options = self.depth_numbers.options()?;
+        let options = self.depth_numbers.options(self.seen.invert)?;
         let depth = match (options.near_m, options.far_m, photo.metres()) {
             (None, None, _) => frame::relative(photo.depth.view(), None, None),
             (near, far, Some(metres)) => frame::relative(metres.view(), near, far),

@@ -27,22 +27,7 @@ pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 
 /// Reads a depth map as [`read_depth`] does, and its orientation.
 pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
-    let refuse = |why: String| Error::file(path, why);
-    let (plane, orientation) = if has_extension(path, "npy") {
-        (
-            npy::read_plane(npy::open(path)?).map_err(refuse)?,
-            Orientation::NoTransforms,
-        )
-    } else {
-        let file = input::open(path, MOST_PICTURE)?;
-        let decoded = decode::decode(file, Reading::UPRIGHT).map_err(refuse)?;
-        let plane = match decoded.pixels {
-            Pixels::Plane(plane) => plane,
-            Pixels::Image(image) => of_image(image).map_err(refuse)?,
-        };
-        (plane, decoded.orientation)
-    };
-    let Plane { mut values, most } = plane;
+    let (Plane { mut values, most }, orientation) = plane(path)?;
     if let Some(most) = most.filter(|_| normalized) {
         values.mapv_inplace(|v| v / most);
     }
@@ -50,6 +35,27 @@ pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
         depth: values,
         orientation,
     })
+}
+
+/// Checks whether a depth map has whole numbers of 16 bits.
+pub(crate) fn has_16_bits(path: &Path) -> bool {
+    plane(path).is_ok_and(|(plane, _)| plane.most == Some(f32::from(u16::MAX)))
+}
+
+/// Reads a depth map and its orientation.
+fn plane(path: &Path) -> Result<(Plane, Orientation)> {
+    let refuse = |why: String| Error::file(path, why);
+    if has_extension(path, "npy") {
+        let plane = npy::read_plane(npy::open(path)?).map_err(refuse)?;
+        return Ok((plane, Orientation::NoTransforms));
+    }
+    let file = input::open(path, MOST_PICTURE)?;
+    let decoded = decode::decode(file, Reading::UPRIGHT).map_err(refuse)?;
+    let plane = match decoded.pixels {
+        Pixels::Plane(plane) => plane,
+        Pixels::Image(image) => of_image(image).map_err(refuse)?,
+    };
+    Ok((plane, decoded.orientation))
 }
 
 fn of_image(image: DynamicImage) -> std::result::Result<Plane, String> {

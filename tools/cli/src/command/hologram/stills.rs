@@ -4,6 +4,7 @@
 use crate::flags::frame::Picture;
 use crate::make::{HologramRequest, infos};
 use crate::record::{Before, Claim, RunRecord};
+use phasefront_command::interrupt;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::{Error, Result, hologram, input, output};
@@ -38,6 +39,10 @@ pub(super) fn run(
     request.record(&display.target.display, &mut record)?;
     let names: BTreeSet<_> = pictures.iter().map(|picture| format!("{}.png", picture.name)).collect();
     let claim = Claim::new(output, &record, before, |name| names.contains(name))?;
+    interrupt::advise(format!(
+        "{} keeps the holograms that are made; the same command with --resume makes the others",
+        output.display()
+    ));
     let start = Instant::now();
     let (mut made, mut kept, mut failed) = (0, 0, Vec::new());
     let bar = progress_bar(pictures.len() as u64, "pictures");
