@@ -9,6 +9,7 @@ use phasefront_io::{Error, Result};
 
 /// The unit of a depth image's values, and the range of depth to show.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Depth")]
 pub(crate) struct DepthFlags {
     /// Unit of the depth values; 0 and NaN are missing readings, except in normalized depth [default: normalized]
     #[arg(long, value_enum)]
@@ -40,17 +41,10 @@ enum UnitName {
 }
 
 impl DepthFlags {
+    /// Records the unit of the depth, which a folder's layout may define.
     pub(crate) fn record(&self, record: &mut RunRecord) {
-        let DepthFlags {
-            depth_unit,
-            depth_scale,
-            near,
-            far,
-        } = self;
-        record.choice("--depth-unit", Some(&depth_unit.unwrap_or_default()));
-        record.set("--depth-scale", *depth_scale);
-        record.set("--near", *near);
-        record.set("--far", *far);
+        record.choice("--depth-unit", Some(&self.depth_unit.unwrap_or_default()));
+        record.set("--depth-scale", self.depth_scale);
     }
 
     /// Takes the unit that a folder's layout defines, unless --depth-unit is given.

@@ -2,8 +2,7 @@
 //! estimates depth. Further flags place the image on the modulator.
 
 use crate::flags::depth::DepthFlags;
-use crate::record::RunRecord;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use ndarray::{Array2, Array3};
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
@@ -17,8 +16,12 @@ use phasefront_io::picture::{self, photo};
 use phasefront_io::{Error, Result, frame, output};
 use std::path::{Path, PathBuf};
 
+/// The groups of the flags for an RGB-D image, for flags that conflict with them.
+pub(crate) const IMAGE_FLAGS: [&str; 3] = ["FrameFlags", "SeenDepthFlags", "DepthFlags"];
+
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Input")]
 pub(crate) struct FrameFlags {
     #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}; or a folder of them"))]
     rgb: Option<PathBuf>,
@@ -38,7 +41,7 @@ pub(crate) struct FrameFlags {
     /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: unchanged;
     /// contain with --photo]. A warning appears if the image's size differs from that of the --display, or, without
     /// --display, if the image is larger than the default display
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Display")]
     fit: Option<FitName>,
     #[command(flatten)]
     depth_numbers: DepthFlags,
@@ -46,12 +49,13 @@ pub(crate) struct FrameFlags {
 
 /// Depth that a network estimates, and the direction of depth.
 #[derive(Clone, Default, Args)]
+#[command(next_help_heading = "Depth")]
 pub(crate) struct SeenDepthFlags {
     /// ONNX file of a network that estimates relative inverse depth from colour alone (docs/depth.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_network: Option<PathBuf>,
     /// Scaling of the colours for --depth-network
-    #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network")]
+    #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network", help_heading = "Expert")]
     depth_network_colours: ColoursName,
     /// Swap near and far: for depth that is larger where it is nearer, and for --depth-network that gives distance
     #[arg(long)]
@@ -59,18 +63,6 @@ pub(crate) struct SeenDepthFlags {
 }
 
 impl SeenDepthFlags {
-    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
-        let SeenDepthFlags {
-            depth_network,
-            depth_network_colours,
-            invert,
-        } = self;
-        record.file("--depth-network", depth_network.as_deref())?;
-        record.choice("--depth-network-colours", Some(depth_network_colours));
-        record.switch("--invert", *invert);
-        Ok(())
-    }
-
     pub(crate) fn network(&self) -> Option<&Path> {
         self.depth_network.as_deref()
     }
@@ -193,37 +185,6 @@ pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, n
 }
 
 impl FrameFlags {
-    /// The names of the flags, for flags that conflict with them.
-    pub(crate) const NAMES: [&str; 11] = [
-        "rgb",
-        "depth",
-        "photo",
-        "depth_network",
-        "depth_network_colours",
-        "invert",
-        "fit",
-        "depth_unit",
-        "depth_scale",
-        "near",
-        "far",
-    ];
-
-    /// Records all flags except those that name the picture.
-    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
-        let FrameFlags {
-            rgb: _,
-            depth: _,
-            photo: _,
-            seen,
-            fit,
-            depth_numbers,
-        } = self;
-        seen.record(record)?;
-        record.choice("--fit", fit.as_ref());
-        depth_numbers.record(record);
-        Ok(())
-    }
-
     /// Returns the pictures of the folders that --rgb and --depth, or --photo, name, or `None` if they name files.
     pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
         let is_folder = |path: &Option<PathBuf>| path.as_ref().is_some_and(|path| path.is_dir());

@@ -26,6 +26,7 @@ mod one_laser;
 mod outputs;
 mod photos;
 mod recordings;
+mod shell;
 mod show;
 mod stills;
 mod video;

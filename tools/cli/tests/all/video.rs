@@ -611,7 +611,7 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
         ),
         (&["--local-steps", "3"], "no --local-steps", "--local-steps 3"),
         (&["--method", "auto", "--network", "15"], "no --network", "--network 15"),
-        (&["--precision", "f32"], "--precision int8", "--precision f32"),
+        (&["--precision", "f32"], "no --precision", "--precision f32"),
         (&["--brightness", "max"], "--brightness smoothed", "--brightness max"),
         (&["--rate", "24"], "--rate 30", "--rate 24"),
         (&["--offset-mm", "2"], "display offset_mm 0", "display offset_mm 2"),

@@ -22,6 +22,7 @@ pub(super) fn run(
     pictures: Vec<Picture>,
     output: &Path,
     before: Before,
+    mut record: RunRecord,
     json: bool,
 ) -> Result<()> {
     if output::has_extension(output, "png") {
@@ -35,8 +36,7 @@ pub(super) fn run(
     }
     output::folder(output, before.holding())?;
     let display = request.display()?;
-    let mut record = RunRecord::new("hologram");
-    request.record(&display.target.display, &mut record)?;
+    record.display(request.display.name(), &display.target.display)?;
     let names: BTreeSet<_> = pictures.iter().map(|picture| format!("{}.png", picture.name)).collect();
     let claim = Claim::new(output, &record, before, |name| names.contains(name))?;
     interrupt::advise(format!(
