@@ -812,7 +812,7 @@ fn films_have_any_names_and_are_films_alone() {
         &["-framerate", "10"],
         &input.join("color_%d.png"),
         &at("a.mp4"),
-        &["-vf", "format=gray", "-c:v", "libx264rgb", "-qp", "0"],
+        &["-vf", "format=gray,negate", "-c:v", "libx264rgb", "-qp", "0"],
     );
     let run = |arguments: &[&str]| {
         let output = phasefront(arguments).current_dir(dir.path()).output().unwrap();

@@ -101,7 +101,9 @@ impl Columns {
     /// The range of a column of one colour in a lossy film.
     const FLAT: u8 = 16;
     /// The difference between the means of columns that have one colour.
-    const SAME: f64 = 8.0;
+    const SAME: f64 = 2.0;
+    /// The least difference between the means of columns at an edge.
+    const EDGE: f64 = 8.0;
     /// The columns beside an edge to which a codec's blocks spread it.
     const BLURRED: usize = 8;
 
@@ -154,22 +156,31 @@ impl Columns {
         if is_background || !(self.is_like(left, left) && self.is_like(right, left)) {
             return 0;
         }
-        let before = self.reach(|n| left.checked_sub(n));
-        let after = self.reach(|n| Some(right + n).filter(|x| *x < width));
-        // Where a picture begins with the margin's colour, the other side shows how wide the margin is.
-        right - left + 1 + 2 * before.min(after)
+        let (before, begins) = self.reach(|n| left.checked_sub(n));
+        let (after, ends) = self.reach(|n| Some(right + n).filter(|x| *x < width));
+        // Where a picture begins with the white of a margin, the other side shows how wide the margin is. Other colours
+        // may be those of a wall.
+        let is_white = self.sum[left].iter().all(|sum| *sum >= 250 * self.rows);
+        let is_margin = begins && ends && before.abs_diff(after) <= 2 || is_white && (begins || ends);
+        if is_margin {
+            right - left + 1 + 2 * before.min(after)
+        } else {
+            0
+        }
     }
 
-    /// Returns how far the colour of column 0 reaches, where `column` counts from there to a side of the film.
-    fn reach(&self, column: impl Fn(usize) -> Option<usize>) -> usize {
-        let Some(from) = column(0) else { return 0 };
+    /// Returns how far the colour of column 0 reaches, where `column` counts from there to a side of the film, and
+    /// whether it ends at an edge.
+    fn reach(&self, column: impl Fn(usize) -> Option<usize>) -> (usize, bool) {
+        let Some(from) = column(0) else { return (0, false) };
         let clear = (1..)
             .take_while(|n| column(*n).is_some_and(|x| self.is_like(x, from)))
             .count();
         // The margin's last columns may be blurred. It ends where the mean colour changes most.
         let change = |n: usize| Some(self.apart(column(n)?, column(n + 1)?));
         let near = (clear..clear + Self::BLURRED).filter_map(|n| Some((n, change(n)?)));
-        near.max_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(clear, |(n, _)| n)
+        let edge = near.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        edge.map_or((clear, false), |(n, change)| (n, change >= Self::EDGE))
     }
 }
 
@@ -233,5 +244,14 @@ mod tests {
         };
         assert_eq!(margin(120, bars), 0);
         assert_eq!(margin(120, |_, _| [0; 3]), 0);
+        // A wall in the middle, and a thing at its left.
+        let wall = |y: usize, x: usize| {
+            if x < 55 && y < 9 {
+                [20; 3]
+            } else {
+                [(100 + x / 4) as u8; 3]
+            }
+        };
+        assert_eq!(margin(120, wall), 0);
     }
 }
