@@ -16,8 +16,8 @@ use phasefront_io::picture::{self, photo};
 use phasefront_io::{Error, Result, frame, output};
 use std::path::{Path, PathBuf};
 
-/// The groups of the flags for an RGB-D image, for flags that conflict with them.
-pub(crate) const IMAGE_FLAGS: [&str; 3] = ["FrameFlags", "SeenDepthFlags", "DepthFlags"];
+/// The flags for an RGB-D image, for flags that conflict with them. clap makes no group of a struct that holds others.
+pub(crate) const IMAGE_FLAGS: [&str; 6] = ["rgb", "depth", "photo", "fit", "SeenDepthFlags", "DepthFlags"];
 
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]

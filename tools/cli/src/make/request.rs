@@ -15,8 +15,19 @@ use phasefront_io::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-/// The groups of the flags for a method, for flags that conflict with them.
-pub(crate) const METHOD_FLAGS: [&str; 3] = ["HologramRequest", "EncoderFlags", "BackendFlags"];
+/// The flags for a method, for flags that conflict with them. clap makes no group of a struct that holds others.
+pub(crate) const METHOD_FLAGS: [&str; 10] = [
+    "ldi",
+    "method",
+    "network",
+    "precision",
+    "planes",
+    "taps",
+    "occlusion",
+    "scale",
+    "EncoderFlags",
+    "BackendFlags",
+];
 
 /// The flags for a hologram's image and method.
 #[derive(Default, Args)]
