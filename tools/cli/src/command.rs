@@ -3,9 +3,11 @@
 mod bench;
 mod calibrate;
 mod compare;
+mod completions;
 mod devices;
 mod doctor;
 mod encode;
+pub(crate) mod help;
 mod hologram;
 mod judge;
 mod link;
@@ -17,6 +19,7 @@ mod show;
 mod video;
 mod view;
 
+use crate::given::Flag;
 use clap::{Parser, Subcommand};
 use phasefront_command::start::Common;
 use phasefront_io::Result;
@@ -27,11 +30,14 @@ const FILES: &str = "\
 Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
 folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \
 or empty, and what `calibrate`, `video` and `hologram` with folders made is kept, unless --overwrite is \
-given. `video --resume` and `hologram --resume` complete what an earlier run began. All this is checked before any work.";
+given. `video --resume` and `hologram --resume` complete what an earlier run began. All this is checked before any work. \
+`-o -` writes to stdout where one file comes out, and the result goes to stderr.
+
+Exit codes: 0 where all is done, 1 where something failed or a check found a fault, 2 where the command line is wrong.";
 
 /// Make phase-only 3D holograms from RGB-D images, look at them, show them on a modulator, and calibrate it.
 #[derive(Parser)]
-#[command(name = "phasefront", version, max_term_width = 100, after_help = FILES)]
+#[command(name = "phasefront", version, max_term_width = 100, after_help = FILES, disable_help_flag = true)]
 pub(crate) struct Phasefront {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -53,6 +59,8 @@ pub(crate) enum Command {
     Multiplex(multiplex::MultiplexCommand),
     Devices(devices::Devices),
     Doctor(doctor::Doctor),
+    Completions(completions::Completions),
+    Man(completions::Man),
     Pack(pack::Pack),
     Unpack(pack::Unpack),
     Show(show::Show),
@@ -64,10 +72,10 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    pub(crate) fn run(self, common: &Common) -> Result<()> {
+    pub(crate) fn run(self, common: &Common, flags: &[Flag]) -> Result<()> {
         let json = common.json;
         match self {
-            Command::Hologram(command) => command.run(json),
+            Command::Hologram(command) => command.run(json, flags),
             Command::Encode(command) => command.run(json),
             Command::Refocus(command) => command.run(json),
             Command::View(command) => command.run(json),
@@ -75,10 +83,12 @@ impl Command {
             Command::Judge(command) => command.run(json),
             Command::Networks(command) => command.run(json),
             Command::Bench(command) => command.run(common.threads().map(NonZeroUsize::get), json),
-            Command::Video(command) => command.run(common.threads(), json),
+            Command::Video(command) => command.run(common.threads(), json, flags),
             Command::Multiplex(command) => command.run(json),
             Command::Devices(command) => command.run(json),
             Command::Doctor(command) => command.run(json),
+            Command::Completions(command) => command.run(),
+            Command::Man(command) => command.run(json),
             Command::Pack(command) => command.run(json),
             Command::Unpack(command) => command.run(json),
             Command::Show(command) => command.run(json),

@@ -9,7 +9,7 @@ mod layers;
 mod request;
 
 pub(crate) use judged::{Judged, judge};
-pub(crate) use request::{HologramRequest, Image, Method};
+pub(crate) use request::{HologramRequest, Image, METHOD_FLAGS, Method};
 
 use crate::flags::encoder::Encoder;
 use crate::flags::method::{CoreMethod, Parts};

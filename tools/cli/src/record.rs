@@ -1,6 +1,7 @@
 //! The record of a folder of holograms. It holds all flags that affect the folder's files and lies beside them, so that
 //! --resume does not mix the holograms of two requests.
 
+use crate::given::{Flag, Given};
 use clap::ValueEnum;
 use phasefront_io::fingerprint::Fingerprint;
 use phasefront_io::output::Holding;
@@ -32,6 +33,19 @@ impl RunRecord {
         record
     }
 
+    /// Adds the flags that decide what is made: those about depth, method and display, and those for experts.
+    pub(crate) fn add(&mut self, flags: &[Flag]) -> Result<()> {
+        const GROUPS: [&str; 4] = ["Depth", "Method", "Display", "Expert"];
+        for Flag { name, value, .. } in flags.iter().filter(|flag| GROUPS.contains(&&*flag.group)) {
+            match value {
+                Given::Switch(is_given) => self.switch(name, *is_given),
+                Given::Text(text) => self.set(name, text.as_ref()),
+                Given::File(file) => self.file(name, file.as_deref())?,
+            }
+        }
+        Ok(())
+    }
+
     pub(crate) fn set(&mut self, flag: &str, value: Option<impl Display>) {
         // Stored as text, because numbers may change in their last bit when they are written and read.
         let value = value.map(|value| value.to_string());
@@ -47,8 +61,10 @@ impl RunRecord {
         self.set(flag, name.as_ref().map(|name| name.get_name()));
     }
 
-    /// Records the display of --display and the files that define it.
+    /// Records the display and the files that define it, in the place of the flags for it.
     pub(crate) fn display(&mut self, name: Option<&str>, display: &phasefront::Display) -> Result<()> {
+        self.0
+            .retain(|flag, _| !["--offset-mm", "--size"].contains(&flag.as_str()));
         self.set("--display", name.filter(|name| display::display_path(name).is_none()));
         let values = serde_json::to_value(display).map_err(|e| Error::Input(e.to_string()))?;
         for (key, value) in values.as_object().into_iter().flatten() {
@@ -61,22 +77,14 @@ impl RunRecord {
         Ok(())
     }
 
-    /// Records a file: its name without folders, and its content.
-    pub(crate) fn file(&mut self, flag: &str, path: Option<&Path>) -> Result<()> {
-        let value = path.map(described).transpose()?;
+    /// Records a file, by its name without folders and its content, or a name that is no file's.
+    fn file(&mut self, flag: &str, path: Option<&Path>) -> Result<()> {
+        let value = match path {
+            Some(path) if path.is_file() => Some(described(path)?),
+            name => name.map(|name| name.display().to_string()),
+        };
         self.set(flag, value);
         Ok(())
-    }
-
-    /// Records a value that is a name or a file, as --network takes.
-    pub(crate) fn name_or_file(&mut self, flag: &str, name: Option<&str>) -> Result<()> {
-        match name.map(Path::new).filter(|path| path.is_file()) {
-            Some(path) => self.file(flag, Some(path)),
-            None => {
-                self.set(flag, name);
-                Ok(())
-            }
-        }
     }
 
     /// Returns the fingerprint that identifies holograms of this record.
@@ -98,9 +106,14 @@ impl RunRecord {
         let flags = self.0.keys().chain(earlier.0.keys());
         let differing = flags
             .into_iter()
-            .find(|flag| self.0.get(*flag) != earlier.0.get(*flag))?;
+            .find(|flag| given(self.0.get(*flag)) != given(earlier.0.get(*flag)))?;
         Some([earlier, self].map(|record| said(differing, record.0.get(differing))))
     }
+}
+
+/// Returns the value of a flag if it is given.
+fn given(value: Option<&Value>) -> Option<&Value> {
+    value.filter(|value| !matches!(value, Value::Null | Value::Bool(false)))
 }
 
 /// Formats a flag as on the command line.

@@ -10,7 +10,8 @@ use phasefront_io::{Error, Result};
 use std::sync::{Arc, LazyLock};
 
 /// The display that a hologram is for.
-#[derive(Clone, Args)]
+#[derive(Clone, Default, Args)]
+#[command(next_help_heading = "Display")]
 pub struct DisplayFlags {
     /// TOML file of the display, or the name of a modulator that `phasefront devices` lists [default: 1920×1080, 8 µm,
     /// 638/520/450 nm, 6 mm]
@@ -187,6 +188,7 @@ pub fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
 
 /// The flag that allows a command to replace existing output files.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Output")]
 pub struct OverwriteFlag {
     /// Replace files of an earlier run; without it, an output folder must be new or empty, and a calibration file must
     /// not exist

@@ -5,6 +5,7 @@
 //! no command line.
 
 pub mod flags;
+pub mod interrupt;
 pub mod networks;
 pub mod start;
 pub mod terminal;

@@ -1,7 +1,7 @@
 //! The start of a command: its threads, log, trace and exit code.
 
-use crate::trace;
-use clap::Args;
+use crate::{terminal, trace};
+use clap::{ArgAction, Args};
 use phasefront_core::method::network::Isa;
 use phasefront_core::runtime::error::Line;
 use phasefront_io::{Error, Result};
@@ -12,16 +12,26 @@ use std::process::ExitCode;
 
 /// The flags of every command.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "General")]
 pub struct Common {
-    /// Number of threads to compute with; all cores if not given.
+    /// Number of threads to compute with [default: all cores]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Print the result as JSON on stdout.
+    /// Print the result as JSON on stdout
     #[arg(long, global = true)]
     pub json: bool,
-    /// Write a trace of when each stage began and ended, for Perfetto (ui.perfetto.dev) or chrome://tracing.
-    #[arg(long, global = true, value_name = "FILE.json")]
+    /// Print errors only, and the result that --json asks for
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print what is decided on the way; -vv prints more
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+    /// Write a trace of when each stage began and ended, for Perfetto (ui.perfetto.dev) or chrome://tracing
+    #[arg(long, global = true, value_name = "FILE.json", hide_short_help = true)]
     trace: Option<PathBuf>,
+    /// Print help; -h prints the common flags alone
+    #[arg(short, long, global = true, action = ArgAction::Help)]
+    help: Option<bool>,
 }
 
 impl Common {
@@ -32,7 +42,8 @@ impl Common {
 
     /// Runs `command` with these flags on the calling thread, because systems open windows only on the main thread.
     pub fn run(&self, command: impl FnOnce() -> Result<()>) -> ExitCode {
-        log_to_stderr();
+        self.log_to_stderr();
+        terminal::set_quiet(self.quiet);
         match self.traced(command) {
             Ok(()) => ExitCode::SUCCESS,
             Err(e) => {
@@ -56,17 +67,30 @@ impl Common {
             Some(path) => trace::traced(path, command),
         }
     }
-}
 
-fn log_to_stderr() {
-    env_logger::Builder::new()
-        .filter_level(log::LevelFilter::Warn)
-        // winit warns when a modulator's desktop lacks a size in millimetres.
-        .filter_module("winit", log::LevelFilter::Error)
-        .parse_default_env()
-        .format(|out, record| {
+    /// Sends messages to stderr: warnings, or what `RUST_LOG` says, or what the flags say.
+    fn log_to_stderr(&self) {
+        let mut log = env_logger::Builder::new();
+        log.filter_level(log::LevelFilter::Warn)
+            // winit warns when a modulator's desktop lacks a size in millimetres.
+            .filter_module("winit", log::LevelFilter::Error)
+            .parse_default_env();
+        let asked = match (self.quiet, self.verbose) {
+            (true, _) => Some(log::LevelFilter::Error),
+            (_, 0) => None,
+            (_, 1) => Some(log::LevelFilter::Info),
+            _ => Some(log::LevelFilter::Debug),
+        };
+        if let Some(level) = asked {
+            log.filter_module("phasefront", level);
+            if self.quiet {
+                log.filter_level(level);
+            }
+        }
+        log.format(|out, record| {
             let level = record.level().as_str().to_lowercase();
             writeln!(out, "{level}: {}", Line(&record.args().to_string()))
         })
         .init();
+    }
 }

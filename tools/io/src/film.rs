@@ -1,9 +1,13 @@
 //! Reading and writing films (mp4 and every other format of ffmpeg) with the installed `ffmpeg`.
 
+mod light;
 pub mod sequence;
+pub mod survey;
 pub mod video;
 
 use crate::{Error, Result, output};
+use light::Light;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
@@ -36,50 +40,124 @@ pub fn is_film(path: &Path) -> bool {
 /// # Errors
 /// Returns an error if ffmpeg is not installed.
 pub fn check(path: &Path) -> Result<()> {
-    let found = Command::new("ffmpeg")
-        .arg("-version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status();
-    match found {
-        Ok(status) if status.success() => Ok(()),
+    version(path).map(|_| ())
+}
+
+/// Returns what ffmpeg says of its version.
+fn version(path: &Path) -> Result<String> {
+    let said = |program: &str| {
+        let output = Command::new(program).arg("-version").stdin(Stdio::null()).output();
+        output.ok().filter(|output| output.status.success())
+    };
+    match (said("ffmpeg"), said("ffprobe")) {
+        (Some(output), Some(_)) => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
         _ => Err(Error::file(
             path,
-            "films need ffmpeg, which is not installed; without it there are folders of pictures and raw frames on stdin",
+            "films need ffmpeg and its ffprobe, which are not installed; without them there are folders of pictures and raw frames on stdin",
         )),
     }
 }
 
-/// The frame rate and length of a film.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct About {
-    /// The frame rate in Hz.
-    pub rate_hz: f64,
-    /// The total number of frames, as far as ffprobe can tell.
-    pub frames: u64,
+/// Returns the options that keep every picture of a film once, whatever times it has.
+fn each_picture(version: &str) -> [&'static str; 2] {
+    // -fps_mode is as old as version 5.1. Later versions drop -vsync.
+    let number = version.split_whitespace().nth(2).unwrap_or_default();
+    let is_old = ["0.", "1.", "2.", "3.", "4.", "5.0"]
+        .iter()
+        .any(|old| number.starts_with(old));
+    [if is_old { "-vsync" } else { "-fps_mode" }, "passthrough"]
 }
 
-/// Asks `ffprobe` for the frame rate and length. Returns `None` if it cannot tell.
+/// What ffprobe says about a film.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct About {
+    /// The number of pictures in a second, in Hz: their mean where the rate varies.
+    pub rate_hz: f64,
+    /// The total number of pictures.
+    pub frames: u64,
+    /// The transfer function of its light.
+    light: Light,
+}
+
+/// Asks `ffprobe` about the film at `path`. Returns `None` if it cannot tell.
 pub fn about(path: &Path) -> Option<About> {
-    let output = Command::new("ffprobe")
-        .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
-        .args(["-show_entries", "stream=avg_frame_rate,nb_frames:format=duration"])
+    let mut ffprobe = Command::new("ffprobe")
+        .args(["-v", "error", "-select_streams", "v:0", "-of", "compact"])
+        .args([
+            "-show_entries",
+            "stream=avg_frame_rate,color_transfer:packet=pts_time,duration_time,flags",
+        ])
         .args(READS)
         .arg(url(path))
         .stdin(Stdio::null())
-        .output()
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
         .ok()?;
-    let said: serde_json::Value = serde_json::from_slice(&output.stdout).ok()?;
-    let number = |value: &serde_json::Value| value.as_str()?.parse::<f64>().ok();
-    let stream = &said["streams"][0];
-    let (over, under) = stream["avg_frame_rate"].as_str()?.split_once('/')?;
-    let rate_hz = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
-    let counted = number(&stream["nb_frames"]);
-    let frames = counted.or_else(|| Some(number(&said["format"]["duration"])? * rate_hz))?;
+    let mut times = Times::default();
+    let mut stream = None;
+    for line in BufReader::new(ffprobe.stdout.take()?)
+        .lines()
+        .map_while(std::result::Result::ok)
+    {
+        let mut parts = line.split('|');
+        let kind = parts.next();
+        let values: BTreeMap<&str, &str> = parts.filter_map(|part| part.split_once('=')).collect();
+        let number = |key: &str| values.get(key)?.parse::<f64>().ok();
+        match kind {
+            // Pictures before the beginning of an edit list are not shown.
+            Some("packet") if values.get("flags").is_none_or(|flags| !flags.contains('D')) => {
+                times.add(number("pts_time"), number("duration_time"));
+            }
+            Some("stream") => {
+                let (over, under) = values.get("avg_frame_rate")?.split_once('/')?;
+                let rate_hz = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
+                stream = Some((rate_hz, Light::of(values.get("color_transfer").copied())));
+            }
+            _ => {}
+        }
+    }
+    let _ = ffprobe.wait();
+    let (said, light) = stream?;
+    let counted = times.rate_hz();
+    // The container's rate is exact where pictures have a constant rate. Some containers state another one than their
+    // pictures have.
+    let is_said = said.is_finite() && counted.is_none_or(|counted| (counted / said - 1.0).abs() < 1e-3);
+    let rate_hz = if is_said { said } else { counted? };
     (rate_hz.is_finite() && rate_hz > 0.0).then_some(About {
         rate_hz,
-        frames: frames.round() as u64,
+        frames: times.pictures,
+        light,
     })
+}
+
+/// The times of a film's pictures in seconds.
+#[derive(Default)]
+struct Times {
+    pictures: u64,
+    first: Option<f64>,
+    /// The time of the last picture, and how long it is shown, if the film says so.
+    last: Option<(f64, Option<f64>)>,
+}
+
+impl Times {
+    fn add(&mut self, time: Option<f64>, duration: Option<f64>) {
+        self.pictures += 1;
+        let Some(time) = time else { return };
+        self.first = Some(self.first.map_or(time, |first| first.min(time)));
+        if self.last.is_none_or(|(last, _)| time >= last) {
+            self.last = Some((time, duration.filter(|duration| *duration > 0.0)));
+        }
+    }
+
+    /// Returns the number of pictures in a second.
+    fn rate_hz(&self) -> Option<f64> {
+        let (first, (last, duration)) = (self.first?, self.last?);
+        match duration {
+            Some(duration) => Some(self.pictures as f64 / (last + duration - first)),
+            None => Some((self.pictures - 1) as f64 / (last - first)),
+        }
+    }
 }
 
 /// The pixel format for decoding a film.
@@ -87,6 +165,8 @@ pub fn about(path: &Path) -> Option<About> {
 pub enum Pixels {
     /// RGB with one byte per channel.
     Rgb,
+    /// RGB with 16 bits per channel, big-endian.
+    DeepRgb,
     /// Grey with 16 bits, big-endian.
     Grey,
 }
@@ -99,6 +179,8 @@ pub struct Film {
     /// The thread that drains ffmpeg's stderr, because a full pipe would block ffmpeg. It returns the end of the
     /// output.
     said: Option<JoinHandle<String>>,
+    /// Whether the film is opened once more, and what ffmpeg says of damage is told then.
+    is_survey: bool,
 }
 
 /// One decoded picture.
@@ -111,36 +193,50 @@ pub struct Picture {
 }
 
 impl Film {
-    /// Opens a film.
+    /// Opens a film. Its pictures come in order, each once, whatever its frame rate. Colour of HDR films, HLG and PQ, is
+    /// mapped to that of their SDR twins.
     ///
     /// # Errors
-    /// Returns an error if ffmpeg is not installed or the file does not exist.
-    pub fn open(path: &Path, pixels: Pixels) -> Result<Self> {
-        check(path)?;
+    /// Returns an error if ffmpeg is not installed, or lacks what an HDR film needs, or the file does not exist.
+    pub fn open(path: &Path, pixels: Pixels, about: Option<&About>) -> Result<Self> {
+        let light = about.map_or(Light::Sdr, |about| about.light);
+        let filter = match pixels {
+            Pixels::Rgb => light.to_sdr(path)?,
+            _ => None,
+        };
+        Self::start(path, pixels, filter.as_deref(), &[], &[])
+    }
+
+    /// Opens a film for a look at up to `most` of its pictures: those that decode alone.
+    fn survey(path: &Path, pixels: Pixels, filter: Option<&str>, most: u32) -> Result<Self> {
+        let most = most.to_string();
+        let mut film = Self::start(path, pixels, filter, &["-skip_frame", "nokey"], &["-frames:v", &most])?;
+        film.is_survey = true;
+        Ok(film)
+    }
+
+    fn start(path: &Path, pixels: Pixels, filter: Option<&str>, before: &[&str], after: &[&str]) -> Result<Self> {
+        let version = version(path)?;
         if !path.is_file() {
             return Err(Error::file(path, "there is no such file"));
         }
         output::reading(path)?;
         let (format, codec) = match pixels {
             Pixels::Rgb => ("rgb24", "ppm"),
+            Pixels::DeepRgb => ("rgb48be", "ppm"),
             Pixels::Grey => ("gray16be", "pgm"),
         };
         let mut ffmpeg = Command::new("ffmpeg")
             .args(["-v", "error", "-nostdin"])
             .args(READS)
+            .args(before)
             .arg("-i")
             .arg(url(path))
-            .args([
-                "-map",
-                "0:v:0",
-                "-f",
-                "image2pipe",
-                "-pix_fmt",
-                format,
-                "-c:v",
-                codec,
-                "-",
-            ])
+            .args(["-map", "0:v:0"])
+            .args(filter.iter().flat_map(|filter| ["-vf", *filter]))
+            .args(each_picture(&version))
+            .args(after)
+            .args(["-f", "image2pipe", "-pix_fmt", format, "-c:v", codec, "-"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -153,6 +249,7 @@ impl Film {
             ffmpeg,
             pictures,
             said: Some(std::thread::spawn(move || last_said(errors))),
+            is_survey: false,
         })
     }
 
@@ -191,6 +288,7 @@ impl Film {
             .and_then(|(w, h)| Some((h.parse().ok()?, w.parse().ok()?)));
         let pixel = match (kind, most) {
             ("P6", "255") => 3,
+            ("P6", "65535") => 6,
             ("P5", "65535") => 2,
             _ => 0,
         };
@@ -209,7 +307,7 @@ impl Film {
         let Some(said) = said else { return Ok(()) };
         match self.ffmpeg.wait() {
             Ok(status) if status.success() => {
-                if let Some(line) = last_line(&said) {
+                if let Some(line) = last_line(&said).filter(|_| !self.is_survey) {
                     log::warn!("{}: may be damaged: ffmpeg says: {line}", self.path.display());
                 }
                 Ok(())
@@ -319,4 +417,39 @@ fn why(said: &str) -> &str {
 
 fn last_line(text: &str) -> Option<&str> {
     text.lines().map(str::trim).rfind(|line| !line.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_version_of_ffmpeg_keeps_each_picture() {
+        for (version, option) in [
+            (
+                "ffmpeg version 4.4.2-0ubuntu0.22.04.1 Copyright (c) 2000-2021",
+                "-vsync",
+            ),
+            ("ffmpeg version 5.0 Copyright", "-vsync"),
+            ("ffmpeg version 5.1.9-0+deb12u1 Copyright (c) 2000-2026", "-fps_mode"),
+            ("ffmpeg version n8.0 Copyright", "-fps_mode"),
+            ("ffmpeg version N-112345-g0123456789 Copyright", "-fps_mode"),
+        ] {
+            assert_eq!(each_picture(version), [option, "passthrough"], "{version}");
+        }
+    }
+
+    #[test]
+    fn the_rate_of_varying_times_is_their_mean() {
+        let rate = |times: &[(f64, Option<f64>)]| {
+            let mut all = Times::default();
+            times
+                .iter()
+                .for_each(|(time, duration)| all.add(Some(*time), *duration));
+            all.rate_hz()
+        };
+        assert_eq!(rate(&[(0.0, Some(0.1)), (0.5, Some(0.1)), (0.1, Some(0.4))]), Some(5.0));
+        assert_eq!(rate(&[(2.0, None), (2.25, None), (3.0, None)]), Some(2.0));
+        assert_eq!(rate(&[]), None);
+    }
 }

@@ -7,19 +7,18 @@ use crate::input::decode::{self, Reading};
 use crate::picture;
 use crate::picture::depth_map::{self, DepthFile};
 use crate::{Error, Result};
+use image::DynamicImage;
 use image::metadata::Orientation;
 use ndarray::{Array2, Array3, ArrayView2};
 use phasefront::RgbdFrame;
 use phasefront_core::depth;
 use phasefront_core::depth::DepthUnit;
 use phasefront_core::depth::condition::Conditioner;
+use std::fmt::Display;
 use std::path::Path;
 
 /// The largest relative difference between the aspect ratios of colour and depth.
 const ASPECT_TOLERANCE: f64 = 0.01;
-
-/// The fraction of depth clipped by --near and --far above which a warning is printed.
-pub const DOUBTFULLY_CLIPPED: f64 = 0.9;
 
 /// How the values of a depth file are interpreted.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +29,8 @@ pub struct DepthOptions {
     pub near_m: Option<f32>,
     /// The distance in metres that maps to d = 1. Defaults to the 99th percentile.
     pub far_m: Option<f32>,
+    /// Whether near and far are swapped.
+    pub inverted: bool,
 }
 
 /// Colour and depth as files have them.
@@ -64,38 +65,49 @@ impl std::fmt::Display for ShownDepth {
     }
 }
 
+/// A colour picture, and the readings of the same field of view, as files hold them.
+pub(crate) struct Stored {
+    pub(crate) image: DynamicImage,
+    /// The readings in the file's unit, (h, w).
+    pub(crate) readings: Array2<f32>,
+}
+
+/// Reads the files of a still or of a frame of a video. `told` takes what is doubtful about them.
+///
+/// # Errors
+/// Returns an error if a file cannot be read or if the files do not match.
+pub(crate) fn stored(
+    rgb_path: &Path,
+    depth_path: &Path,
+    options: DepthOptions,
+    told: &mut dyn FnMut(Doubt),
+) -> Result<Stored> {
+    let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
+    let (height, width) = (image.height() as usize, image.width() as usize);
+    let normalized = options.unit == DepthUnit::Normalized;
+    let file = depth_map::read(depth_path, normalized)?;
+    if is_turned_alone(depth_path, &file, orientation, (height, width))? {
+        told(Doubt::Turned(orientation));
+    }
+    let readings = file.depth;
+    if normalized {
+        check_normalized(&readings).map_err(|why| Error::file(depth_path, why))?;
+        if let Some(doubt) = Doubt::of_normalized(readings.iter().copied(), options.inverted) {
+            told(doubt);
+        }
+    }
+    check_aspect(readings.dim(), (height, width)).map_err(|why| Error::file(depth_path, why))?;
+    Ok(Stored { image, readings })
+}
+
 /// Reads colour, and depth of the same aspect ratio.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or if the files do not match.
 pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result<Captured> {
-    let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
+    let warn = |doubt: Doubt| log::warn!("{}: {doubt}", depth_path.display());
+    let Stored { image, readings } = stored(rgb_path, depth_path, options, &mut { warn })?;
     let rgb = picture::amplitudes(image);
-    let normalized = options.unit == DepthUnit::Normalized;
-    let file = depth_map::read(depth_path, normalized)?;
-    let (_, height, width) = rgb.dim();
-    if is_turned_alone(depth_path, &file, orientation, (height, width))? {
-        log::warn!(
-            "{}: is taken as it is, upright; the colour's Exif data turn the colour: {orientation:?}",
-            depth_path.display()
-        );
-    }
-    let readings = file.depth;
-    if normalized {
-        check_normalized(&readings).map_err(|why| Error::file(depth_path, why))?;
-        if let Some(doubt) = doubt(&readings) {
-            log::warn!("{}: {doubt}", depth_path.display());
-        }
-    }
-    let (depth_height, depth_width) = readings.dim();
-    if !has_aspect((depth_height, depth_width), (height, width)) {
-        return Err(Error::file(
-            depth_path,
-            format!(
-                "depth is {depth_width}×{depth_height}, colour {width}×{height}: their aspect ratios differ; they must show the same field of view"
-            ),
-        ));
-    }
     let normalized = depth::normalize(readings.view(), options.unit, options.near_m, options.far_m)
         .map_err(|e| Error::file(depth_path, e))?;
     let shown = normalized.range_m.map(|(near_m, far_m)| ShownDepth {
@@ -105,14 +117,8 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     });
     if let Some(shown) = shown {
         let clipped = normalized.clipped as f64 / readings.len() as f64;
-        if clipped > DOUBTFULLY_CLIPPED {
-            log::warn!(
-                "{}: {:.0} % of the depth lies before near {} m or beyond far {} m and is shown there; both are metres",
-                depth_path.display(),
-                100.0 * clipped,
-                shown.near_m,
-                shown.far_m
-            );
+        if let Some(doubt) = Doubt::of_clipped(clipped, shown.near_m, shown.far_m) {
+            warn(doubt);
         }
         let is_chosen = options.near_m.is_some() && options.far_m.is_some();
         if let Some(crowd) = crowd(&normalized.depth, shown).filter(|_| !is_chosen) {
@@ -179,6 +185,20 @@ fn crowd(depth: &Array2<f32>, shown: ShownDepth) -> Option<String> {
     ))
 }
 
+/// Checks that colour and depth, (H, W), have the same aspect ratio.
+///
+/// # Errors
+/// Returns the two sizes if they do not.
+pub fn check_aspect(depth: (usize, usize), colour: (usize, usize)) -> std::result::Result<(), String> {
+    if has_aspect(depth, colour) {
+        return Ok(());
+    }
+    let ((depth_height, depth_width), (height, width)) = (depth, colour);
+    Err(format!(
+        "depth is {depth_width}×{depth_height}, colour {width}×{height}: their aspect ratios differ; they must show the same field of view"
+    ))
+}
+
 /// Checks whether two shapes, (H, W), have the same aspect ratio.
 fn has_aspect((h, w): (usize, usize), (height, width): (usize, usize)) -> bool {
     let cross = |a: usize, b: usize| a as f64 * b as f64;
@@ -214,26 +234,78 @@ pub(crate) fn is_turned_alone(
     Ok(fits)
 }
 
-/// Returns the reason to doubt that `depth` is normalized, if there is one.
-fn doubt(depth: &Array2<f32>) -> Option<String> {
-    /// Normalized depth that uses its range exceeds this value.
-    const LITTLE: f32 = 0.25;
-    /// The fraction of zeros that is unlikely for a near surface.
-    const MANY: f32 = 0.1;
-    let most = depth.iter().copied().fold(0.0, f32::max);
-    let zeros = depth.iter().filter(|d| **d == 0.0).count() as f32 / depth.len().max(1) as f32;
-    if (0.0..LITTLE).contains(&most) && most > 0.0 {
-        return Some(format!(
-            "as normalized depth it uses {:.1} % of its range; if its numbers are millimetres, metres or a sensor's, say so by --depth-unit",
-            100.0 * most
-        ));
+/// What is doubtful about a frame's depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// The colour's Exif data turned the colour alone, though both shapes match.
+    Turned(Orientation),
+    /// Normalized depth reaches only this value.
+    Little(f32),
+    /// This share of normalized depth is 0.
+    Zeros(f32),
+    /// Near and far clip a share of the depth.
+    Clipped {
+        /// The share.
+        share: f64,
+        /// Near in metres.
+        near_m: f32,
+        /// Far in metres.
+        far_m: f32,
+    },
+}
+
+impl Doubt {
+    /// Returns the reason to doubt that `depth` is normalized, if there is one. `inverted` tells that 0 is the farthest.
+    pub fn of_normalized(depth: impl Iterator<Item = f32>, inverted: bool) -> Option<Self> {
+        /// Normalized depth that uses its range exceeds this value.
+        const LITTLE: f32 = 0.25;
+        /// The share of zeros that is unlikely for a near surface.
+        const MANY: f32 = 0.1;
+        let (mut most, mut zeros, mut all) = (0.0f32, 0usize, 0usize);
+        for d in depth {
+            most = most.max(d);
+            zeros += usize::from(d == 0.0);
+            all += 1;
+        }
+        let zeros = zeros as f32 / all.max(1) as f32;
+        match (0.0..LITTLE).contains(&most) && most > 0.0 {
+            true => Some(Doubt::Little(most)),
+            false => (zeros > MANY && !inverted).then_some(Doubt::Zeros(zeros)),
+        }
     }
-    (zeros > MANY).then(|| {
-        format!(
-            "{:.0} % of it is 0, which as normalized depth is the nearest; if that means no reading, --depth-unit says what its numbers are",
-            100.0 * zeros
-        )
-    })
+
+    /// Returns the reason to doubt near and far that clip `share` of the depth, if there is one.
+    pub fn of_clipped(share: f64, near_m: f32, far_m: f32) -> Option<Self> {
+        /// The share above which near and far are doubtful.
+        const DOUBTFUL: f64 = 0.9;
+        (share > DOUBTFUL).then_some(Doubt::Clipped { share, near_m, far_m })
+    }
+}
+
+impl Display for Doubt {
+    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Doubt::Turned(how) => write!(
+                to,
+                "is taken as it is, upright; the colour's Exif data turn the colour: {how:?}"
+            ),
+            Doubt::Little(most) => write!(
+                to,
+                "as normalized depth it uses {:.1} % of its range; if its numbers are millimetres, metres or a sensor's, say so by --depth-unit",
+                100.0 * most
+            ),
+            Doubt::Zeros(share) => write!(
+                to,
+                "{:.0} % of it is 0, which as normalized depth is the nearest; if that means no reading, --depth-unit says what its numbers are",
+                100.0 * share
+            ),
+            Doubt::Clipped { share, near_m, far_m } => write!(
+                to,
+                "{:.0} % of the depth lies before near {near_m} m or beyond far {far_m} m and is shown there; both are metres",
+                100.0 * share
+            ),
+        }
+    }
 }
 
 /// Normalizes depth, (h, w), of any scale on which farther is larger, to the range from `near` to `far`. The defaults
@@ -278,11 +350,14 @@ mod tests {
 
     #[test]
     fn depth_that_is_hardly_normalized_is_doubted() {
-        let plane = |value: &dyn Fn(usize) -> f32| Array2::from_shape_fn((10, 10), |(y, x)| value(10 * y + x));
-        assert_eq!(doubt(&plane(&|i| i as f32 / 99.0)), None);
+        let doubt = |value: &dyn Fn(usize) -> f32, inverted| Doubt::of_normalized((0..100).map(value), inverted);
+        assert_eq!(doubt(&|i| i as f32 / 99.0, false), None);
         // Depths of an indoor scene in millimetres, stored in 16 bits.
-        assert!(doubt(&plane(&|i| (800.0 + 40.0 * i as f32) / 65535.0)).is_some_and(|d| d.contains("7.3 %")));
-        assert!(doubt(&plane(&|i| if i % 5 == 0 { 0.0 } else { 0.9 })).is_some_and(|d| d.contains("20 % of it is 0")));
+        let indoor = doubt(&|i| (800.0 + 40.0 * i as f32) / 65535.0, false);
+        assert!(indoor.is_some_and(|d| d.to_string().contains("7.3 %")));
+        let zeros = |i| if i % 5 == 0 { 0.0 } else { 0.9 };
+        assert_eq!(doubt(&zeros, false), Some(Doubt::Zeros(0.2)));
+        assert_eq!(doubt(&zeros, true), None, "0 is the farthest");
     }
 
     #[test]

@@ -8,9 +8,10 @@
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, Metadata};
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, IsTerminal, Write, stdout};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
@@ -32,25 +33,54 @@ impl Holding<'_> {
     }
 }
 
-/// Declares `path` as an output of this command: an absent or regular file in a writable folder. Its extension must be
-/// one of `extensions`, unless that list is empty.
+/// Declares `path` as an output of this command: an absent or regular file in a writable folder, or `-` for stdout. A
+/// file's extension must be one of `extensions`, unless that list is empty.
 ///
 /// # Errors
 /// Returns an error if the name has another extension, if the path is a folder, a device, a pipe, a dangling link, an
 /// input or another output, or if its folder does not exist or is not writable.
 pub fn file(path: &Path, extensions: &[&str]) -> Result<()> {
+    if is_stdout(path) {
+        return take_stdout(path);
+    }
     extension(path, extensions)?;
     let place = Place::of_file(path)?;
     place.check_writable()?;
     places().add_output(place)
 }
 
-/// Checks that `path` has one of the extensions in `extensions`, unless that list is empty.
+/// Whether an output file takes stdout.
+static STDOUT: AtomicBool = AtomicBool::new(false);
+
+/// Checks whether `path` stands for stdout.
+pub fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Checks whether an output file takes stdout.
+pub fn takes_stdout() -> bool {
+    STDOUT.load(Ordering::Relaxed)
+}
+
+fn take_stdout(path: &Path) -> Result<()> {
+    if stdout().is_terminal() {
+        return Err(Error::file(
+            path,
+            "would write a file into the terminal; redirect stdout, or give a name",
+        ));
+    }
+    match STDOUT.swap(true, Ordering::Relaxed) {
+        true => Err(Error::file(path, "is an output already; stdout takes one file")),
+        false => Ok(()),
+    }
+}
+
+/// Checks that `path` has one of the extensions in `extensions`, unless that list is empty or the path is stdout.
 ///
 /// # Errors
 /// Returns an error if the extension is another.
 pub fn extension(path: &Path, extensions: &[&str]) -> Result<()> {
-    if extensions.is_empty() || extensions.iter().any(|extension| has_extension(path, extension)) {
+    if is_stdout(path) || extensions.is_empty() || extensions.iter().any(|extension| has_extension(path, extension)) {
         return Ok(());
     }
     let right = alternatives(extensions);
@@ -84,6 +114,12 @@ pub fn new_file(path: &Path, extensions: &[&str], overwrite: bool) -> Result<()>
 /// Returns an error if the path is a file or an input, if the folder holds more than `holding` allows, or if its parent
 /// is a file or not writable.
 pub fn folder(path: &Path, holding: Holding) -> Result<()> {
+    if is_stdout(path) {
+        return Err(Error::file(
+            path,
+            "is stdout, which takes one file; the name of a folder is needed",
+        ));
+    }
     if path.exists() && !path.is_dir() {
         return Err(Error::file(path, "is a file; the name of a folder is needed"));
     }
@@ -160,11 +196,38 @@ pub(crate) fn write_by_name(path: &Path, write: impl FnOnce(&Path) -> Result<()>
     pending.synced()?.place()
 }
 
+/// The temporary files that this process is writing.
+static WRITING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn writing() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files that this process is writing. While the result is held, none is created or put in place.
+/// A process calls this before it ends in the middle of its work.
+pub fn give_up() -> impl Sized {
+    let writing = writing();
+    for path in writing.iter() {
+        let _ = std::fs::remove_file(path);
+    }
+    writing
+}
+
+/// An entry of [`WRITING`].
+struct Written(PathBuf);
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        writing().remove(&self.0);
+    }
+}
+
 /// A temporary file that is not in its place yet. Dropping it deletes it.
 pub(crate) struct Pending {
     path: PathBuf,
     real: PathBuf,
     file: NamedTempFile,
+    written: Written,
 }
 
 impl Pending {
@@ -184,16 +247,25 @@ impl Pending {
 
     /// Creates an empty temporary file.
     fn begin(path: &Path) -> Result<Self> {
-        let real = Place::of_file(path)?.real;
+        let real = if is_stdout(path) {
+            std::env::temp_dir().join("stdout")
+        } else {
+            Place::of_file(path)?.real
+        };
         let parent = real.parent().unwrap_or(Path::new("."));
         remove_left_over(parent);
+        let mut all = writing();
         let file = temporary_in(parent).map_err(|e| cannot_write(path, &e))?;
+        all.insert(file.path().to_owned());
+        drop(all);
+        let written = Written(file.path().to_owned());
         // The lock tells other runs that the file is in use. Writing also works on file systems without locks.
         let _ = file.as_file().try_lock();
         Ok(Self {
             path: path.to_owned(),
             real,
             file,
+            written,
         })
     }
 
@@ -203,13 +275,25 @@ impl Pending {
         synced.map_err(|e| cannot_write(&self.path, &e)).map(|()| self)
     }
 
-    /// Renames the file to its final path. A file that is replaced passes on its permissions.
+    /// Renames the file to its final path, or copies it to stdout. A file that is replaced passes on its permissions.
     pub(crate) fn place(self) -> Result<()> {
-        let Self { path, real, file } = self;
+        let Self {
+            path,
+            real,
+            file,
+            written: _written,
+        } = self;
+        if is_stdout(&path) {
+            let mut file = File::open(file.path()).map_err(|e| cannot_write(&path, &e))?;
+            let mut out = stdout().lock();
+            let copied = std::io::copy(&mut file, &mut out).and_then(|_| out.flush());
+            return copied.map_err(|e| cannot_write(&path, &e));
+        }
         if let Ok(before) = std::fs::metadata(&real) {
             // Some file systems, such as FAT, have no permissions.
             let _ = file.as_file().set_permissions(before.permissions());
         }
+        let _all = writing();
         file.persist(real).map_err(|e| cannot_write(&path, &e.error))?;
         Ok(())
     }

@@ -29,6 +29,7 @@ fn main() -> Result<()> {
         unit: DepthUnit::Normalized,
         near_m: None,
         far_m: None,
+        inverted: false,
     };
     let Captured { rgb, depth, .. } = frame::read(Path::new(rgb), Path::new(depth), options)?;
     let frame = RgbdFrame::new(rgb, depth)?;

@@ -21,7 +21,7 @@ or empty unless --overwrite is given. `dataset`, `seeds` and `stacks` complete w
 
 /// Ground truth for phase-only holograms: scenes, data sets, evaluation and studies.
 #[derive(Parser)]
-#[command(name = "phasefront-lab", version, max_term_width = 100, after_help = FILES)]
+#[command(name = "phasefront-lab", version, max_term_width = 100, after_help = FILES, disable_help_flag = true)]
 pub(crate) struct Lab {
     #[command(subcommand)]
     pub(crate) command: Command,

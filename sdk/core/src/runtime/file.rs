@@ -59,12 +59,29 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads the text of a regular file of at most [`MOST_TEXT`] bytes.
+/// Reads the text of a regular file of at most [`MOST_TEXT`] bytes: UTF-8, or UTF-16 with a byte-order mark. The mark is
+/// left out.
 ///
 /// # Errors
-/// Returns an error if [`open`] does, if the file grows too large during the read, or if the bytes are not UTF-8.
+/// Returns an error if [`open`] does, if the file grows too large during the read, or if the bytes are not text.
 pub fn read_text(path: &Path) -> Result<String> {
-    String::from_utf8(read(path, MOST_TEXT)?).map_err(|_| Error::new(ErrorKind::InvalidData, "it is not text in UTF-8"))
+    text(read(path, MOST_TEXT)?).ok_or_else(|| Error::new(ErrorKind::InvalidData, "it is not text in UTF-8"))
+}
+
+/// Decodes text. Programs on Windows begin it with a byte-order mark.
+fn text(bytes: Vec<u8>) -> Option<String> {
+    let wide = |of: fn([u8; 2]) -> u16| {
+        let (words, []) = bytes[2..].as_chunks::<2>() else {
+            return None;
+        };
+        String::from_utf16(&words.iter().map(|word| of(*word)).collect::<Vec<_>>()).ok()
+    };
+    match &bytes[..] {
+        [0xef, 0xbb, 0xbf, text @ ..] => String::from_utf8(text.to_vec()).ok(),
+        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        _ => String::from_utf8(bytes).ok(),
+    }
 }
 
 #[cfg(test)]
@@ -85,6 +102,16 @@ mod tests {
         assert_eq!(read_text(&path).unwrap(), "four");
         let why = read(&path, 3).unwrap_err().to_string();
         assert_eq!(why, "it has 4 bytes; 3 are the most");
+        for marked in [
+            &b"\xef\xbb\xbfh\xc3\xa9"[..],
+            b"\xff\xfeh\0\xe9\0",
+            b"\xfe\xff\0h\0\xe9",
+        ] {
+            std::fs::write(&path, marked).unwrap();
+            assert_eq!(read_text(&path).unwrap(), "hé");
+        }
+        std::fs::write(&path, b"\xff\xfeh").unwrap();
+        assert!(read_text(&path).is_err());
         std::fs::write(&path, b"\xff").unwrap();
         assert!(read_text(&path).unwrap_err().to_string().contains("UTF-8"));
         std::fs::remove_file(&path).unwrap();

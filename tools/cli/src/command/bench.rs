@@ -26,13 +26,13 @@ use std::time::Duration;
 pub(crate) struct Bench {
     /// Layers of the network; 0 for the plane sweep. If no network with this number is bundled, one with random f32
     /// weights
-    #[arg(long, value_name = "L")]
+    #[arg(long, value_name = "L", help_heading = "Method")]
     layers: Option<usize>,
     /// Number type of the network
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Expert")]
     precision: Option<PrecisionName>,
     /// An ONNX file instead of the bundled networks
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["layers", "precision"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["layers", "precision"], help_heading = "Method")]
     network: Option<String>,
     /// Width and height [default: 384x384, 960x540 and 1920x1080]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
@@ -43,16 +43,16 @@ pub(crate) struct Bench {
     #[command(flatten)]
     encoder: EncoderFlags,
     /// Write a chart of the stages' times
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendFlags,
     /// Number of layers that a GPU dispatch computes [default: both variants]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Expert")]
     fusion: Option<FusionName>,
     /// Largest instruction set to use, to measure a smaller one than the processor has: portable, avx2, avx512, vnni,
     /// amx, neon, dotprod, i8mm
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Expert")]
     kernels: Option<String>,
     #[command(flatten)]
     display: DisplayFlags,

@@ -34,15 +34,15 @@ pub(crate) struct Encode {
     #[command(flatten)]
     encoder: EncoderFlags,
     /// Amplitude that full light stands for [default: the largest of the field]
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", help_heading = "Expert")]
     scale: Option<f32>,
     #[command(flatten)]
     outputs: OutputFlags,
     /// Also write the phases of the modulator, float32 in radians, (C, H, W), before they become levels
-    #[arg(long, value_name = "FILE.npy")]
+    #[arg(long, value_name = "FILE.npy", help_heading = "Output")]
     phases: Option<PathBuf>,
     /// Output: a PNG of modulator levels
-    #[arg(short, value_name = "OUT.png")]
+    #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
 }
 

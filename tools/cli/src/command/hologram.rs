@@ -4,8 +4,9 @@ mod stills;
 
 use crate::flags::frame::Picture;
 use crate::flags::outputs::OutputFlags;
+use crate::given::Flag;
 use crate::make::HologramRequest;
-use crate::record::Before;
+use crate::record::{Before, RunRecord};
 use clap::Args;
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::{Error, Result, output};
@@ -27,7 +28,7 @@ pub(crate) struct Hologram {
     #[command(flatten)]
     outputs: OutputFlags,
     /// Output: a PNG of modulator levels; for folders of pictures, a folder that gets NAME.png for each picture NAME
-    #[arg(short, value_name = "OUT.png|DIR")]
+    #[arg(short, long, value_name = "OUT.png|DIR")]
     output: PathBuf,
     /// For folders of pictures: keep the holograms of an earlier run with the same flags
     #[arg(long, conflicts_with = "overwrite")]
@@ -38,7 +39,7 @@ pub(crate) struct Hologram {
 }
 
 impl Hologram {
-    pub(crate) fn run(mut self, json: bool) -> Result<()> {
+    pub(crate) fn run(mut self, json: bool, flags: &[Flag]) -> Result<()> {
         if let Some(picture) = &self.picture {
             return Err(Error::file(
                 picture,
@@ -46,7 +47,7 @@ impl Hologram {
             ));
         }
         if let Some(pictures) = self.request.pictures()? {
-            return self.stills(json, pictures);
+            return self.stills(json, pictures, flags);
         }
         if self.resume || self.overwrite {
             return Err(Error::Input(
@@ -63,13 +64,15 @@ impl Hologram {
         self.outputs.finish(&self.output, &display, &made, shown, json)
     }
 
-    fn stills(self, json: bool, pictures: Vec<Picture>) -> Result<()> {
+    fn stills(self, json: bool, pictures: Vec<Picture>, flags: &[Flag]) -> Result<()> {
         if let Some(flag) = self.outputs.given() {
             return Err(Error::Input(format!(
                 "{flag} goes with one picture, not with a folder of them"
             )));
         }
         let before = Before::of_flags(self.resume, self.overwrite);
-        stills::run(self.request, pictures, &self.output, before, json)
+        let mut record = RunRecord::new("hologram");
+        record.add(flags)?;
+        stills::run(self.request, pictures, &self.output, before, record, json)
     }
 }

@@ -1,7 +1,7 @@
 //! `phasefront judge`: compares methods and encoders on an image and a display.
 
 use crate::flags::encoder::EncoderFlags;
-use crate::flags::frame::{FrameFlags, shown_json, shown_text};
+use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, shown_json, shown_text};
 use crate::flags::method::CoreMethod;
 use crate::make::{HologramRequest, HologramResult, Image, Method, infos};
 use clap::Args;
@@ -34,24 +34,24 @@ pub(crate) struct Judge {
     #[command(flatten)]
     frame: FrameFlags,
     /// Folder of a layered depth image
-    #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
+    #[arg(long, value_name = "DIR", conflicts_with_all = IMAGE_FLAGS, help_heading = "Input")]
     ldi: Option<PathBuf>,
     /// Methods [default: sweep, and network if one was trained for the display]
-    #[arg(long, value_enum, value_delimiter = ',')]
+    #[arg(long, value_enum, value_delimiter = ',', help_heading = "Method")]
     method: Vec<CoreMethod>,
     /// Encoders, each as published, with the default correction, and with the correction for stills
-    #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"])]
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"], help_heading = "Method")]
     encoder: Vec<EncoderName>,
     /// Number of planes of the exact wave
-    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..), help_heading = "Expert")]
     planes: u16,
     /// Width of a border that does not count, in pixels; at an offset, light enters an image from outside
-    #[arg(long, value_name = "PX", default_value_t = 0)]
+    #[arg(long, value_name = "PX", default_value_t = 0, help_heading = "Expert")]
     margin: usize,
     #[command(flatten)]
     display: DisplayFlags,
     /// Page that shows all results
-    #[arg(short, value_name = "OUT.html")]
+    #[arg(short, long, value_name = "OUT.html")]
     output: Option<PathBuf>,
 }
 
@@ -107,7 +107,7 @@ impl Judge {
             None => truth::filled(&frame, display)?,
         };
         let image = Image::Rgbd(frame);
-        let mut request = HologramRequest::of(self.display.clone());
+        let mut request = HologramRequest::new(self.display.clone());
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean, &mut request)?;
         let z_m = truth::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;

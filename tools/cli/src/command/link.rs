@@ -23,11 +23,13 @@ pub(crate) struct Pattern {
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1920x1080")]
     size: (usize, usize),
     /// Output pattern
-    #[arg(short, value_name = "OUT.png")]
+    #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
 }
 
 /// Read a capture of the pattern, saved by a frame grabber in the modulator's place or as a screenshot
+///
+/// Exits with 1 if the link changes pixels.
 #[derive(Args)]
 pub(crate) struct Read {
     /// The captured image, PNG or BMP
@@ -83,6 +85,16 @@ impl Read {
             reading.faults.join("\n")
         };
         terminal::print(json, &json!(reading), text);
-        Ok(())
+        match reading.faults.len() {
+            0 => Ok(()),
+            1 => Err(Error::file(
+                &self.capture,
+                "the link does not pass pixels as they are: a fault",
+            )),
+            n => Err(Error::file(
+                &self.capture,
+                format!("the link does not pass pixels as they are: {n} faults"),
+            )),
+        }
     }
 }

@@ -23,35 +23,35 @@ pub(crate) struct MultiplexCommand {
     #[command(flatten)]
     frame: FrameFlags,
     /// Method for the wave [default: auto; network with --network or --encoder deep]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Method")]
     method: Option<CoreMethod>,
     /// A bundled network, or an ONNX file [default: 8]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Method")]
     network: Option<String>,
     /// Number type of a bundled network [default: int8]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Expert")]
     precision: Option<PrecisionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
     #[command(flatten)]
     display: DisplayFlags,
     /// Number of maps
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Method")]
     maps: u16,
     /// Do not let each map compensate for the error in the mean of the maps before it
-    #[arg(long)]
+    #[arg(long, help_heading = "Expert")]
     no_feedback: bool,
     /// Also write the maps' planes as one frame of a modulator of bit planes
-    #[arg(long, value_name = "FRAME.png")]
+    #[arg(long, value_name = "FRAME.png", help_heading = "Output")]
     packed: Option<PathBuf>,
     /// The one colour of --packed; without it, a frame holds the maps of all three colours, red first
-    #[arg(long, value_parser = packed::COLOURS, requires = "packed")]
+    #[arg(long, value_parser = packed::COLOURS, requires = "packed", help_heading = "Output")]
     colour: Option<String>,
     /// Compare the mean of the first 1, 2, 4, 8 … maps with the wave
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     judge: bool,
     /// Output folder of the maps: phase_000.png …
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
     overwrite: OverwriteFlag,

@@ -22,7 +22,7 @@ pub(crate) struct Pack {
     #[arg(long, value_parser = packed::COLOURS)]
     colour: Option<String>,
     /// Output frame: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
-    #[arg(short, value_name = "FRAME.png")]
+    #[arg(short, long, value_name = "FRAME.png")]
     output: PathBuf,
 }
 
@@ -103,7 +103,7 @@ pub(crate) struct Unpack {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(usize, usize)>,
     /// Output hologram: a PNG of modulator levels
-    #[arg(short, value_name = "OUT.png")]
+    #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
 }
 

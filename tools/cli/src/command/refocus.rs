@@ -22,19 +22,20 @@ pub(crate) struct Refocus {
         value_name = "Z",
         allow_negative_numbers = true,
         required_unless_present = "stack",
-        conflicts_with = "stack"
+        conflicts_with = "stack",
+        help_heading = "Output"
     )]
     z_mm: Option<f64>,
     /// Number of views from the near end of the volume to the far end
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000), help_heading = "Output")]
     stack: Option<u32>,
     #[command(flatten)]
     display: DisplayFlags,
     /// Width of the pictures, pixels; they keep their proportions [default: the hologram's width]
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=16384))]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=16384), help_heading = "Output")]
     width: Option<u32>,
     /// Output: a .png, .jpg or .webp for one z; a folder, or an animated .gif or .webp, for a stack
-    #[arg(short, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: OverwriteFlag,

@@ -8,8 +8,9 @@ use crate::flags::depth::DepthFlags;
 use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::{SeenDepthFlags, warn_of_size};
 use crate::flags::method::{CoreMethod, Parts};
+use crate::given::Flag;
 use crate::record::{Before, RunRecord};
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, SessionHandle, Statistics};
 use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
@@ -35,59 +36,65 @@ pub(crate) struct Video {
     /// frames must have one size
     input: PathBuf,
     /// Names of a folder's colour and depth files, where each * stands for the same text: 'left_*.png,left_*_z.png'
-    #[arg(long, value_name = "COLOUR,DEPTH")]
+    #[arg(long, value_name = "COLOUR,DEPTH", help_heading = "Input")]
     pairs: Option<String>,
     /// Film in grey with the depth of the input film
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
     depth_video: Option<PathBuf>,
-    /// Take the depth of a film from the right half of its pictures, in grey
-    #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
+    /// Take the depth of a film from the right half of its pictures, in grey; a margin in their middle is left out
+    #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"], help_heading = "Input")]
     depth_beside: bool,
     #[command(flatten)]
     seen: SeenDepthFlags,
     /// Size of the colour of raw frames on stdin, rows of RGB bytes
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Input")]
     raw: Option<(usize, usize)>,
     /// Size of the depth of raw frames on stdin, rows of 16-bit little-endian numbers [default: the colour's]
-    #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "raw")]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "raw", help_heading = "Input")]
     raw_depth: Option<(usize, usize)>,
     #[command(flatten)]
     depth: DepthFlags,
     /// Method for the holograms [default: auto; network with --network or --encoder deep]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Method")]
     method: Option<CoreMethod>,
     /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, help_heading = "Method")]
     network: Option<String>,
     /// Number type of a bundled network [default: int8]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Expert")]
     precision: Option<PrecisionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
     /// Size of the holograms [default: the size of the first frame's colour]
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Display")]
     size: Option<(usize, usize)>,
     #[command(flatten)]
     display: DisplayFlags,
     #[command(flatten)]
     backend: BackendFlags,
     /// Amplitude that full light stands for
-    #[arg(long, value_enum, default_value_t = BrightnessName::Smoothed)]
+    #[arg(long, value_enum, default_value_t = BrightnessName::Smoothed, help_heading = "Expert")]
     brightness: BrightnessName,
     /// Frames per second of the input [default: a film's own rate, else 30]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Input")]
     rate: Option<f64>,
     /// Submit frames at the input's rate and drop those for which there is no time
-    #[arg(long)]
+    #[arg(long, help_heading = "Input")]
     live: bool,
     /// Let a live stream step down to half and a quarter of the resolution if it cannot hold the rate
-    #[arg(long, requires = "live")]
+    #[arg(long, requires = "live", help_heading = "Input")]
     adaptive: bool,
     /// Number of times to show the frames of a folder
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Input")]
     repeat: u32,
     /// Also write a preview of each hologram, focused at this z
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "output")]
+    #[arg(
+        long,
+        value_name = "MM",
+        allow_negative_numbers = true,
+        requires = "output",
+        help_heading = "Output"
+    )]
     preview_mm: Option<f64>,
     /// Continue an earlier run with the same flags and input
     #[arg(long, requires = "output", conflicts_with_all = ["live", "overwrite"])]
@@ -98,7 +105,7 @@ pub(crate) struct Video {
     /// Output folder: phase_000000.png …, preview_000000.png …, request.json, statistics.json; for NAME.mp4 the folder
     /// NAME, with a film of the previews and the lossless NAME-phases.mp4 beside it. Required unless --live or --json
     /// is given, which report without it
-    #[arg(short, value_name = "DIR|NAME.mp4")]
+    #[arg(short, long, value_name = "DIR|NAME.mp4")]
     output: Option<PathBuf>,
 }
 
@@ -125,21 +132,23 @@ fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
 }
 
 impl Video {
-    pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
+    pub(crate) fn run(mut self, threads: Option<NonZeroUsize>, json: bool, flags: &[Flag]) -> Result<()> {
         if self.output.is_none() && !self.live && !json {
             return Err(Error::Input(
                 "no output is asked for: -o DIR writes the holograms; --json alone reports how long they took".into(),
             ));
         }
-        let rate = self.rate_hz()?;
+        check_rate(self.rate)?;
         let before = Before::of_flags(self.resume, self.overwrite);
-        let (mut source, (height, width)) = Source::open(&self)?;
+        let (mut source, (height, width)) = Source::open(&mut self)?;
+        let rate = self.rate.or(source.rate_hz()).unwrap_or(30.0);
+        check_rate(Some(rate))?;
         let (options, info) = self.options(height, width, threads, rate)?;
         let preview_mm = self.preview_mm();
         if let Some(mm) = preview_mm {
             hologram::check_z(&info.display, mm / 1e3)?;
         }
-        let record = self.record(&info.display, rate)?;
+        let record = self.record(flags, &info.display, rate)?;
         let mut sink = Sink::new(
             self.output.as_deref(),
             preview_mm.map(|mm| mm / 1e3),
@@ -147,6 +156,7 @@ impl Video {
             before,
             record,
         )?;
+        sink.expect_interrupts(self.live);
         let bar = source.progress();
         let start = Instant::now();
         let memory = memory_mb();
@@ -168,62 +178,18 @@ impl Video {
     }
 
     /// Records all flags that affect the output. The input is left out, because each frame is identified by itself.
-    fn record(&self, display: &phasefront::Display, rate: f64) -> Result<RunRecord> {
-        let Video {
-            input: _,
-            pairs: _,
-            depth_video: _,
-            depth_beside: _,
-            seen,
-            raw: _,
-            raw_depth: _,
-            depth,
-            method,
-            network,
-            precision,
-            encoder,
-            size: _, // Part of the display.
-            display: flags,
-            backend,
-            brightness,
-            rate: _,
-            live,
-            adaptive,
-            repeat: _,
-            preview_mm: _,
-            resume: _,
-            overwrite: _,
-            output: _,
-        } = self;
+    fn record(&self, flags: &[Flag], display: &phasefront::Display, rate: f64) -> Result<RunRecord> {
         let mut record = RunRecord::new("video");
-        seen.record(&mut record)?;
-        depth.record(&mut record);
-        let method = CoreMethod::or_default(*method, network.as_deref(), encoder);
+        record.add(flags)?;
+        self.depth.record(&mut record);
+        let method = CoreMethod::or_default(self.method, self.network.as_deref(), &self.encoder);
         record.choice("--method", Some(&method));
-        record.name_or_file("--network", network.as_deref())?;
-        record.choice("--precision", Some(&precision.unwrap_or_default()));
-        encoder.record(&mut record)?;
-        record.display(flags.name(), display)?;
-        backend.record(&mut record);
-        record.choice("--brightness", Some(brightness));
+        record.display(self.display.name(), display)?;
         record.set("--rate", Some(rate));
-        record.switch("--live", *live);
-        record.switch("--adaptive", *adaptive);
+        record.switch("--live", self.live);
+        record.switch("--adaptive", self.adaptive);
         record.set("--preview-mm", self.preview_mm());
         Ok(record)
-    }
-
-    /// Returns the frames per second of the input.
-    fn rate_hz(&self) -> Result<f64> {
-        let films = || film::is_film(&self.input).then(|| film::about(&self.input)).flatten();
-        let rate = self.rate.or_else(|| Some(films()?.rate_hz)).unwrap_or(30.0);
-        if rate.is_finite() && rate > 0.0 && rate <= 1000.0 {
-            Ok(rate)
-        } else {
-            Err(Error::Input(format!(
-                "--rate {rate}: it must lie above 0 and up to 1000"
-            )))
-        }
     }
 
     fn options(
@@ -456,6 +422,15 @@ impl Video {
             ),
         );
         Ok(())
+    }
+}
+
+fn check_rate(rate_hz: Option<f64>) -> Result<()> {
+    match rate_hz {
+        Some(rate) if !(rate.is_finite() && rate > 0.0 && rate <= 1000.0) => Err(Error::Input(format!(
+            "--rate {rate}: it must lie above 0 and up to 1000"
+        ))),
+        _ => Ok(()),
     }
 }
 

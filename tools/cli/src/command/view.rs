@@ -1,7 +1,7 @@
 //! `phasefront view`: makes one HTML file that shows holograms.
 
-use crate::flags::frame::{FrameFlags, shown_json, shown_text};
-use crate::make::{HologramRequest, Image, Judged, infos, judge};
+use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, shown_json, shown_text};
+use crate::make::{HologramRequest, Image, Judged, METHOD_FLAGS, infos, judge};
 use clap::Args;
 use image::RgbImage;
 use indicatif::ProgressBar;
@@ -24,25 +24,25 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 pub(crate) struct View {
     /// Holograms (.png, or .npy with its .json), folders of `video`, or pages of this command, all joined in one page
-    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = FrameFlags::NAMES, conflicts_with_all = HologramRequest::NAMES)]
+    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = IMAGE_FLAGS, conflicts_with_all = METHOD_FLAGS)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     request: HologramRequest,
     /// Number of views from the near end of the volume to the far end [default: 25; 5 for each frame of video]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=200))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=200), help_heading = "Output")]
     views: Option<u8>,
     /// Number of frames of a video to show, evenly chosen [default: 24]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000), help_heading = "Output")]
     frames: Option<u16>,
     /// Title of the hologram on the page [default: its file's name]
-    #[arg(long, value_name = "TEXT")]
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
     title: Option<String>,
     /// Size limit of the page, MB; pictures are made smaller to fit, but those of joined pages stay as they are
     /// [default: 5, and the size of joined pages]
-    #[arg(long, value_name = "MB")]
+    #[arg(long, value_name = "MB", help_heading = "Output")]
     max_mb: Option<f64>,
     /// Output page
-    #[arg(short, value_name = "OUT.html")]
+    #[arg(short, long, value_name = "OUT.html")]
     output: PathBuf,
 }
 

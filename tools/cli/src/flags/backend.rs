@@ -1,6 +1,5 @@
 //! The flags for the device that makes frames.
 
-use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
 use phasefront_cli::gpu;
 use phasefront_gpu::DeviceOptions;
@@ -8,12 +7,13 @@ use phasefront_io::{Error, Result};
 
 /// The device that makes frames.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Method")]
 pub(crate) struct BackendFlags {
     /// Device that makes frames
     #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
     backend: BackendName,
     /// Part of the GPU's name [default: the fastest; drivers in software are taken by name only]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Expert")]
     gpu: Option<String>,
 }
 
@@ -27,12 +27,6 @@ enum BackendName {
 }
 
 impl BackendFlags {
-    pub(crate) fn record(&self, record: &mut RunRecord) {
-        let BackendFlags { backend, gpu } = self;
-        record.choice("--backend", Some(backend));
-        record.set("--gpu", gpu.as_ref());
-    }
-
     /// Returns the options of the GPU, if one is requested.
     pub(crate) fn device(&self) -> Result<Option<DeviceOptions>> {
         match (self.backend, &self.gpu) {

@@ -9,6 +9,7 @@ use phasefront_io::{Error, Result};
 
 /// The unit of a depth image's values, and the range of depth to show.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Depth")]
 pub(crate) struct DepthFlags {
     /// Unit of the depth values; 0 and NaN are missing readings, except in normalized depth [default: normalized]
     #[arg(long, value_enum)]
@@ -40,17 +41,27 @@ enum UnitName {
 }
 
 impl DepthFlags {
+    /// Records the unit of the depth, which a folder's layout may define.
     pub(crate) fn record(&self, record: &mut RunRecord) {
-        let DepthFlags {
-            depth_unit,
-            depth_scale,
-            near,
-            far,
-        } = self;
-        record.choice("--depth-unit", Some(&depth_unit.unwrap_or_default()));
-        record.set("--depth-scale", *depth_scale);
-        record.set("--near", *near);
-        record.set("--far", *far);
+        record.choice("--depth-unit", Some(&self.depth_unit.unwrap_or_default()));
+        record.set("--depth-scale", self.depth_scale);
+    }
+
+    /// Takes the unit that a folder's layout defines, unless --depth-unit is given.
+    pub(crate) fn take_layout(&mut self, unit: Option<DepthUnit>) {
+        let (Some(unit), None) = (unit, self.depth_unit) else {
+            return;
+        };
+        self.depth_unit = Some(match unit {
+            DepthUnit::Normalized => UnitName::Normalized,
+            DepthUnit::Metres => UnitName::M,
+            DepthUnit::Millimetres => UnitName::Mm,
+            DepthUnit::Disparity => UnitName::Disparity,
+            DepthUnit::Raw { units_per_m } => {
+                self.depth_scale = Some(units_per_m);
+                UnitName::Raw
+            }
+        });
     }
 
     /// Returns --near and --far of video, in metres.
@@ -62,7 +73,8 @@ impl DepthFlags {
         }
     }
 
-    pub(crate) fn options(&self) -> Result<DepthOptions> {
+    /// Returns how depth is read. `inverted` tells whether --invert is given.
+    pub(crate) fn options(&self, inverted: bool) -> Result<DepthOptions> {
         let unit = self.depth_unit.unwrap_or_default();
         check_used(&[(
             "--depth-scale",
@@ -83,6 +95,7 @@ impl DepthFlags {
             unit,
             near_m: self.near,
             far_m: self.far,
+            inverted,
         })
     }
 }

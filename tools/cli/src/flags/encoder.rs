@@ -1,22 +1,21 @@
 //! The flags for the encoder that turns a field into phases.
 
-use crate::record::RunRecord;
-use clap::Args;
+use clap::{Args, ValueHint};
 use phasefront::{Display, EncoderOptions, Encoding, Network};
 use phasefront_command::flags::EncoderName;
 use phasefront_command::networks::{self, Precision};
 use phasefront_io::{Error, Result};
-use std::path::Path;
 use std::sync::Arc;
 
 /// The encoder that turns a field into phases.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Expert")]
 pub(crate) struct EncoderFlags {
     /// Encoder that turns the field into phases [default: anti-alias; deep with --network ddpm-8]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Method")]
     encoder: Option<EncoderName>,
     /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: that of --network ddpm-8]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     prefilter: Option<String>,
     /// Fraction of full light, 0 to 1, below which phases are drawn to 0 to reduce speckle in dark areas [default: 0.4;
     /// 0 with --encoder deep]
@@ -62,22 +61,6 @@ impl EncoderFlags {
             local_steps: Some(local_steps),
             midpoint_steps,
         }
-    }
-
-    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
-        let EncoderFlags {
-            encoder,
-            prefilter,
-            dark_threshold,
-            local_steps,
-            midpoint_steps,
-        } = self;
-        record.choice("--encoder", encoder.as_ref());
-        record.file("--prefilter", prefilter.as_ref().map(Path::new))?;
-        record.set("--dark-threshold", *dark_threshold);
-        record.set("--local-steps", *local_steps);
-        record.set("--midpoint-steps", Some(*midpoint_steps));
-        Ok(())
     }
 
     /// Makes the encoder for fields that are not made by the network of a pair.

@@ -2,13 +2,12 @@
 //! estimates depth. Further flags place the image on the modulator.
 
 use crate::flags::depth::DepthFlags;
-use crate::record::RunRecord;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use ndarray::{Array2, Array3};
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::stage;
-use phasefront_io::film::sequence;
+use phasefront_io::film::sequence::{self, Shows};
 use phasefront_io::frame::fit::{Fit, Placement};
 use phasefront_io::frame::{Captured, ShownDepth};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
@@ -18,8 +17,12 @@ use phasefront_io::{Error, Result, frame, output};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
+/// The flags for an RGB-D image, for flags that conflict with them. clap makes no group of a struct that holds others.
+pub(crate) const IMAGE_FLAGS: [&str; 6] = ["rgb", "depth", "photo", "fit", "SeenDepthFlags", "DepthFlags"];
+
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
+#[command(next_help_heading = "Input")]
 pub(crate) struct FrameFlags {
     #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}"))]
     rgb: Option<PathBuf>,
@@ -39,7 +42,7 @@ pub(crate) struct FrameFlags {
     /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: unchanged;
     /// contain with --photo]. A warning appears if the image's size differs from that of the --display, or, without
     /// --display, if the image is larger than the default display
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Display")]
     fit: Option<FitName>,
     #[command(flatten)]
     depth_numbers: DepthFlags,
@@ -47,12 +50,13 @@ pub(crate) struct FrameFlags {
 
 /// Depth that a network estimates, and the direction of depth.
 #[derive(Clone, Default, Args)]
+#[command(next_help_heading = "Depth")]
 pub(crate) struct SeenDepthFlags {
     /// ONNX file of a network that estimates relative inverse depth from colour alone (docs/depth.md)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_network: Option<PathBuf>,
     /// Scaling of the colours for --depth-network
-    #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network")]
+    #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network", help_heading = "Expert")]
     depth_network_colours: ColoursName,
     /// Swap near and far: for depth that is larger where it is nearer, and for --depth-network that gives distance
     #[arg(long)]
@@ -60,18 +64,6 @@ pub(crate) struct SeenDepthFlags {
 }
 
 impl SeenDepthFlags {
-    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
-        let SeenDepthFlags {
-            depth_network,
-            depth_network_colours,
-            invert,
-        } = self;
-        record.file("--depth-network", depth_network.as_deref())?;
-        record.choice("--depth-network-colours", Some(depth_network_colours));
-        record.switch("--invert", *invert);
-        Ok(())
-    }
-
     pub(crate) fn network(&self) -> Option<&Path> {
         self.depth_network.as_deref()
     }
@@ -155,11 +147,13 @@ pub(crate) struct Picture {
 }
 
 fn of_one_folder(folder: &Path) -> Result<Vec<Picture>> {
-    let found = sequence::images(folder)?.into_iter().map(|(name, path)| Picture {
-        name: name.text,
-        files: vec![path],
-        is_whole: true,
-    });
+    let found = sequence::images(folder, Shows::Colour)?
+        .into_iter()
+        .map(|(name, path)| Picture {
+            name: name.text,
+            files: vec![path],
+            is_whole: true,
+        });
     Ok(found.collect())
 }
 
@@ -205,37 +199,6 @@ pub(crate) fn shown_text(shown: Option<ShownDepth>) -> String {
 }
 
 impl FrameFlags {
-    /// The names of the flags, for flags that conflict with them.
-    pub(crate) const NAMES: [&str; 11] = [
-        "rgb",
-        "depth",
-        "photo",
-        "depth_network",
-        "depth_network_colours",
-        "invert",
-        "fit",
-        "depth_unit",
-        "depth_scale",
-        "near",
-        "far",
-    ];
-
-    /// Records all flags except those that name the picture.
-    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
-        let FrameFlags {
-            rgb: _,
-            depth: _,
-            photo: _,
-            seen,
-            fit,
-            depth_numbers,
-        } = self;
-        seen.record(record)?;
-        record.choice("--fit", fit.as_ref());
-        depth_numbers.record(record);
-        Ok(())
-    }
-
     /// Returns the pictures of the folders that --rgb and --depth, or --photo, name, or `None` if they name files.
     pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
         let is_folder = |path: &Option<PathBuf>| path.as_ref().is_some_and(|path| path.is_dir());
@@ -288,7 +251,7 @@ impl FrameFlags {
         let mut shown = None;
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
-                let captured: Captured = frame::read(rgb, depth, self.depth_numbers.options()?)?;
+                let captured: Captured = frame::read(rgb, depth, self.depth_numbers.options(self.seen.invert)?)?;
                 shown = captured.shown;
                 self.conditioned(&captured.rgb, captured.depth, display)
             }
@@ -328,7 +291,7 @@ impl FrameFlags {
 
     /// Makes the frame of a photo: from its distances if --near or --far is given, else from d_n unchanged.
     fn of_photo(&self, path: &Path, photo: &photo::Photo, display: &Display) -> Result<RgbdFrame> {
-        let options = self.depth_numbers.options()?;
+        let options = self.depth_numbers.options(self.seen.invert)?;
         let depth = match (options.near_m, options.far_m, photo.metres()) {
             (None, None, _) => frame::relative(photo.depth.view(), None, None),
             (near, far, Some(metres)) => frame::relative(metres.view(), near, far),

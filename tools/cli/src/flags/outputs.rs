@@ -15,6 +15,7 @@ use std::time::Duration;
 
 /// What is made of a hologram beside its levels.
 #[derive(Args)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct OutputFlags {
     /// Also write the complex field at the modulator, with a .json beside it
     #[arg(long, value_name = "FILE.npy")]

@@ -2,11 +2,10 @@
 
 use crate::flags::backend::BackendFlags;
 use crate::flags::encoder::EncoderFlags;
-use crate::flags::frame::{FrameFlags, Picture};
+use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, Picture};
 use crate::flags::method::CoreMethod;
-use crate::record::RunRecord;
 use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 use phasefront::{Brightness, EncoderOptions, RgbdFrame};
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used};
 use phasefront_exact::point_based::Occlusion;
@@ -17,42 +16,57 @@ use phasefront_io::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+/// The flags for a method, for flags that conflict with them. clap makes no group of a struct that holds others.
+pub(crate) const METHOD_FLAGS: [&str; 10] = [
+    "ldi",
+    "method",
+    "network",
+    "precision",
+    "planes",
+    "taps",
+    "occlusion",
+    "scale",
+    "EncoderFlags",
+    "BackendFlags",
+];
+
 /// The flags for a hologram's image and method.
-#[derive(Args)]
+#[derive(Default, Args)]
+#[command(next_help_heading = "Method")]
 pub(crate) struct HologramRequest {
     #[command(flatten)]
     pub(super) frame: FrameFlags,
     /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
-    #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
+    #[arg(long, value_name = "DIR", conflicts_with_all = IMAGE_FLAGS, help_heading = "Input")]
     pub(super) ldi: Option<PathBuf>,
     /// Method for the midpoint hologram [default: auto; network with --network or --encoder deep, layers with --ldi and
     /// no --network]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Method")]
     pub(super) method: Option<Method>,
     /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, help_heading = "Method")]
     pub(super) network: Option<String>,
     /// Number type of a bundled network [default: int8]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub(super) precision: Option<PrecisionName>,
     /// Number of planes for --method layers and points [default: 256] and sweep [default: chosen for the display]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Expert")]
     pub(super) planes: Option<usize>,
     /// Number of taps of the filter from plane to plane, for --method sweep [default: chosen for planes and display]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Expert")]
     pub(super) taps: Option<usize>,
     /// Treatment of occlusion for --method points [default: geometric]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub(super) occlusion: Option<OcclusionName>,
     #[command(flatten)]
     pub(super) encoder: EncoderFlags,
     /// Amplitude that full light stands for [default: the largest of the image]
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", help_heading = "Expert")]
     pub(super) scale: Option<f32>,
     #[command(flatten)]
     pub(super) backend: BackendFlags,
     #[command(flatten)]
-    pub(super) display: DisplayFlags,
+    pub(crate) display: DisplayFlags,
     /// Whether the result keeps the field.
     #[arg(skip)]
     pub(crate) keeps_field: bool,
@@ -113,41 +127,11 @@ pub(crate) enum Image {
 }
 
 impl HologramRequest {
-    /// The names of these flags, except those of [`FrameFlags`] and the display, for flags that conflict with them.
-    pub(crate) const NAMES: [&str; 15] = [
-        "ldi",
-        "method",
-        "network",
-        "precision",
-        "planes",
-        "taps",
-        "occlusion",
-        "encoder",
-        "prefilter",
-        "dark_threshold",
-        "local_steps",
-        "midpoint_steps",
-        "scale",
-        "backend",
-        "gpu",
-    ];
-
     /// Creates a request for `display` without flags for an image.
-    pub(crate) fn of(display: DisplayFlags) -> Self {
+    pub(crate) fn new(display: DisplayFlags) -> Self {
         HologramRequest {
-            frame: FrameFlags::default(),
-            ldi: None,
-            method: None,
-            network: None,
-            precision: None,
-            planes: None,
-            taps: None,
-            occlusion: None,
-            encoder: EncoderFlags::default(),
-            scale: None,
-            backend: BackendFlags::default(),
             display,
-            keeps_field: false,
+            ..Self::default()
         }
     }
 
@@ -169,36 +153,6 @@ impl HologramRequest {
 
     pub(crate) fn display(&self) -> Result<DisplayFile> {
         self.display.read()
-    }
-
-    /// Records all flags except those that name the picture.
-    pub(crate) fn record(&self, display: &phasefront::Display, record: &mut RunRecord) -> Result<()> {
-        let HologramRequest {
-            frame,
-            ldi: _, // Names the picture.
-            method,
-            network,
-            precision,
-            planes,
-            taps,
-            occlusion,
-            encoder,
-            scale,
-            backend,
-            display: flags,
-            keeps_field: _,
-        } = self;
-        frame.record(record)?;
-        record.choice("--method", method.as_ref());
-        record.name_or_file("--network", network.as_deref())?;
-        record.choice("--precision", Some(&precision.unwrap_or_default()));
-        record.set("--planes", *planes);
-        record.set("--taps", *taps);
-        record.choice("--occlusion", Some(&occlusion.unwrap_or_default()));
-        encoder.record(record)?;
-        record.set("--scale", *scale);
-        backend.record(record);
-        record.display(flags.name(), display)
     }
 
     /// Returns the pictures of the folders, or `None` if the flags name no folders.

@@ -379,8 +379,10 @@ fn the_links_pattern_goes_through_files() {
         image::Rgb(pattern.get_pixel(x, y).0.map(|v| 16 + (u32::from(v) * 219 / 255) as u8))
     });
     limited.save(folder.path("limited.png")).unwrap();
-    let told = folder.succeeds(&["link", "read", "limited.png", "--size", "640x96"]);
+    let read = folder.run(&["link", "read", "limited.png", "--size", "640x96"]);
+    let told = String::from_utf8(read.stdout).unwrap();
     assert!(told.starts_with("limited range"), "{told}");
+    assert_eq!(read.status.code(), Some(1), "scripts see that the link changes pixels");
 }
 
 /// A Meadowlark table has two columns: the numbers 0 to 255, and the levels or voltages.

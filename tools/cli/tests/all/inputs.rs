@@ -86,7 +86,7 @@ fn exif(orientation: u8) -> Vec<u8> {
 }
 
 /// Encodes `image` as a JPEG with an orientation.
-fn jpeg(image: &DynamicImage, orientation: u8) -> Vec<u8> {
+pub(crate) fn jpeg(image: &DynamicImage, orientation: u8) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
     let bytes = bytes.into_inner();
@@ -100,6 +100,7 @@ fn options(unit: DepthUnit) -> DepthOptions {
         unit,
         near_m: None,
         far_m: None,
+        inverted: false,
     }
 }
 

@@ -209,9 +209,6 @@ fn wrong_input_is_named() {
         let said = refusal(arguments);
         assert!(said.contains(word), "{arguments:?}: {said}");
     }
-    // Depth in millimetres is not normalized.
-    std::fs::remove_file(input.join("depth_1.png")).unwrap();
-    assert!(refusal(&[name]).contains("no partner"));
     let empty = dir.path().join("empty");
     std::fs::create_dir(&empty).unwrap();
     assert!(refusal(&[empty.to_str().unwrap()]).contains("no frames"));
@@ -351,7 +348,7 @@ fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
 }
 
 /// Creates `path` from `from`: a film from pictures, or pictures from a film.
-fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
+pub(crate) fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
     let made = Command::new("ffmpeg")
         .args(["-v", "error", "-y"])
         .args(rate)
@@ -614,7 +611,7 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
         ),
         (&["--local-steps", "3"], "no --local-steps", "--local-steps 3"),
         (&["--method", "auto", "--network", "15"], "no --network", "--network 15"),
-        (&["--precision", "f32"], "--precision int8", "--precision f32"),
+        (&["--precision", "f32"], "no --precision", "--precision f32"),
         (&["--brightness", "max"], "--brightness smoothed", "--brightness max"),
         (&["--rate", "24"], "--rate 30", "--rate 24"),
         (&["--offset-mm", "2"], "display offset_mm 0", "display offset_mm 2"),
@@ -690,6 +687,63 @@ fn one_run_at_a_time_writes_into_a_folder() {
     assert!(first.wait().unwrap().success());
 }
 
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_whole_files_and_names_resume() {
+    use std::os::unix::process::ExitStatusExt;
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    std::fs::create_dir(at("in")).unwrap();
+    // Large frames, so that writing them takes a while.
+    for index in 0..4 {
+        let (colour, depth) = frame(index);
+        image::imageops::resize(&colour, 1024, 768, image::imageops::Nearest)
+            .save(at(&format!("in/color_{index}.png")))
+            .unwrap();
+        depth.save(at(&format!("in/depth_{index}.png"))).unwrap();
+    }
+    let (input, out) = (at("in").to_str().unwrap().to_owned(), at("out"));
+    let call = [
+        "video",
+        &input,
+        "--depth-unit",
+        "mm",
+        "--method",
+        "sweep",
+        "-o",
+        out.to_str().unwrap(),
+    ];
+    let names = || -> Vec<String> {
+        let entries = std::fs::read_dir(&out).into_iter().flatten().flatten();
+        entries
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .collect()
+    };
+    let half = |names: &[String]| names.iter().any(|name| name.ends_with(".tmp"));
+    let child = phasefront(&call)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !(names().contains(&"phase_000000.png".to_owned()) && half(&names())) {
+        assert!(!out.join("phase_000003.png").exists(), "no file was seen half written");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(sent.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.signal(), Some(2), "{errors}");
+    assert!(
+        errors.lines().count() == 1 && errors.contains("out") && errors.contains("--resume"),
+        "{errors}"
+    );
+    assert!(!half(&names()), "{:?}", names());
+    assert!(!out.join("phase_000003.png").exists(), "the run was interrupted");
+    json(&[&call[..], &["--resume"]].concat());
+    assert_eq!(holograms(&out).len(), 4);
+}
+
 /// Tests a film about which ffmpeg complains at length: more than a pipe holds.
 #[cfg(unix)]
 #[test]
@@ -758,7 +812,7 @@ fn films_have_any_names_and_are_films_alone() {
         &["-framerate", "10"],
         &input.join("color_%d.png"),
         &at("a.mp4"),
-        &["-c:v", "libx264rgb", "-qp", "0"],
+        &["-vf", "format=gray,negate", "-c:v", "libx264rgb", "-qp", "0"],
     );
     let run = |arguments: &[&str]| {
         let output = phasefront(arguments).current_dir(dir.path()).output().unwrap();
@@ -822,8 +876,16 @@ fn films_replace_no_file_unasked() {
     json(&[&call[..], &["--overwrite"]].concat());
     assert_ne!(std::fs::read(at("x-phases.mp4")).unwrap(), b"old");
     // The input film is not replaced.
-    let film = std::fs::read(at("x.mp4")).unwrap();
+    let pictures = input.join("depth_%d.png");
+    film(
+        &["-framerate", "10"],
+        &pictures,
+        &at("y.mp4"),
+        &["-c:v", "libx264rgb", "-qp", "0"],
+    );
+    let before = std::fs::read(at("y.mp4")).unwrap();
+    let out = at("y.mp4").to_str().unwrap().to_owned();
     let error = refusal(&["video", &out, "--depth-beside", "--overwrite", "-o", &out]);
     assert!(error.contains("input"), "{error}");
-    assert_eq!(std::fs::read(at("x.mp4")).unwrap(), film);
+    assert_eq!(std::fs::read(at("y.mp4")).unwrap(), before);
 }

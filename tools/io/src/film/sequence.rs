@@ -1,8 +1,7 @@
 //! Sequences of colour and depth files in the folder layouts of data sets.
 
-use crate::film::video;
+use crate::picture::depth_map;
 use crate::{Error, Result, input, output};
-use image::{ImageDecoder, ImageReader};
 use phasefront_core::depth::DepthUnit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -14,10 +13,34 @@ const TUM_APART_S: f64 = 0.02;
 const TUM_UNITS_PER_M: f64 = 5000.0;
 /// The names of colour folders that may lie beside a folder `depth`.
 const COLOUR_FOLDERS: [&str; 3] = ["rgb", "color", "image"];
-/// The file extensions of colour and depth. Files with other extensions are ignored.
-const IMAGES: [&str; 12] = [
-    "png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff", "exr", "npy", "npz", "pgm", "pfm",
-];
+/// The file extensions of pictures.
+const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff"];
+/// The further file extensions of depth.
+const NUMBERS: [&str; 5] = ["exr", "npy", "npz", "pgm", "pfm"];
+
+/// What a file shows. It decides which file extensions count; other files are ignored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shows {
+    /// Colour: a picture.
+    Colour,
+    /// Depth: a picture, or an array of numbers.
+    Depth,
+}
+
+impl Shows {
+    /// Checks whether the file at `path` may show this. Hidden files do not.
+    fn is_by(self, path: &Path) -> bool {
+        let numbers = NUMBERS.iter().filter(|_| self == Shows::Depth);
+        let hidden = path
+            .file_name()
+            .is_none_or(|name| name.to_string_lossy().starts_with('.'));
+        !hidden
+            && PICTURES
+                .iter()
+                .chain(numbers)
+                .any(|ending| output::has_extension(path, ending))
+    }
+}
 
 /// Frames in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,11 +52,13 @@ pub struct Sequence {
 }
 
 /// Returns the frames of `dir`: a sequence of the TUM RGB-D benchmark (`rgb.txt`, `depth.txt`), folders `rgb` and
-/// `depth` with the file numbers of a Redwood scan or with equal names, or numbered files
-/// ([`video::frames_of_folder`]).
+/// `depth` with the file numbers of a Redwood scan or with equal names, or numbered files in one folder, where
+/// `color_7.jpg` or `rgb_007.png` belongs to `depth_7.png` or `depth_007.npy`. Frames that lack a file are left out
+/// with a warning.
 ///
 /// # Errors
-/// Returns an error if the folder has none of these layouts.
+/// Returns an error if the folder has none of these layouts or no whole frame, or if two files claim to be the same
+/// part of a frame.
 pub fn of_folder(dir: &Path) -> Result<Sequence> {
     if dir.is_file() {
         return Err(Error::file(
@@ -51,20 +76,17 @@ pub fn of_folder(dir: &Path) -> Result<Sequence> {
     if let Some(colour) = colour
         && dir.join("depth").is_dir()
     {
-        return two_folders(&colour, &dir.join("depth"));
+        return two_folders(dir, &colour, &dir.join("depth"));
     }
     if let Some(why) = other_folders(dir)? {
         return Err(Error::file(dir, why));
     }
-    Ok(Sequence {
-        frames: video::frames_of_folder(dir)?,
-        unit: None,
-    })
+    numbered(dir)
 }
 
 /// Returns advice if `dir` holds folders of pictures with other names, and no pictures beside them.
 fn other_folders(dir: &Path) -> Result<Option<String>> {
-    let is_image = |path: &PathBuf| IMAGES.iter().any(|ending| output::has_extension(path, ending));
+    let is_image = |path: &PathBuf| Shows::Depth.is_by(path);
     let mut paths = files_of(dir)?;
     paths.sort();
     let mut patterns = Vec::new();
@@ -96,13 +118,13 @@ fn other_folders(dir: &Path) -> Result<Option<String>> {
 
 /// Returns the frames of `dir` whose names match the patterns `colour` and `depth`, for example `left_*.png` and
 /// `left_*_z.png`. Each pattern has one `*`, which stands for the same text in both. Numbers are sorted numerically. A
-/// file that matches both patterns belongs to the longer pattern.
+/// file that matches both patterns belongs to the longer pattern. Frames that lack a file are left out with a warning.
 ///
 /// # Errors
-/// Returns an error if a pattern is invalid, a file has no partner, or no file matches.
+/// Returns an error if a pattern is invalid or there is no whole frame.
 pub fn by_pattern(dir: &Path, colour: &str, depth: &str) -> Result<Sequence> {
-    let mut colours = matching(dir, colour)?;
-    let mut depths = matching(dir, depth)?;
+    let mut colours = matching(dir, colour, Shows::Colour)?;
+    let mut depths = matching(dir, depth, Shows::Depth)?;
     let (longer, shorter) = if colour.len() > depth.len() {
         (&colours, &mut depths)
     } else {
@@ -110,28 +132,101 @@ pub fn by_pattern(dir: &Path, colour: &str, depth: &str) -> Result<Sequence> {
     };
     let taken: BTreeSet<_> = longer.values().cloned().collect();
     shorter.retain(|_, path| !taken.contains(path));
-    let alone = |a: &BTreeMap<Key, PathBuf>, b: &BTreeMap<Key, PathBuf>| {
-        a.iter()
-            .find(|(key, _)| !b.contains_key(*key))
-            .map(|(_, path)| path.clone())
-    };
-    if let Some(path) = alone(&colours, &depths).or_else(|| alone(&depths, &colours)) {
-        return Err(Error::file(path, format!("has no partner by --pairs {colour},{depth}")));
-    }
-    if colours.is_empty() {
+    if colours.is_empty() && depths.is_empty() {
         return Err(Error::file(dir, format!("holds no files {colour} and {depth}")));
     }
-    let mut frames = Vec::new();
-    while let (Some((_, colour)), Some((_, depth))) = (colours.pop_first(), depths.pop_first()) {
-        frames.push((colour, depth));
+    join(colours, depths).sequence(dir, &format!("--pairs {colour},{depth}"), None)
+}
+
+/// The files of two kinds, joined by a key.
+struct Joined<K> {
+    pairs: Vec<(K, PathBuf, PathBuf)>,
+    /// The files without a partner.
+    alone: Vec<PathBuf>,
+}
+
+fn join<K: Ord>(colours: BTreeMap<K, PathBuf>, mut depths: BTreeMap<K, PathBuf>) -> Joined<K> {
+    let (mut pairs, mut alone) = (Vec::new(), Vec::new());
+    for (key, colour) in colours {
+        match depths.remove(&key) {
+            Some(depth) => pairs.push((key, colour, depth)),
+            None => alone.push(colour),
+        }
     }
-    Ok(Sequence { frames, unit: None })
+    alone.extend(depths.into_values());
+    Joined { pairs, alone }
+}
+
+impl<K> Joined<K> {
+    /// Returns the whole frames of `dir`, which were joined by `what`. Warns of the others, because a recording may
+    /// lack the depth of some frames.
+    fn sequence(self, dir: &Path, what: &str, unit: Option<DepthUnit>) -> Result<Sequence> {
+        let Joined { pairs, alone } = self;
+        let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
+        if let Some(first) = alone.first() {
+            if pairs.is_empty() {
+                return Err(Error::file(
+                    dir,
+                    format!("has no colour with depth by {what}: {} has no partner", name(first)),
+                ));
+            }
+            log::warn!(
+                "{}: {} of {} frames have both colour and depth by {what}; the others are left out, such as that of {}",
+                dir.display(),
+                pairs.len(),
+                pairs.len() + alone.len(),
+                name(first)
+            );
+        }
+        let frames = pairs.into_iter().map(|(_, colour, depth)| (colour, depth)).collect();
+        Ok(Sequence { frames, unit })
+    }
+}
+
+/// Adds the file of `key`.
+///
+/// # Errors
+/// Returns an error if there is one already.
+fn add<K: Ord>(files: &mut BTreeMap<K, PathBuf>, key: K, path: PathBuf) -> Result<()> {
+    let Some(other) = files.insert(key, path.clone()) else {
+        return Ok(());
+    };
+    let other = other.file_name().unwrap_or_default().display().to_string();
+    Err(Error::file(
+        path,
+        format!("stands for the same picture as {other}; keep one of them, or give it a name of its own"),
+    ))
+}
+
+/// Returns the frames of a folder whose files are numbered.
+fn numbered(dir: &Path) -> Result<Sequence> {
+    let (mut colours, mut depths) = (BTreeMap::new(), BTreeMap::new());
+    for path in files_of(dir)? {
+        let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else {
+            continue;
+        };
+        let number =
+            |prefix: &str| -> Option<u64> { stem.strip_prefix(prefix)?.trim_start_matches(['_', '-']).parse().ok() };
+        let colour = ["color", "colour", "rgb"].into_iter().find_map(number);
+        if let Some(number) = colour.filter(|_| Shows::Colour.is_by(&path)) {
+            add(&mut colours, number, path)?;
+        } else if let Some(number) = number("depth").filter(|_| Shows::Depth.is_by(&path)) {
+            add(&mut depths, number, path)?;
+        }
+    }
+    if colours.is_empty() && depths.is_empty() {
+        return Err(Error::file(
+            dir,
+            "holds no frames; they are named color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …",
+        ));
+    }
+    join(colours, depths).sequence(dir, "number", None)
 }
 
 /// The text that a `*` stands for. Numbers sort before other text.
 type Key = (Option<u64>, String);
 
-fn matching(dir: &Path, pattern: &str) -> Result<BTreeMap<Key, PathBuf>> {
+fn matching(dir: &Path, pattern: &str, what: Shows) -> Result<BTreeMap<Key, PathBuf>> {
     let pattern_path = dir.join(pattern);
     let folder = pattern_path.parent().unwrap_or(dir);
     let name = pattern_path
@@ -147,10 +242,13 @@ fn matching(dir: &Path, pattern: &str) -> Result<BTreeMap<Key, PathBuf>> {
     let mut found = BTreeMap::new();
     for path in files_of(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let Some(key) = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after)) else {
-            continue;
-        };
-        found.insert((key.parse().ok(), key.to_owned()), path);
+        let key = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
+        // A pattern with an extension names its files; without one it also matches files of other kinds.
+        if let Some(key) = key
+            && (after.contains('.') || what.is_by(&path))
+        {
+            found.insert((key.parse().ok(), key.to_owned()), path);
+        }
     }
     Ok(found)
 }
@@ -158,7 +256,9 @@ fn matching(dir: &Path, pattern: &str) -> Result<BTreeMap<Key, PathBuf>> {
 fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
     let refuse = |e: std::io::Error| Error::file(dir, format!("cannot be read: {e}"));
     let entries = std::fs::read_dir(dir).map_err(refuse)?;
-    entries.map(|entry| entry.map(|e| e.path()).map_err(refuse)).collect()
+    let mut paths = (entries.map(|entry| entry.map(|e| e.path()).map_err(refuse))).collect::<Result<Vec<_>>>()?;
+    paths.sort(); // So that messages do not depend on the file system.
+    Ok(paths)
 }
 
 /// The pictures of two folders, paired by file name without extension, with numbers sorted numerically.
@@ -175,38 +275,23 @@ pub struct Named {
 /// # Errors
 /// Returns an error if a folder cannot be read or two of its files have the same name.
 pub fn by_name(colour: &Path, depth: &Path) -> Result<Named> {
-    let colours = images(colour)?;
-    let mut depths = images(depth)?;
-    let (mut pairs, mut alone) = (Vec::new(), Vec::new());
-    for (name, colour) in colours {
-        match depths.remove(&name) {
-            Some(depth) => pairs.push((name.text, colour, depth)),
-            None => alone.push(colour),
-        }
-    }
-    alone.extend(depths.into_values());
-    Ok(Named { pairs, alone })
+    let Joined { pairs, alone } = join(images(colour, Shows::Colour)?, images(depth, Shows::Depth)?);
+    let pairs = (pairs.into_iter()).map(|(name, colour, depth)| (name.text, colour, depth));
+    Ok(Named {
+        pairs: pairs.collect(),
+        alone,
+    })
 }
 
-/// Returns the pictures of a folder, keyed and sorted by name without extension.
+/// Returns the files of a folder that may show `what`, keyed and sorted by name without extension.
 ///
 /// # Errors
 /// Returns an error if the folder cannot be read or two files have the same name.
-pub fn images(dir: &Path) -> Result<BTreeMap<Name, PathBuf>> {
+pub fn images(dir: &Path, what: Shows) -> Result<BTreeMap<Name, PathBuf>> {
     let mut found = BTreeMap::new();
-    for path in files_of(dir)? {
-        let is_image = IMAGES.iter().any(|ending| output::has_extension(&path, ending));
+    for path in files_of(dir)?.into_iter().filter(|path| what.is_by(path)) {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        if !is_image || stem.starts_with('.') {
-            continue;
-        }
-        if let Some(other) = found.insert(Name::new(stem), path.clone()) {
-            let other = other.file_name().unwrap_or_default().display().to_string();
-            return Err(Error::file(
-                path,
-                format!("has the name of {other} but for the ending; each picture needs a name of its own"),
-            ));
-        }
+        add(&mut found, Name::new(stem), path)?;
     }
     Ok(found)
 }
@@ -245,39 +330,43 @@ impl Name {
         }
     }
 
-    /// Checks whether the name is a number, or a number and a time, as in Redwood's scans.
-    fn is_of_redwood(&self) -> bool {
+    /// Returns the number of a name that is a number, or a number and a time, as in Redwood's scans.
+    fn frame(&self) -> Option<&Part> {
         let (number, time) = self.text.split_once('-').unwrap_or((&self.text, "0"));
         let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-        digits(number) && digits(time)
+        self.parts.first().filter(|_| digits(number) && digits(time))
     }
 }
 
-/// Returns the frames of a colour folder and a depth folder.
-fn two_folders(colour: &Path, depth: &Path) -> Result<Sequence> {
-    let names = [images(colour)?, images(depth)?];
-    if names.iter().flat_map(BTreeMap::keys).all(Name::is_of_redwood) {
-        return redwood(colour, depth);
+/// Returns the frames of a colour folder and a depth folder of `dir`: a Redwood scan or a similar recording, whose file
+/// names begin with the frame's number, such as 0000012-000000366371.png, or files of equal names.
+fn two_folders(dir: &Path, colour: &Path, depth: &Path) -> Result<Sequence> {
+    let (colours, depths) = (images(colour, Shows::Colour)?, images(depth, Shows::Depth)?);
+    let Some(empty) = [(colour, &colours), (depth, &depths)]
+        .into_iter()
+        .find(|(_, files)| files.is_empty())
+    else {
+        let (Some(colours_by_number), Some(depths_by_number)) = (by_number(&colours)?, by_number(&depths)?) else {
+            return join(colours, depths).sequence(dir, "name", None);
+        };
+        // Millimetres are 16-bit numbers.
+        let first = depths_by_number.values().next();
+        let unit = first
+            .is_some_and(|path| depth_map::has_16_bits(path))
+            .then_some(DepthUnit::Millimetres);
+        return join(colours_by_number, depths_by_number).sequence(dir, "number", unit);
+    };
+    Err(Error::file(empty.0, "holds no pictures"))
+}
+
+/// Returns the files by the frame's number, or `None` if one has another name.
+fn by_number(files: &BTreeMap<Name, PathBuf>) -> Result<Option<BTreeMap<Part, PathBuf>>> {
+    let mut numbered = BTreeMap::new();
+    for (name, path) in files {
+        let Some(number) = name.frame() else { return Ok(None) };
+        add(&mut numbered, number.clone(), path.clone())?;
     }
-    let found = by_name(colour, depth)?;
-    if let Some(path) = found.alone.first() {
-        return Err(Error::file(
-            path,
-            format!(
-                "has no partner of the same name; {} and {} need equal names",
-                colour.display(),
-                depth.display()
-            ),
-        ));
-    }
-    Ok(Sequence {
-        frames: found
-            .pairs
-            .into_iter()
-            .map(|(_, colour, depth)| (colour, depth))
-            .collect(),
-        unit: None,
-    })
+    Ok(Some(numbered))
 }
 
 /// Reads a sequence of the TUM RGB-D benchmark and pairs each colour image with the depth image nearest in time.
@@ -285,21 +374,28 @@ fn tum(dir: &Path) -> Result<Sequence> {
     let colours = timed(dir, "rgb.txt")?;
     let depths = timed(dir, "depth.txt")?;
     let mut frames = Vec::new();
+    let mut least = f64::INFINITY;
     for (time, colour) in &colours {
-        let nearest = depths
-            .iter()
-            .min_by(|(a, _), (b, _)| (a - time).abs().total_cmp(&(b - time).abs()));
-        if let Some((at, depth)) = nearest
-            && (at - time).abs() <= TUM_APART_S
-        {
+        let apart = |at: f64| (at - time).abs();
+        let nearest = depths.iter().min_by(|(a, _), (b, _)| apart(*a).total_cmp(&apart(*b)));
+        let Some((at, depth)) = nearest else { continue };
+        least = least.min(apart(*at));
+        if apart(*at) <= TUM_APART_S {
             frames.push((colour.clone(), depth.clone()));
         }
     }
+    let (found, all) = (frames.len(), colours.len());
+    let reach = format!("of the {all} colour images of rgb.txt have a depth image within {TUM_APART_S} s");
     if frames.is_empty() {
-        return Err(Error::file(
-            dir,
-            "its rgb.txt and depth.txt have no images within 0.02 s of each other",
-        ));
+        let least = if least.is_finite() {
+            format!("; the nearest is {least:.3} s away")
+        } else {
+            String::new()
+        };
+        return Err(Error::file(dir, format!("none {reach}{least}")));
+    }
+    if found < all {
+        log::warn!("{}: {found} {reach}; the others are left out", dir.display());
     }
     Ok(Sequence {
         frames,
@@ -322,61 +418,10 @@ fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
             let (time, name) = line.split_once(char::is_whitespace).unwrap_or_default();
             match time.parse::<f64>() {
                 Ok(time) => Ok((time, dir.join(name.trim()))),
-                Err(_) => Err(Error::file(&path, format!("{line:?} is no time and a file\'s name"))),
+                Err(_) => Err(Error::file(&path, format!("{line:?} is no time and a file's name"))),
             }
         })
         .collect()
-}
-
-/// Reads a Redwood scan or a similar folder, whose file names begin with the frame's number, such as
-/// 0000012-000000366371.png. Files without a partner are skipped, because the depth of a scan may begin later than its
-/// colour.
-fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
-    let numbered = |dir: &Path| -> Result<BTreeMap<u64, PathBuf>> {
-        let mut found = BTreeMap::new();
-        for path in files_of(dir)? {
-            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let digits: String = stem.chars().take_while(char::is_ascii_digit).collect();
-            if let Ok(number) = digits.parse() {
-                found.insert(number, path);
-            }
-        }
-        Ok(found)
-    };
-    let colours = numbered(colour)?;
-    let mut depths = numbered(depth)?;
-    let images = colours.len().max(depths.len());
-    let frames: Vec<_> = (colours.into_iter())
-        .filter_map(|(number, colour)| Some((colour, depths.remove(&number)?)))
-        .collect();
-    if frames.is_empty() {
-        return Err(Error::file(
-            depth,
-            format!("holds no image of a number that {} has too", colour.display()),
-        ));
-    }
-    if frames.len() < images {
-        log::warn!(
-            "{}: {} of {images} frames have both images",
-            colour.display(),
-            frames.len()
-        );
-    }
-    // Depth in millimetres needs more than 8 bits.
-    let unit = (!has_bytes(&frames[0].1)).then_some(DepthUnit::Millimetres);
-    Ok(Sequence { frames, unit })
-}
-
-/// Checks whether a picture has 8 bits per channel.
-fn has_bytes(path: &Path) -> bool {
-    let decoder = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .ok()
-        .and_then(|reader| reader.into_decoder().ok());
-    decoder.is_some_and(|decoder| {
-        let color = decoder.color_type();
-        color.bytes_per_pixel() == color.channel_count()
-    })
 }
 
 #[cfg(test)]
@@ -426,21 +471,47 @@ mod tests {
         let dir = folder(&[
             ("rgb/0000001-000000000000.jpg", ""),
             ("rgb/0000002-000000033369.jpg", ""),
-            ("depth/0000002-000000040000.png", ""),
             ("depth/0000010-000000400000.png", ""),
         ]);
+        let words = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::new(2, 2);
+        words.save(dir.path().join("depth/0000002-000000040000.png")).unwrap();
         let found = of_folder(dir.path()).unwrap();
         let expected = [("0000002-000000033369.jpg", "0000002-000000040000.png")];
         assert_eq!(names(&found), pairs(&expected));
         assert_eq!(found.unit, Some(DepthUnit::Millimetres));
-        // An 8-bit picture cannot hold millimetres.
+        // 8-bit pictures and floating point hold no millimetres.
         let bytes = folder(&[("rgb/1.png", ""), ("depth/1.png", "")]);
         image::GrayImage::new(2, 2)
             .save(bytes.path().join("depth/1.png"))
             .unwrap();
         assert_eq!(of_folder(bytes.path()).unwrap().unit, None);
+        let floats = folder(&[("rgb/1.png", ""), ("depth/1.npy", "")]);
+        ndarray_npy::write_npy(floats.path().join("depth/1.npy"), &ndarray::Array2::<f32>::ones((2, 2))).unwrap();
+        assert_eq!(of_folder(floats.path()).unwrap().unit, None);
         let none = folder(&[("image/1.jpg", ""), ("depth/2.png", "")]);
-        assert!(of_folder(none.path()).unwrap_err().to_string().contains("no image"));
+        assert!(
+            of_folder(none.path())
+                .unwrap_err()
+                .to_string()
+                .contains("1.jpg has no partner")
+        );
+    }
+
+    #[test]
+    fn frames_of_a_folder_are_paired_in_the_order_of_their_numbers() {
+        let dir = folder(&[("notes.txt", "")]);
+        assert!(of_folder(dir.path()).unwrap_err().to_string().contains("no frames"));
+        for name in [
+            "color_10.jpg",
+            "depth_10.png",
+            "rgb_2.png",
+            "depth_0002.npy",
+            "depth_11.png",
+        ] {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        let expected = [("rgb_2.png", "depth_0002.npy"), ("color_10.jpg", "depth_10.png")];
+        assert_eq!(names(&of_folder(dir.path()).unwrap()), pairs(&expected));
     }
 
     #[test]
@@ -459,7 +530,8 @@ mod tests {
         assert!(refused("left_rgb.png", "z/left_*.png").contains("one *"));
         assert!(refused("no_*", "not_*").contains("no files"));
         std::fs::write(dir.path().join("left_11_rgb.png"), "").unwrap();
-        assert!(refused("left_*_rgb.png", "z/left_*.png").contains("left_11_rgb.png"));
+        let found = by_pattern(dir.path(), "left_*_rgb.png", "z/left_*.png").unwrap();
+        assert_eq!(names(&found), pairs(&expected), "the frame without depth is left out");
     }
 
     #[test]
@@ -476,8 +548,8 @@ mod tests {
         let turned = by_pattern(dir.path(), "left_*_z.png", "left_*.png").unwrap();
         assert_eq!(names(&turned), pairs(&expected.map(|(a, b)| (b, a))));
         std::fs::remove_file(dir.path().join("left_2_z.png")).unwrap();
-        let refused = by_pattern(dir.path(), "left_*.png", "left_*_z.png").unwrap_err();
-        assert!(refused.to_string().contains("left_2.png"));
+        let found = by_pattern(dir.path(), "left_*.png", "left_*_z.png").unwrap();
+        assert_eq!(names(&found), pairs(&expected[..1]));
     }
 
     #[test]
@@ -504,9 +576,12 @@ mod tests {
         let expected = [("cat 9.png", "cat 9.npy"), ("cat 10.jpg", "cat 10.png")];
         assert_eq!((names(&found), found.unit), (pairs(&expected), None));
         std::fs::write(dir.path().join("depth/dog.png"), "").unwrap();
-        let refused = || of_folder(dir.path()).unwrap_err().to_string();
-        assert!(refused().contains("dog.png") && refused().contains("no partner"));
+        assert_eq!(names(&of_folder(dir.path()).unwrap()), pairs(&expected));
         std::fs::write(dir.path().join("rgb/cat 9.jpg"), "").unwrap();
-        assert!(refused().contains("cat 9") && refused().contains("a name of its own"));
+        let refused = of_folder(dir.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains("cat 9.jpg") && refused.contains("cat 9.png"),
+            "{refused}"
+        );
     }
 }

@@ -1,15 +1,13 @@
 //! RGB-D video: frames from a folder or a pipe, in place of a camera.
 
 use crate::fingerprint::Fingerprint;
-use crate::input::decode::{self, Reading};
-use crate::picture::depth_map;
-use crate::{Error, Result, frame};
+use crate::frame::{self, DepthOptions, Doubt, Stored};
+use crate::{Error, Result};
 use ndarray::Array2;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront_core::depth::DepthUnit;
-use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// One frame in memory: colour as rows of RGB bytes, and depth unless a network estimates it.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +23,14 @@ struct VideoDepth {
     bytes: Vec<u8>,
     shape: (usize, usize),
     format: DepthFormat,
+}
+
+impl VideoDepth {
+    /// Returns the readings: normalized, or in metres with NaN for none.
+    fn readings(&self) -> impl Iterator<Item = f32> {
+        let pixels = self.bytes.chunks_exact(self.format.pixel_bytes());
+        pixels.map(|pixel| self.format.reading(pixel).0)
+    }
 }
 
 impl VideoFrame {
@@ -71,30 +77,29 @@ impl VideoFrame {
         }
     }
 
-    /// Creates a frame from a picture of (H, W) RGB bytes with colour in its left half and normalized depth in its
-    /// right half.
+    /// Creates a frame from a picture of (H, W) RGB bytes with colour at its left and normalized grey depth at its right,
+    /// each `side` columns wide.
     ///
     /// # Errors
-    /// Returns an error if the picture cannot be split into two equal halves.
-    pub fn of_halves((height, width): (usize, usize), picture: &[u8]) -> Result<Self> {
-        let half = width / 2;
-        if half == 0 || width % 2 == 1 {
+    /// Returns an error if the picture is narrower.
+    pub fn of_sides((height, width): (usize, usize), picture: &[u8], side: usize) -> Result<Self> {
+        let Some(right) = width.checked_sub(side).filter(|right| *right >= side) else {
             return Err(Error::Input(format!(
-                "a picture of {width}×{height} has no two halves for colour and depth beside it"
+                "a picture of {width}×{height} has no two sides of {side} columns"
             )));
-        }
+        };
         let rows = || picture.chunks_exact(3 * width);
-        let colour = rows().flat_map(|row| &row[..3 * half]).copied().collect();
-        let depth = rows().flat_map(|row| row[3 * half..].as_chunks::<3>().0).map(|pixel| {
+        let colour = rows().flat_map(|row| &row[..3 * side]).copied().collect();
+        let depth = rows().flat_map(|row| row[3 * right..].as_chunks::<3>().0).map(|pixel| {
             let sum: u32 = pixel.iter().map(|v| u32::from(*v)).sum();
             (sum * 65535 / (3 * 255)) as u16
         });
         Ok(VideoFrame {
             colour,
-            colour_shape: (height, half),
+            colour_shape: (height, side),
             depth: Some(VideoDepth {
                 bytes: depth.flat_map(u16::to_le_bytes).collect(),
-                shape: (height, half),
+                shape: (height, side),
                 format: DepthFormat::NormalizedU16,
             }),
         })
@@ -125,14 +130,25 @@ impl VideoFrame {
         }
     }
 
-    /// Returns the fraction of depth readings that are nearer than `near_m` or farther than `far_m`.
+    /// Checks that colour and depth show the same field of view, and returns the reason to doubt normalized depth, if
+    /// there is one. `inverted` tells that 0 is the farthest.
+    ///
+    /// # Errors
+    /// Returns an error if their aspect ratios differ.
+    pub fn check(&self, inverted: bool) -> Result<Option<Doubt>> {
+        let Some(depth) = &self.depth else { return Ok(None) };
+        frame::check_aspect(depth.shape, self.colour_shape).map_err(Error::Input)?;
+        let normalized = depth.format == DepthFormat::NormalizedU16;
+        Ok(normalized
+            .then(|| Doubt::of_normalized(depth.readings(), inverted))
+            .flatten())
+    }
+
+    /// Returns the share of depth readings that are nearer than `near_m` or farther than `far_m`.
     pub fn beyond(&self, near_m: f32, far_m: f32) -> f64 {
-        let Some(VideoDepth { bytes, format, .. }) = &self.depth else {
-            return 0.0;
-        };
-        let metres = bytes.chunks_exact(format.pixel_bytes());
         let (mut all, mut beyond) = (0usize, 0usize);
-        for metres in metres.map(|pixel| format.reading(pixel).0).filter(|m| !m.is_nan()) {
+        let readings = self.depth.iter().flat_map(VideoDepth::readings);
+        for metres in readings.filter(|m| !m.is_nan()) {
             all += 1;
             beyond += usize::from(!(near_m..=far_m).contains(&metres));
         }
@@ -158,69 +174,33 @@ impl VideoFrame {
     }
 }
 
-/// Returns the colour and depth files of a folder, sorted by their numbers. `color_7.jpg` or `rgb_007.png` belongs to
-/// `depth_7.png` or `depth_007.npy`.
+/// Reads the files of a frame, with the checks of a still ([`frame::read`]). `told` takes what is doubtful about them.
 ///
 /// # Errors
-/// Returns an error if the folder cannot be read or has no frames, or if a file has no partner.
-pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
-    let mut colours = BTreeMap::new();
-    let mut depths = BTreeMap::new();
-    let entries = std::fs::read_dir(dir).map_err(|e| Error::file(dir, e))?;
-    for entry in entries {
-        let path = entry.map_err(|e| Error::file(dir, e))?.path();
-        let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else {
-            continue;
-        };
-        let number =
-            |prefix: &str| -> Option<u64> { stem.strip_prefix(prefix)?.trim_start_matches(['_', '-']).parse().ok() };
-        if let Some(number) = ["color", "colour", "rgb"].into_iter().find_map(number) {
-            colours.insert(number, path);
-        } else if let Some(number) = number("depth") {
-            depths.insert(number, path);
-        }
-    }
-    let alone = (colours.iter().find(|(number, _)| !depths.contains_key(number)))
-        .or_else(|| depths.iter().find(|(number, _)| !colours.contains_key(number)));
-    if let Some((number, path)) = alone {
-        return Err(Error::file(
-            path,
-            format!("has no partner; frame {number} needs both a color_{number} and a depth_{number}"),
-        ));
-    }
-    if colours.is_empty() {
-        return Err(Error::file(
-            dir,
-            "holds no frames; they are named color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …",
-        ));
-    }
-    Ok(colours.into_values().zip(depths.into_values()).collect())
-}
-
-/// Reads the files of a frame.
-///
-/// # Errors
-/// Returns an error if a file cannot be read.
-pub fn read_frame(colour: &Path, depth: &Path, unit: DepthUnit) -> Result<VideoFrame> {
-    let (image, orientation) = decode::open_picture(colour, Reading::UPRIGHT)?;
+/// Returns an error if a file cannot be read, if the files do not match, or if a pixel has no normalized depth.
+pub fn read_frame(
+    colour: &Path,
+    depth: &Path,
+    options: DepthOptions,
+    told: &mut dyn FnMut(Doubt),
+) -> Result<VideoFrame> {
+    let Stored { image, readings } = frame::stored(colour, depth, options, told)?;
     let colour_shape = (image.height() as usize, image.width() as usize);
-    let bytes = image.into_rgb8().into_raw();
-    let normalized = unit == DepthUnit::Normalized;
-    let file = depth_map::read(depth, normalized)?;
-    frame::is_turned_alone(depth, &file, orientation, colour_shape)?;
-    let readings = file.depth;
-    if normalized && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d)) {
+    let unit = options.unit;
+    if unit == DepthUnit::Normalized
+        && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d))
+    {
         return Err(Error::file(
             depth,
             format!("holds {bad}; normalized depth of video must lie in 0..=1"),
         ));
     }
-    let (format, depth_bytes) = depth_bytes(&readings, unit);
+    let (format, bytes) = depth_bytes(&readings, unit);
     Ok(VideoFrame {
-        colour: bytes,
+        colour: image.into_rgb8().into_raw(),
         colour_shape,
         depth: Some(VideoDepth {
-            bytes: depth_bytes,
+            bytes,
             shape: readings.dim(),
             format,
         }),
@@ -327,29 +307,6 @@ fn fill(from: &mut dyn Read, bytes: &mut [u8]) -> Result<usize> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-
-    #[test]
-    fn frames_of_a_folder_are_paired_in_the_order_of_their_numbers() {
-        let dir = tempfile::tempdir().unwrap();
-        let touch = |name: &str| std::fs::write(dir.path().join(name), "").unwrap();
-        let refused = || frames_of_folder(dir.path()).unwrap_err().to_string();
-        assert!(refused().contains("no frames"));
-        for name in [
-            "color_10.jpg",
-            "depth_10.png",
-            "rgb_2.png",
-            "depth_0002.npy",
-            "notes.txt",
-        ] {
-            touch(name);
-        }
-        let frames = frames_of_folder(dir.path()).unwrap();
-        let names: Vec<_> = frames.iter().map(|(c, d)| (c.file_name(), d.file_name())).collect();
-        assert_eq!(names[0], (Some("rgb_2.png".as_ref()), Some("depth_0002.npy".as_ref())));
-        assert_eq!(names[1], (Some("color_10.jpg".as_ref()), Some("depth_10.png".as_ref())));
-        touch("depth_11.png");
-        assert!(refused().contains("depth_11.png") && refused().contains("no partner"));
-    }
 
     #[test]
     fn raw_video_is_cut_into_frames_and_a_cut_frame_is_named() {

@@ -275,6 +275,12 @@ pub fn declare(path: &Path, display: &DisplayFile) -> Result<()> {
         Packing::Images(layout) => layout.images(display.device.display.colours()),
         _ => 1,
     };
+    if count > 1 && output::is_stdout(path) {
+        return Err(Error::file(
+            path,
+            format!("is stdout, which takes one file; the modulator takes {count} images"),
+        ));
+    }
     paths(path, count)
         .iter()
         .try_for_each(|path| output::file(path, &["png"]))

@@ -30,31 +30,7 @@ pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 
 /// Reads a depth map as [`read_depth`] does, and its orientation.
 pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
-    let refuse = |why: String| Error::file(path, why);
-    let mut file = input::open(path, MOST_PICTURE)?;
-    let head = (file.fill_buf()).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-    let is_npy = head.starts_with(b"\x93NUMPY") || has_extension(path, "npy");
-    let (is_npz, is_anymap) = (head.starts_with(b"PK\x03\x04"), anymap::is(head));
-    let upright = |plane: Plane| (plane, Orientation::NoTransforms);
-    let (plane, orientation) = if is_npy {
-        npy::read_plane(npy::open(path)?).map(upright).map_err(refuse)?
-    } else if is_npz {
-        npz::read_plane(&input::bytes(path, MOST_ARRAY)?)
-            .map(upright)
-            .map_err(refuse)?
-    } else if is_anymap {
-        anymap::read_plane(&input::bytes(path, MOST_ARRAY)?)
-            .map(upright)
-            .map_err(refuse)?
-    } else {
-        let decoded = decode::decode(file, Reading::UPRIGHT).map_err(refuse)?;
-        let plane = match decoded.pixels {
-            Pixels::Plane(plane) => plane,
-            Pixels::Image(image) => of_image(image).map_err(refuse)?,
-        };
-        (plane, decoded.orientation)
-    };
-    let Plane { mut values, numbers } = plane;
+    let (Plane { mut values, numbers }, orientation) = plane(path)?;
     match numbers {
         Numbers::Integers { most } if normalized => values.mapv_inplace(|v| v / most),
         _ if normalized => {}
@@ -64,6 +40,36 @@ pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
         depth: values,
         orientation,
     })
+}
+
+/// Checks whether a depth map has whole numbers of 16 bits.
+pub(crate) fn has_16_bits(path: &Path) -> bool {
+    let words = f32::from(u16::MAX);
+    plane(path).is_ok_and(|(plane, _)| matches!(plane.numbers, Numbers::Integers { most } if most == words))
+}
+
+/// Reads a depth map as its file has it, and its orientation.
+fn plane(path: &Path) -> Result<(Plane, Orientation)> {
+    let refuse = |why: String| Error::file(path, why);
+    let mut file = input::open(path, MOST_PICTURE)?;
+    let head = (file.fill_buf()).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let is_npy = head.starts_with(b"\x93NUMPY") || has_extension(path, "npy");
+    let (is_npz, is_anymap) = (head.starts_with(b"PK\x03\x04"), anymap::is(head));
+    let plane = if is_npy {
+        npy::read_plane(npy::open(path)?)
+    } else if is_npz {
+        npz::read_plane(&input::bytes(path, MOST_ARRAY)?)
+    } else if is_anymap {
+        anymap::read_plane(&input::bytes(path, MOST_ARRAY)?)
+    } else {
+        let decoded = decode::decode(file, Reading::UPRIGHT).map_err(refuse)?;
+        let plane = match decoded.pixels {
+            Pixels::Plane(plane) => plane,
+            Pixels::Image(image) => of_image(image).map_err(refuse)?,
+        };
+        return Ok((plane, decoded.orientation));
+    };
+    Ok((plane.map_err(refuse)?, Orientation::NoTransforms))
 }
 
 fn of_image(image: DynamicImage) -> std::result::Result<Plane, String> {

@@ -69,7 +69,7 @@ pub fn moves(path: &Path) -> bool {
 /// Returns an error if the extension is another or the file cannot be written.
 pub fn write(path: &Path, picture: &RgbImage) -> Result<()> {
     let is = |extension| output::has_extension(path, extension);
-    if is("png") {
+    if is("png") || output::is_stdout(path) {
         return picture::write_rgb(path, picture);
     }
     if is("webp") {

@@ -48,7 +48,7 @@ pub(crate) struct Dataset {
     #[command(flatten)]
     display: DisplayFlags,
     /// Folder of the data set
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct Occlusion {
     display: DisplayFlags,
     /// Folder for comparison.png (settings 1 to 6 from left to right, front focus above rear focus) and
     /// each view as setting_1_front.png …
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct Scene {
     #[arg(long)]
     gpu: bool,
     /// Folder of the layered depth image: layer_0.png, depth_0.png, layer_1.png …
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: OverwriteFlag,

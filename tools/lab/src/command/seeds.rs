@@ -27,7 +27,7 @@ pub(crate) struct Seeds {
     #[arg(long, value_name = "N", default_value_t = 0)]
     refined: usize,
     /// Folder of the depths; the command writes the fields there too
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 

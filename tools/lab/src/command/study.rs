@@ -58,7 +58,7 @@ pub(crate) struct Study {
     #[command(flatten)]
     display: DisplayFlags,
     /// Folder for the results: NAME.json, NAME.svg for layers, planes and sweep, and slopes.png
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 

@@ -46,7 +46,7 @@ pub(crate) struct Aberration {
     #[command(flatten)]
     pub(super) display: DisplayFlags,
     /// Output coefficients: `aberration` of a display file
-    #[arg(short, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml")]
     pub(super) output: PathBuf,
     #[command(flatten)]
     pub(super) overwrite: OverwriteFlag,

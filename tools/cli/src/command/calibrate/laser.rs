@@ -38,7 +38,7 @@ pub(crate) struct Laser {
     #[command(flatten)]
     pub(super) display: DisplayFlags,
     /// Output map: `laser` of a display file
-    #[arg(short, value_name = "OUT.png")]
+    #[arg(short, long, value_name = "OUT.png")]
     pub(super) output: PathBuf,
     #[command(flatten)]
     pub(super) overwrite: OverwriteFlag,

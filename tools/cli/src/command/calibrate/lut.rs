@@ -41,7 +41,7 @@ pub(crate) struct Lut {
     #[arg(long, value_name = "DIR", group = "step", requires = "output")]
     pub(super) captures: Option<PathBuf>,
     /// Output table for a phone: `per_pixel` of a display file
-    #[arg(short, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// Also write the full tables to this folder: full_red.npy …, uint8 (H, W, 256)
     #[arg(long, value_name = "DIR", requires = "captures")]

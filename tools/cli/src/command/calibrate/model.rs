@@ -45,7 +45,7 @@ pub(crate) struct LearnModel {
     #[command(flatten)]
     pub(super) display: DisplayFlags,
     /// Output model: `model` of a display file
-    #[arg(short, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
     #[command(flatten)]
     pub(super) overwrite: OverwriteFlag,

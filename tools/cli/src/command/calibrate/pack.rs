@@ -15,7 +15,7 @@ pub(crate) struct Pack {
     #[command(flatten)]
     display: DisplayFlags,
     /// Output file for the app
-    #[arg(short, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: OverwriteFlag,

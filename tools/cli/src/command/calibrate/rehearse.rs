@@ -39,7 +39,7 @@ pub(crate) struct Rehearse {
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(4..=1000))]
     learn: Vec<u16>,
     /// Output folder
-    #[arg(short, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
     overwrite: OverwriteFlag,

@@ -4,6 +4,7 @@
 use crate::flags::frame::Picture;
 use crate::make::{HologramRequest, infos};
 use crate::record::{Before, Claim, RunRecord};
+use phasefront_command::interrupt;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::{Error, Result, hologram, input, output};
@@ -21,6 +22,7 @@ pub(super) fn run(
     pictures: Vec<Picture>,
     output: &Path,
     before: Before,
+    mut record: RunRecord,
     json: bool,
 ) -> Result<()> {
     if output::has_extension(output, "png") {
@@ -34,10 +36,13 @@ pub(super) fn run(
     }
     output::folder(output, before.holding())?;
     let display = request.display()?;
-    let mut record = RunRecord::new("hologram");
-    request.record(&display.target.display, &mut record)?;
+    record.display(request.display.name(), &display.target.display)?;
     let names: BTreeSet<_> = pictures.iter().map(|picture| format!("{}.png", picture.name)).collect();
     let claim = Claim::new(output, &record, before, |name| names.contains(name))?;
+    interrupt::advise(format!(
+        "{} keeps the holograms that are made; the same command with --resume makes the others",
+        output.display()
+    ));
     let start = Instant::now();
     let (mut made, mut kept, mut failed) = (0, 0, Vec::new());
     let bar = progress_bar(pictures.len() as u64, "pictures");

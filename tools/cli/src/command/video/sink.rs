@@ -4,6 +4,7 @@ use crate::record::{Before, Claim, RunRecord, already, names_of};
 use ndarray::Array3;
 use phasefront::Hologram;
 use phasefront::output::Layout;
+use phasefront_command::interrupt;
 use phasefront_io::film::video::VideoFrame;
 use phasefront_io::film::{self, Quality};
 use phasefront_io::hologram::{self, HologramInfo, Levels};
@@ -76,6 +77,19 @@ impl Sink {
             claim,
             scales: Vec::new(),
         })
+    }
+
+    /// Prepares for interrupts. A `live` run cannot be resumed.
+    pub(super) fn expect_interrupts(&self, live: bool) {
+        let Some(folder) = self.folder.as_deref().map(Path::display) else {
+            return;
+        };
+        interrupt::advise(match live {
+            true => format!("{folder} keeps the frames that are made"),
+            false => {
+                format!("{folder} keeps the frames that are made; the same command with --resume makes the others")
+            }
+        });
     }
 
     /// Checks whether frames of an earlier run may exist.

@@ -6,10 +6,13 @@ use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{progress_bar, progress_count};
 use phasefront_core::depth::DepthUnit;
 use phasefront_io::film::sequence::{self, Sequence};
+use phasefront_io::film::survey::{self, Sides};
 use phasefront_io::film::video::{self, RawVideo, VideoFrame};
-use phasefront_io::film::{self, Film, Pixels};
-use phasefront_io::{Error, Result, frame, output};
+use phasefront_io::film::{self, About, Film, Pixels};
+use phasefront_io::frame::{DepthOptions, Doubt};
+use phasefront_io::{Error, Result, output};
 use std::collections::BTreeSet;
+use std::mem::{Discriminant, discriminant};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,46 +29,69 @@ pub(super) struct Source {
     given: usize,
     /// Fixed near and far, in metres.
     range_m: Option<(f32, f32)>,
+    /// The kinds of doubts that were told of: one warning each, however many frames there are.
+    told: Vec<Discriminant<Doubt>>,
 }
 
 enum Input {
     Folder(Folder),
     Film(Box<FilmSource>),
-    Pipe { raw: RawVideo, first: Option<VideoFrame> },
+    Pipe { raw: RawVideo, first: Option<Read> },
+}
+
+/// A frame, and what is doubtful about it.
+#[derive(Clone)]
+struct Read {
+    frame: Arc<VideoFrame>,
+    doubts: Vec<Doubt>,
+}
+
+impl Read {
+    /// Checks a frame that is no file of its own, and swaps its near and far if it is `inverted`.
+    fn checked(mut frame: VideoFrame, inverted: bool) -> Result<Self> {
+        let doubts = frame.check(inverted)?.into_iter().collect();
+        if inverted && frame.depth_shape().is_some() {
+            frame.invert()?;
+        }
+        Ok(Read {
+            frame: Arc::new(frame),
+            doubts,
+        })
+    }
 }
 
 struct Folder {
     paths: Vec<(PathBuf, PathBuf)>,
-    unit: DepthUnit,
-    invert: bool,
+    depth: DepthOptions,
     /// The frames that were read, if they are shown again.
-    kept: Vec<Arc<VideoFrame>>,
+    kept: Vec<Read>,
     next: usize,
     total: usize,
 }
 
 struct FilmSource {
+    path: PathBuf,
     colour: Film,
     depth: FilmDepth,
-    unit: DepthUnit,
-    invert: bool,
-    first: Option<VideoFrame>,
-    frames: Option<u64>,
+    numbers: DepthOptions,
+    first: Option<Read>,
+    about: Option<About>,
 }
 
 /// The place of a film's depth.
 enum FilmDepth {
     /// A film of its own.
     Film(Film),
-    /// The right half of the pictures.
-    Beside,
+    /// The right side of the pictures.
+    Beside(Sides),
     /// The session's depth network.
     Network,
 }
 
 impl Source {
-    /// Opens the source that `flags` name, and returns it with the (H, W) of its first frame.
-    pub(super) fn open(flags: &Video) -> Result<(Source, (usize, usize))> {
+    /// Opens the source that `flags` name, and returns it with the (H, W) of its first frame. Completes the flags by
+    /// what a folder's layout defines.
+    pub(super) fn open(flags: &mut Video) -> Result<(Source, (usize, usize))> {
         let (input, shape) = Input::open(flags)?;
         let source = Source {
             input,
@@ -73,6 +99,7 @@ impl Source {
             shapes: None,
             given: 0,
             range_m: flags.depth.range()?,
+            told: Vec::new(),
         };
         Ok((source, shape))
     }
@@ -82,7 +109,7 @@ impl Source {
     /// # Errors
     /// Returns an error if a frame cannot be read or has another size than the frames before it.
     pub(super) fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
-        let Some(frame) = self.input.next()? else {
+        let Some(Read { frame, mut doubts }) = self.input.next()? else {
             return Ok(None);
         };
         let shapes = (frame.shape(), frame.depth_shape());
@@ -100,13 +127,13 @@ impl Source {
             )));
         }
         if let Some((near_m, far_m)) = self.range_m.filter(|_| self.given == 0) {
-            let beyond = frame.beyond(near_m, far_m);
-            if beyond > frame::DOUBTFULLY_CLIPPED {
-                log::warn!(
-                    "{}: {:.0} % of the depth lies before near {near_m} m or beyond far {far_m} m and is shown there; both are metres",
-                    self.name(0),
-                    100.0 * beyond
-                );
+            doubts.extend(Doubt::of_clipped(frame.beyond(near_m, far_m), near_m, far_m));
+        }
+        for doubt in doubts {
+            let kind = discriminant(&doubt);
+            if !self.told.contains(&kind) {
+                self.told.push(kind);
+                log::warn!("{}: {doubt}", self.name(self.given));
             }
         }
         self.given += 1;
@@ -124,6 +151,14 @@ impl Source {
         }
     }
 
+    /// Returns the frames per second of a film.
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        match &self.input {
+            Input::Film(film) => film.about.map(|about| about.rate_hz),
+            _ => None,
+        }
+    }
+
     /// Checks whether frames are available before they are due.
     pub(super) fn is_stored(&self) -> bool {
         !matches!(self.input, Input::Pipe { .. })
@@ -132,7 +167,7 @@ impl Source {
     pub(super) fn progress(&self) -> ProgressBar {
         let frames = match &self.input {
             Input::Folder(folder) => Some(folder.total as u64),
-            Input::Film(film) => film.frames,
+            Input::Film(film) => film.about.map(|about| about.frames),
             Input::Pipe { .. } => None,
         };
         match frames {
@@ -143,8 +178,8 @@ impl Source {
 }
 
 impl Input {
-    fn open(flags: &Video) -> Result<(Input, (usize, usize))> {
-        let unit = flags.depth.options()?.unit;
+    fn open(flags: &mut Video) -> Result<(Input, (usize, usize))> {
+        let numbers = flags.depth.options(flags.seen.invert())?;
         let is_pipe = flags.input.as_os_str() == "-";
         let is_film = !is_pipe && film::is_film(&flags.input);
         let is_folder = !is_pipe && !is_film;
@@ -152,94 +187,98 @@ impl Input {
         check_used(&[
             ("--pairs", flags.pairs.is_some(), is_folder, "a folder"),
             ("--repeat", flags.repeat > 1, is_folder, "a folder"),
-            ("--invert", flags.seen.invert(), !is_pipe, "a folder or a film"),
+            ("--invert", numbers.inverted, !is_pipe, "a folder or a film"),
             ("--depth-video", flags.depth_video.is_some(), is_film, a_film),
             ("--depth-beside", flags.depth_beside, is_film, a_film),
             ("--depth-network", flags.seen.network().is_some(), is_film, a_film),
         ])?;
         if is_pipe {
-            check_range(flags, unit)?;
-            return open_pipe(flags, unit);
+            check_range(flags, numbers)?;
+            return open_pipe(flags, numbers);
         }
         if flags.raw.is_some() {
             return Err(Error::Input("--raw is for frames on stdin; give - as input".into()));
         }
-        if is_film {
-            return open_film(flags, unit);
+        match is_film {
+            true => open_film(flags, numbers),
+            false => open_folder(flags),
         }
-        let Sequence {
-            frames: paths,
-            unit: said,
-        } = match &flags.pairs {
-            None => sequence::of_folder(&flags.input)?,
-            Some(pattern) => {
-                let (colour, depth) = pattern.split_once(',').ok_or_else(|| {
-                    Error::Input("--pairs takes two patterns with a comma between, as rgb_*.png,depth_*.png".into())
-                })?;
-                sequence::by_pattern(&flags.input, colour, depth)?
-            }
-        };
-        // Layouts that define their unit never hold normalized depth.
-        let unit = said.filter(|_| unit == DepthUnit::Normalized).unwrap_or(unit);
-        check_range(flags, unit)?;
-        let folders: BTreeSet<_> = (paths.iter())
-            .flat_map(|(colour, depth)| [colour.parent(), depth.parent()])
-            .flatten()
-            .collect();
-        for folder in folders {
-            output::reading(folder)?;
-        }
-        let shape = video::read_frame(&paths[0].0, &paths[0].1, unit)?.shape();
-        let total = paths.len() * flags.repeat as usize;
-        let folder = Folder {
-            paths,
-            unit,
-            invert: flags.seen.invert(),
-            kept: Vec::new(),
-            next: 0,
-            total,
-        };
-        Ok((Input::Folder(folder), shape))
     }
 
-    fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
+    fn next(&mut self) -> Result<Option<Read>> {
         match self {
             Input::Pipe { raw, first } => match first.take() {
-                Some(frame) => Ok(Some(Arc::new(frame))),
-                None => Ok(raw.read(&mut std::io::stdin().lock())?.map(Arc::new)),
+                Some(read) => Ok(Some(read)),
+                None => read_raw(raw),
             },
-            Input::Film(film) => Ok(film.next()?.map(Arc::new)),
+            Input::Film(film) => film.next(),
             Input::Folder(folder) => folder.next(),
         }
     }
 }
 
+fn open_folder(flags: &mut Video) -> Result<(Input, (usize, usize))> {
+    let Sequence { frames: paths, unit } = match &flags.pairs {
+        None => sequence::of_folder(&flags.input)?,
+        Some(pattern) => {
+            let (colour, depth) = pattern.split_once(',').ok_or_else(|| {
+                Error::Input("--pairs takes two patterns with a comma between, as rgb_*.png,depth_*.png".into())
+            })?;
+            sequence::by_pattern(&flags.input, colour, depth)?
+        }
+    };
+    flags.depth.take_layout(unit);
+    let depth = flags.depth.options(flags.seen.invert())?;
+    check_range(flags, depth)?;
+    let folders: BTreeSet<_> = (paths.iter())
+        .flat_map(|(colour, depth)| [colour.parent(), depth.parent()])
+        .flatten()
+        .collect();
+    for folder in folders {
+        output::reading(folder)?;
+    }
+    let shape = video::read_frame(&paths[0].0, &paths[0].1, depth, &mut |_| ())?.shape();
+    let total = paths.len() * flags.repeat as usize;
+    let folder = Folder {
+        paths,
+        depth,
+        kept: Vec::new(),
+        next: 0,
+        total,
+    };
+    Ok((Input::Folder(folder), shape))
+}
+
 impl Folder {
-    fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
+    fn next(&mut self) -> Result<Option<Read>> {
         if self.next == self.total {
             return Ok(None);
         }
         let at = self.next % self.paths.len();
         self.next += 1;
-        if let Some(frame) = self.kept.get(at) {
-            return Ok(Some(frame.clone()));
+        if let Some(read) = self.kept.get(at) {
+            return Ok(Some(read.clone()));
         }
         let (colour, depth) = &self.paths[at];
-        let mut frame = video::read_frame(colour, depth, self.unit)?;
-        if self.invert {
+        let mut doubts = Vec::new();
+        let mut frame = video::read_frame(colour, depth, self.depth, &mut |doubt| doubts.push(doubt))?;
+        if self.depth.inverted {
             frame.invert().map_err(|e| Error::file(depth, e))?;
         }
-        let frame = Arc::new(frame);
+        let read = Read {
+            frame: Arc::new(frame),
+            doubts,
+        };
         if self.total > self.paths.len() {
-            self.kept.push(frame.clone());
+            self.kept.push(read.clone());
         }
-        Ok(Some(frame))
+        Ok(Some(read))
     }
 }
 
-/// Refuses near and far if depth of `unit` has no metres.
-fn check_range(flags: &Video, unit: DepthUnit) -> Result<()> {
-    if flags.depth.range()?.is_some() && unit == DepthUnit::Normalized {
+/// Refuses near and far if depth has no metres.
+fn check_range(flags: &Video, numbers: DepthOptions) -> Result<()> {
+    if flags.depth.range()?.is_some() && numbers.unit == DepthUnit::Normalized {
         Err(Error::Input(
             "--near and --far are metres and normalized depth has no unit; leave them out, or name the unit by --depth-unit"
                 .into(),
@@ -249,7 +288,7 @@ fn check_range(flags: &Video, unit: DepthUnit) -> Result<()> {
     }
 }
 
-fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> {
+fn open_pipe(flags: &Video, numbers: DepthOptions) -> Result<(Input, (usize, usize))> {
     let Some((width, height)) = flags.raw else {
         return Err(Error::Input(
             "raw frames on stdin need --raw WxH, the size of their colour".into(),
@@ -259,23 +298,39 @@ fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> 
     let raw = RawVideo {
         colour: (height, width),
         depth: (depth_height, depth_width),
-        unit,
+        unit: numbers.unit,
     };
-    let first = raw.read(&mut std::io::stdin().lock())?;
+    let first = read_raw(&raw)?;
     if first.is_none() {
         return Err(Error::Input("stdin holds no frame".into()));
     }
     Ok((Input::Pipe { raw, first }, (height, width)))
 }
 
-fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> {
+fn read_raw(raw: &RawVideo) -> Result<Option<Read>> {
+    let frame = raw.read(&mut std::io::stdin().lock())?;
+    frame.map(|frame| Read::checked(frame, false)).transpose()
+}
+
+fn open_film(flags: &Video, numbers: DepthOptions) -> Result<(Input, (usize, usize))> {
     let path = &flags.input;
     let depth = match (&flags.depth_video, flags.depth_beside, flags.seen.network()) {
         (Some(depth), false, None) => {
-            check_range(flags, unit)?;
-            FilmDepth::Film(Film::open(depth, Pixels::Grey)?)
+            check_range(flags, numbers)?;
+            survey::check_grey(depth)?;
+            FilmDepth::Film(Film::open(depth, Pixels::Grey, None)?)
         }
-        (None, true, None) => FilmDepth::Beside,
+        (None, true, None) => {
+            let sides = survey::sides(path)?;
+            if sides.margin() > 0 {
+                log::warn!(
+                    "{}: the {} columns of one colour between colour and depth are left out",
+                    path.display(),
+                    sides.margin()
+                );
+            }
+            FilmDepth::Beside(sides)
+        }
         (None, false, Some(_)) => FilmDepth::Network,
         _ => {
             return Err(Error::file(
@@ -284,32 +339,33 @@ fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> 
             ));
         }
     };
+    let about = film::about(path);
     let mut film = FilmSource {
-        colour: Film::open(path, Pixels::Rgb)?,
+        path: path.clone(),
+        colour: Film::open(path, Pixels::Rgb, about.as_ref())?,
         depth,
-        unit,
-        invert: flags.seen.invert(),
+        numbers,
         first: None,
-        frames: film::about(path).map(|about| about.frames),
+        about,
     };
     film.first = film.read()?;
     let first = film
         .first
         .as_ref()
         .ok_or_else(|| Error::file(path, "holds no picture"))?;
-    let shape = first.shape();
+    let shape = first.frame.shape();
     Ok((Input::Film(Box::new(film)), shape))
 }
 
 impl FilmSource {
-    fn next(&mut self) -> Result<Option<VideoFrame>> {
+    fn next(&mut self) -> Result<Option<Read>> {
         match self.first.take() {
-            Some(frame) => Ok(Some(frame)),
+            Some(read) => Ok(Some(read)),
             None => self.read(),
         }
     }
 
-    fn read(&mut self) -> Result<Option<VideoFrame>> {
+    fn read(&mut self) -> Result<Option<Read>> {
         let Some(colour) = self.colour.read()? else {
             if let FilmDepth::Film(film) = &mut self.depth
                 && film.read()?.is_some()
@@ -318,22 +374,20 @@ impl FilmSource {
             }
             return Ok(None);
         };
-        let mut frame = match &mut self.depth {
+        let frame = match &mut self.depth {
             FilmDepth::Film(film) => match film.read()? {
                 None => {
                     log::warn!("the film of depth ends before that of colour; the video ends with it");
                     return Ok(None);
                 }
                 Some(depth) => {
-                    VideoFrame::of_big_endian(colour.shape, colour.bytes, depth.shape, &depth.bytes, self.unit)
+                    VideoFrame::of_big_endian(colour.shape, colour.bytes, depth.shape, &depth.bytes, self.numbers.unit)
                 }
             },
-            FilmDepth::Beside => VideoFrame::of_halves(colour.shape, &colour.bytes)?,
-            FilmDepth::Network => return Ok(Some(VideoFrame::without_depth(colour.shape, colour.bytes))),
+            FilmDepth::Beside(sides) => VideoFrame::of_sides(colour.shape, &colour.bytes, sides.side)?,
+            FilmDepth::Network => VideoFrame::without_depth(colour.shape, colour.bytes),
         };
-        if self.invert {
-            frame.invert()?;
-        }
-        Ok(Some(frame))
+        let read = Read::checked(frame, self.numbers.inverted).map_err(|e| Error::file(&self.path, e))?;
+        Ok(Some(read))
     }
 }
