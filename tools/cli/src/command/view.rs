@@ -1,6 +1,6 @@
 //! `phasefront view`: makes one HTML file that shows holograms.
 
-use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, shown_json, shown_text};
+use crate::flags::frame::{IMAGE_FLAGS, shown_json, shown_text};
 use crate::make::{HologramRequest, Image, Judged, METHOD_FLAGS, infos, judge};
 use clap::Args;
 use image::RgbImage;

@@ -43,6 +43,7 @@ fn read(folder: &Folder, name: &str, unit: DepthUnit) -> phasefront_io::Result<C
         unit,
         near_m: None,
         far_m: None,
+        inverted: false,
     };
     frame::read(&folder.path("rgb.png"), &folder.path(name), options)
 }

@@ -125,10 +125,10 @@ impl Columns {
         for row in picture.bytes.chunks_exact(3 * self.width()) {
             for (x, pixel) in row.as_chunks::<3>().0.iter().enumerate() {
                 self.coloured[x] += u64::from(is_coloured(pixel));
-                for c in 0..3 {
-                    self.least[x][c] = self.least[x][c].min(pixel[c]);
-                    self.most[x][c] = self.most[x][c].max(pixel[c]);
-                    self.sum[x][c] += u64::from(pixel[c]);
+                for (c, &value) in pixel.iter().enumerate() {
+                    self.least[x][c] = self.least[x][c].min(value);
+                    self.most[x][c] = self.most[x][c].max(value);
+                    self.sum[x][c] += u64::from(value);
                 }
             }
             self.rows += 1;
