@@ -19,8 +19,8 @@ fn help_has_groups_and_the_short_one_the_common_flags() {
     assert!(at.is_sorted(), "{long}");
     let group = |text: &str, flag: &str| {
         let at = text.find(flag).expect(flag);
-        let heads = text[..at].lines().filter(|line| groups.contains(line));
-        heads.last().unwrap_or_default().to_owned()
+        let mut heads = text[..at].lines().filter(|line| groups.contains(line));
+        heads.next_back().unwrap_or_default().to_owned()
     };
     for (flag, head) in [
         ("--rgb", "Input:"),
