@@ -39,8 +39,9 @@ class ConfidenceFormat(enum.Enum):
     U8 = 1
 
 class DepthFormat(enum.Enum):
-    """The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers
-    and numbers that are not finite mean no reading.
+    """The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
+    NaN, numbers of 10⁹ or more, the largest code of an integer format and the largest finite 16-bit float mean no
+    reading.
 
     Values:
         METRES_F32: Metres as 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
@@ -51,7 +52,7 @@ class DepthFormat(enum.Enum):
         ANDROID_DEPTH16: Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits. It differs from millimetres in all 16 bits.
         NORMALIZED_U8: Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
         NORMALIZED_U16: 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
-        RELATIVE_F32: Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. Numbers that are not finite mean no reading.
+        RELATIVE_F32: Relative inverse depth as 32-bit floats, as networks estimate it: larger where nearer, on any scale. NaN and numbers from ±10⁹ on mean no reading.
         RELATIVE_F16: Relative inverse depth as 16-bit floats.
     """
     METRES_F32 = 0
