@@ -120,6 +120,13 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
         if let Some(doubt) = Doubt::of_clipped(clipped, shown.near_m, shown.far_m) {
             warn(doubt);
         }
+        log::info!(
+            "{}: near {:.3} m, far {:.3} m, {} pixels without a reading",
+            depth_path.display(),
+            shown.near_m,
+            shown.far_m,
+            normalized.holes
+        );
         let is_chosen = options.near_m.is_some() && options.far_m.is_some();
         if let Some(crowd) = crowd(&normalized.depth, shown).filter(|_| !is_chosen) {
             log::warn!("{}: {crowd}", depth_path.display());

@@ -324,7 +324,7 @@ fn a_network_takes_the_colours_in_turn() {
         let mut field = vec![Complex32::ZERO; seed.len()];
         plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
         let worst = farthest(&field, &expected);
-        assert!(worst < tolerance, "{worst}");
+        assert!(worst < tolerance, "{wavelengths_nm:?}: {worst}");
         let deep = Display::from_toml("volume_depth_mm = 7").unwrap();
         let refused = network.check_display(&deep).unwrap_err().to_string();
         assert!(refused.contains("spreads 1.17 times as far"), "{refused}");
