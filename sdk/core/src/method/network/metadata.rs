@@ -294,7 +294,7 @@ pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
         corrected: found(metadata, "corrected") == Some("true"),
     };
     let seed_planes = match found(metadata, "seed_planes") {
-        Some(planes) if input == InputKind::Seeded => {
+        Some(planes) if matches!(input, InputKind::Seeded | InputKind::SeededColour) => {
             let right = format!("a number from 1 to {MAX_PLANES}");
             let known = (planes.parse().ok()).filter(|n| (1..=MAX_PLANES).contains(n));
             Some(known.ok_or_else(|| wrong("seed_planes", planes, &right))?)
