@@ -38,15 +38,20 @@ class DataError(Exception):
     """A data set cannot be used. The message names the problem and its place."""
 
 
-def make(output, arguments, command="phasefront-lab"):
-    """Calls `phasefront-lab dataset` to make or complete a data set. Raises DataError if it fails."""
-    call = [command, "dataset", *arguments, "-o", str(output)]
+def call_laboratory(call):
+    """Runs the laboratory's command with its arguments. Raises DataError if it is missing or fails."""
     try:
         status = subprocess.run(call, check=False).returncode
     except FileNotFoundError:
-        raise DataError(f"no command '{command}': build it (cargo build --release) and give its path by --phasefront-lab") from None
+        raise DataError(f"no command '{call[0]}': build it (cargo build --release) and give its path by --phasefront-lab") from None
     if status != 0:
         raise DataError(f"'{' '.join(call)}' ended with status {status}")
+
+
+def make(output, arguments, command="phasefront-lab"):
+    """Calls `phasefront-lab dataset` to make or complete a data set. Raises DataError if it fails."""
+    call = [command, "dataset", *arguments, "-o", str(output)]
+    call_laboratory(call)
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,13 @@ int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale in `se
 """
 
 import json
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from .data import DataError, read_pair
+from .data import DataError, call_laboratory, read_pair
 from .evaluate import sensor_generator
 from .files import replacing
 from .sensor_depth import simulate_sensor_depth
@@ -34,12 +33,7 @@ def make(manifest, output, variants, arguments, command="phasefront-lab"):
             with replacing(path) as temporary, open(temporary, "wb") as file:
                 np.save(file, _depths(manifest, number, variants))
     call = [command, "seeds", str(manifest.folder), "-o", str(output), *arguments]
-    try:
-        status = subprocess.run(call, check=False).returncode
-    except FileNotFoundError:
-        raise DataError(f"no command '{command}': build it (cargo build --release) and give its path by --phasefront-lab") from None
-    if status != 0:
-        raise DataError(f"'{' '.join(call)}' ended with status {status}")
+    call_laboratory(call)
 
 
 def _depths(manifest, number, variants):

@@ -4,25 +4,19 @@
 `stack_000123.npz` with `depths`, float32 (K), normalized, and `amplitudes`, uint8 (K, 3, H, W), times 255.
 """
 
-import subprocess
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from .data import DataError
+from .data import DataError, call_laboratory
 
 
 def make(manifest, output, arguments, command="phasefront-lab"):
     """Makes or completes the stacks of a data set."""
     call = [command, "stacks", str(manifest.folder), "-o", str(output), *arguments]
-    try:
-        status = subprocess.run(call, check=False).returncode
-    except FileNotFoundError:
-        raise DataError(f"no command '{command}': build it (cargo build --release) and give its path by --phasefront-lab") from None
-    if status != 0:
-        raise DataError(f"'{' '.join(call)}' ended with status {status}")
+    call_laboratory(call)
 
 
 @dataclass(frozen=True)
