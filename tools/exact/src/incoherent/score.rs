@@ -58,7 +58,7 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// Returns the depths of focus, z in metres, at which holograms for `display` are judged.
+    /// Returns z, in metres, of the focal planes at which a hologram for `display` is compared.
     pub fn z_m(display: &Display) -> Vec<f64> {
         let depth = |i: usize| (i as f64 + 0.5) / DEPTHS as f64;
         (0..DEPTHS).map(|i| display.z_of_depth(depth(i))).collect()
