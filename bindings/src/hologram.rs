@@ -142,8 +142,8 @@ impl RawHologram {
     /// properties, of which it keeps the size and the scale.
     ///
     /// # Errors
-    /// Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target
-    /// has more than 8 bits.
+    /// Returns an error if there is another number of levels, if the size or the scale is not possible, or if the
+    /// target has more than 8 bits.
     #[uniffi::constructor]
     pub fn from_levels(levels: &[u8], info: HologramInfo, target: Arc<Target>) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {

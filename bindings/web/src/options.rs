@@ -35,8 +35,8 @@ impl RawMethod {
         RawMethod(Maker::Sweep)
     }
 
-    /// Creates the method that chooses between the built-in network and the sweep by each frame's depth. It is the sweep
-    /// alone if that network was not trained for the display.
+    /// Creates the method that chooses between the built-in network and the sweep by each frame's depth. It is the
+    /// sweep alone if that network was not trained for the display.
     pub fn auto() -> RawMethod {
         RawMethod(Maker::Auto(None))
     }

@@ -200,8 +200,8 @@ impl Hologram {
         })
     }
 
-    /// Returns the hologram whose levels, (C, H, W) for (H, W) = `shape`, are known, for example from a file. `scale` is
-    /// the amplitude that full light represents. C is the number of the target's lasers. Its depth is not known.
+    /// Returns the hologram whose levels, (C, H, W) for (H, W) = `shape`, are known, for example from a file. `scale`
+    /// is the amplitude that full light represents. C is the number of the target's lasers. Its depth is not known.
     ///
     /// # Errors
     /// Returns an error if the target is invalid or has more than 8 bits, if there is another number of levels or the

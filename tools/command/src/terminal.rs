@@ -24,9 +24,9 @@ pub fn name(path: &Path) -> String {
     Line(&path.display().to_string()).to_string()
 }
 
-/// Prints a command's result: `value` on one line if `json` is set, else `text` unless --quiet is given. Replaces control
-/// characters in `text` other than newlines, because names of files, networks and scenes may contain any. Where an output
-/// file takes stdout, the result goes to stderr.
+/// Prints a command's result: `value` on one line if `json` is set, else `text` unless --quiet is given. Replaces
+/// control characters in `text` other than newlines, because names of files, networks and scenes may contain any. Where
+/// an output file takes stdout, the result goes to stderr.
 pub fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display) {
     let line = if json {
         value.to_string()

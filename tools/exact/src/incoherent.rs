@@ -8,7 +8,7 @@
 //!
 //! The scene is cut into [`PLANES`] planes, which are moved by bilinear interpolation and drawn from the back to the
 //! front. A point lies on its own plane and on the one behind, so that slopes have no cracks. The surroundings are
-//! black. [`reference`] follows single rays instead.
+//! black. [`reference()`] follows single rays instead.
 
 use crate::sm_lbm::plane_of_depth;
 use ndarray::{Array2, Array3, Axis};

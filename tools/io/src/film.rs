@@ -193,8 +193,8 @@ pub struct Picture {
 }
 
 impl Film {
-    /// Opens a film. Its pictures come in order, each once, whatever its frame rate. Colour of HDR films, HLG and PQ, is
-    /// mapped to that of their SDR twins.
+    /// Opens a film. Its pictures come in order, each once, whatever its frame rate. Colour of HDR films, HLG and PQ,
+    /// is mapped to that of their SDR twins.
     ///
     /// # Errors
     /// Returns an error if ffmpeg is not installed, or lacks what an HDR film needs, or the file does not exist.

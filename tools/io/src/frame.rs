@@ -262,7 +262,8 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// Returns the reason to doubt that `depth` is normalized, if there is one. `inverted` tells that 0 is the farthest.
+    /// Returns the reason to doubt that `depth` is normalized, if there is one. `inverted` tells that 0 is the
+    /// farthest.
     pub fn of_normalized(depth: impl Iterator<Item = f32>, inverted: bool) -> Option<Self> {
         /// Normalized depth that uses its range exceeds this value.
         const LITTLE: f32 = 0.25;

@@ -59,8 +59,8 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads the text of a regular file of at most [`MOST_TEXT`] bytes: UTF-8, or UTF-16 with a byte-order mark. The mark is
-/// left out.
+/// Reads the text of a regular file of at most [`MOST_TEXT`] bytes: UTF-8, or UTF-16 with a byte-order mark. The mark
+/// is left out.
 ///
 /// # Errors
 /// Returns an error if [`open`] does, if the file grows too large during the read, or if the bytes are not text.

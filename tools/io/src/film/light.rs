@@ -42,8 +42,8 @@ impl Light {
     /// reference white, white is the film's peak. A brighter film has its reference white at SDR white, and its
     /// highlights are compressed.
     ///
-    /// zscale applies the gamma of hybrid log-gamma's display to each channel instead of the luminance, as most programs
-    /// that use it do. Greys are exact, and saturated colours are more saturated than by ITU-R BT.2100.
+    /// zscale applies the gamma of hybrid log-gamma's display to each channel instead of the luminance, as most
+    /// programs that use it do. Greys are exact, and saturated colours are more saturated than by ITU-R BT.2100.
     ///
     /// # Errors
     /// Returns an error if ffmpeg lacks the filters or cannot read the film.

@@ -103,8 +103,8 @@ impl Hologram {
     /// Computes the amplitudes, (C, H, W), at each of `z_m`, in metres from the middle of the volume.
     ///
     /// # Errors
-    /// Returns an error if a z is one that [`check_z`] refuses, if the look-up table is invalid, or if the hologram was made
-    /// for a calibrated display.
+    /// Returns an error if a z is one that [`check_z`] refuses, if the look-up table is invalid, or if the hologram was
+    /// made for a calibrated display.
     pub fn views(&self, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         self.views_on(&self.info().display_file()?, z_m)
     }
