@@ -67,8 +67,14 @@ else
     # cc asks for an SDK, whose headers assembly does not include.
     SDKROOT=$(realpath "$build")
     export SDKROOT
+    # cargo also links the shared libraries of dependencies, which no static library needs.
+    # shellcheck disable=SC2016 # The script's own variables.
+    printf '#!/bin/sh\nwhile [ "$1" != -o ]; do shift; done\n: >"$2"\n' >"$build/no-linker"
+    chmod +x "$build/no-linker"
     for target in "${targets[@]}"; do
-        export "CC_${target//-/_}=$zig_clang" "AR_${target//-/_}=$zig_ar"
+        upper=${target^^}
+        export "CC_${target//-/_}=$zig_clang" "AR_${target//-/_}=$zig_ar" \
+            "CARGO_TARGET_${upper//-/_}_LINKER=$(realpath "$build/no-linker")"
     done
 fi
 

@@ -234,8 +234,9 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual(session.statistics.dropped.paused, 100_000)
     }
 
-    func testACancelledCallThrowsAndItsFrameIsNotComputed() async throws {
+    @MainActor func testACancelledCallThrowsAndItsFrameIsNotComputed() async throws {
         let session = try HologramSession(options(), mode: .image)
+        // The calls belong to the main actor, so they begin when this test waits, after they were cancelled.
         let calls = (1...8 as ClosedRange<Int64>).map { i in
             Task { try await session.process(still(timestampNs: i)) }
         }
@@ -246,8 +247,7 @@ final class SessionTests: XCTestCase {
                 XCTFail("a cancelled call returned a hologram")
             } catch is CancellationError {}
         }
-        // One at most had begun.
-        XCTAssertLessThanOrEqual(session.statistics.processed, 1)
+        XCTAssertEqual(session.statistics.processed, 0)
         _ = try await session.process(still())
     }
 

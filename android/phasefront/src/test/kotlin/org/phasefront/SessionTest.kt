@@ -19,7 +19,7 @@ import kotlin.test.assertIs
 import kotlin.test.assertNull
 import kotlin.test.assertTrue
 import kotlinx.coroutines.CancellationException
-import kotlinx.coroutines.Dispatchers
+import kotlinx.coroutines.CoroutineStart
 import kotlinx.coroutines.async
 import kotlinx.coroutines.flow.toList
 import kotlinx.coroutines.runBlocking
@@ -276,7 +276,8 @@ class SessionTest {
     fun aCancelledCallThrowsAndItsFrameIsNotComputed() = runBlocking {
         image { session ->
             runBlocking {
-                val calls = (1L..8L).map { async(Dispatchers.Default) { session.process(still(it)) } }
+                // Each call begins in this thread and can end only when it waits below, after it was cancelled.
+                val calls = (1L..8L).map { async(start = CoroutineStart.UNDISPATCHED) { session.process(still(it)) } }
                 calls.forEach { it.cancel() }
                 calls.forEach { assertFailsWith<CancellationException> { it.await() } }
             }
