@@ -1,10 +1,19 @@
 //! The number of segments of a JPEG, checked before it is decoded: the decoder compares all parts of extended XMP after
-//! each segment, so that a small file of many segments takes hours.
+//! each segment, so that a small file of many segments takes hours, and it keeps a colour profile of any size.
 
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 
 /// The maximum number of segments. Photos with depth have up to 4000, each of 64 KiB.
 const MOST_SEGMENTS: usize = 1 << 13;
+/// The maximum number of segments of a profile, which are numbered in one byte from 1: ICC.1:2022, annex B.4.
+const MOST_OF_PROFILE: usize = 255;
+
+/// The segments of a JPEG up to the data of its first scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Segments {
+    all: usize,
+    profile: usize,
+}
 
 /// Checks the number of segments of the JPEG at the start of `from`, up to the data of its first scan.
 ///
@@ -12,30 +21,43 @@ const MOST_SEGMENTS: usize = 1 << 13;
 /// Returns an error if there are too many, or if `from` cannot be read.
 pub(super) fn check(from: &mut impl BufRead) -> Result<(), String> {
     match count(from) {
-        Ok(segments) if segments > MOST_SEGMENTS => {
+        Ok(segments) if segments.all > MOST_SEGMENTS => {
             Err(format!("is a JPEG of over {MOST_SEGMENTS} segments; a photo has fewer"))
         }
+        Ok(segments) if segments.profile > MOST_OF_PROFILE => Err(format!(
+            "is a JPEG with a colour profile of over {MOST_OF_PROFILE} segments; the format allows no more"
+        )),
         Ok(_) => Ok(()),
         Err(e) => Err(format!("cannot be read: {e}")),
     }
 }
 
 /// Counts segments until they are too many.
-fn count(from: &mut impl BufRead) -> std::io::Result<usize> {
+fn count(from: &mut impl BufRead) -> std::io::Result<Segments> {
     const START: u8 = 0xD8;
     const END: u8 = 0xD9;
     const SCAN: u8 = 0xDA;
-    let mut segments = 0;
-    while segments <= MOST_SEGMENTS {
-        match next_marker(from)? {
+    const PROFILE: u8 = 0xE2;
+    const NAME: &[u8] = b"ICC_PROFILE\0";
+    let mut segments = Segments::default();
+    while segments.all <= MOST_SEGMENTS && segments.profile <= MOST_OF_PROFILE {
+        let marker = match next_marker(from)? {
             None | Some(END | SCAN) => break,
-            Some(START) if segments == 0 => continue,
-            Some(_) => segments += 1,
-        }
+            Some(START) if segments.all == 0 => continue,
+            Some(marker) => marker,
+        };
+        segments.all += 1;
         let (Some(high), Some(low)) = (byte(from)?, byte(from)?) else {
             break;
         };
-        skip(from, usize::from(u16::from_be_bytes([high, low])).saturating_sub(2))?;
+        let mut length = usize::from(u16::from_be_bytes([high, low])).saturating_sub(2);
+        if marker == PROFILE && length > NAME.len() {
+            let mut name = Vec::new();
+            from.take(NAME.len() as u64).read_to_end(&mut name)?;
+            segments.profile += usize::from(name == NAME);
+            length -= NAME.len();
+        }
+        skip(from, length)?;
     }
     Ok(segments)
 }
@@ -100,6 +122,8 @@ mod tests {
             segment(0xE1, b"a thumbnail \xFF\xD8\xFF\xDA\xFF\xD9"),
             b"\xFF\xFF".to_vec(),
             segment(0xFE, b""),
+            segment(0xE2, b"ICC_PROFILE\0\x01\x01profile"),
+            segment(0xE2, b"MPF\0 and more bytes"),
             b"between\xFF\0".to_vec(),
             segment(0xC4, b"ab"),
             segment(0xDA, b"data"),
@@ -108,7 +132,8 @@ mod tests {
         .concat();
         for capacity in 1..9 {
             let mut from = std::io::BufReader::with_capacity(capacity, &file[..]);
-            assert_eq!(count(&mut from).unwrap(), 3, "{capacity}");
+            let want = Segments { all: 5, profile: 1 };
+            assert_eq!(count(&mut from).unwrap(), want, "{capacity}");
         }
         for end in 0..file.len() {
             count(&mut &file[..end]).unwrap();
@@ -130,5 +155,16 @@ mod tests {
             let why = check(&mut &with(MOST_SEGMENTS)[..]).unwrap_err();
             assert!(why.contains("over 8192 segments"), "{why}");
         }
+    }
+
+    #[test]
+    fn a_profile_of_too_many_parts_is_refused() {
+        let with = |number| {
+            let part = segment(0xE2, b"ICC_PROFILE\0\x01\xFFpart");
+            [b"\xFF\xD8".to_vec(), part.repeat(number)].concat()
+        };
+        check(&mut &with(MOST_OF_PROFILE)[..]).unwrap();
+        let why = check(&mut &with(MOST_OF_PROFILE + 1)[..]).unwrap_err();
+        assert!(why.contains("profile of over 255 segments"), "{why}");
     }
 }
