@@ -109,8 +109,8 @@ export async function run() {
   const said = version();
 
   // A request for too much memory ends the module cleanly: this call and every later one report it.
-  const huge = { target: { width: 40000, height: 40000 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
-  refused("internal", "the module cannot go on", () => new Session(huge));
+  const huge = { target: { width: 8192, height: 8192 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
+  refused("internal", "the module cannot go on", () => new Session(huge).process(new Frame(colour(), depth())));
   refused("internal", "the module cannot go on", () => version());
   return said;
 }
