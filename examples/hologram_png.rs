@@ -1,6 +1,7 @@
 //! Writes a hologram as a file that `phasefront refocus` and `phasefront view` read.
 
 use phasefront::Hologram;
+use phasefront::Size;
 use std::error::Error;
 use std::fs::File;
 use std::path::Path;
@@ -8,7 +9,7 @@ use std::path::Path;
 /// Writes the levels of `hologram` as a PNG. Its text chunk `phasefront` describes the levels: the display, the
 /// encoding (`anti-alias` is a session's default) and the amplitude that full light represents.
 pub(crate) fn save(hologram: &Hologram, path: &Path) -> Result<(), Box<dyn Error>> {
-    let (height, width) = hologram.shape();
+    let Size { width, height } = hologram.size();
     // The levels are planar, (C, H, W); the pixels of a PNG interleave the colours.
     let planes = hologram.levels().chunks_exact(height * width).collect::<Vec<_>>();
     let pixels = (0..height * width).flat_map(|i| planes.iter().map(move |plane| plane[i]));

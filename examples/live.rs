@@ -7,6 +7,7 @@
 mod hologram_png;
 
 use image::imageops::FilterType::Nearest;
+use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::session::Event;
 use phasefront::{Display, LiveSession, SessionOptions};
@@ -31,7 +32,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The session makes holograms on its own thread and reports the outcome of each frame to its listener. The listener
     // only forwards holograms, because no frame is processed while it is busy.
     let (sender, holograms) = mpsc::channel();
-    let display = Display::default().with_size(HEIGHT, WIDTH)?;
+    let display = Display::default().with_size(Size {
+        width: WIDTH,
+        height: HEIGHT,
+    })?;
     let mut options = SessionOptions::for_target(display);
     options.target_rate_hz = Some(RATE_HZ as f64);
     let session = LiveSession::new(options, move |event| match event {
@@ -44,8 +48,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         // The camera's next picture: all rows move to the left.
         rgb.chunks_exact_mut(3 * WIDTH).for_each(|row| row.rotate_left(3 * 4));
         depth.chunks_exact_mut(WIDTH).for_each(|row| row.rotate_left(4));
-        let colour = ColourImage::new(ColourFormat::Rgb, WIDTH, HEIGHT, &[Plane::new(&rgb, 3 * WIDTH, 3)])?;
-        let depth = DepthImage::new(DepthFormat::NormalizedU8, WIDTH, HEIGHT, Plane::new(&depth, WIDTH, 1))?;
+        let colour = ColourImage::new(
+            ColourFormat::Rgb,
+            Size {
+                width: WIDTH,
+                height: HEIGHT,
+            },
+            &[Plane::new(&rgb, 3 * WIDTH, 3)],
+        )?;
+        let depth = DepthImage::new(
+            DepthFormat::NormalizedU8,
+            Size {
+                width: WIDTH,
+                height: HEIGHT,
+            },
+            Plane::new(&depth, WIDTH, 1),
+        )?;
         // This copies the frame and returns at once. If the session cannot keep up, it drops the older of two frames.
         session.submit(&CameraFrame::new(frame * 1_000_000_000 / RATE_HZ, colour, depth))?;
         std::thread::sleep(Duration::from_millis(1000 / RATE_HZ));

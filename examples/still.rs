@@ -7,6 +7,7 @@
 
 mod hologram_png;
 
+use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::{Display, ImageSession, SessionOptions};
 use std::error::Error;
@@ -26,15 +27,22 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // A session plans its work once and then makes holograms of any number of frames. The display is the target: here
     // the paper's, with 8 µm pixels and three lasers, and as many pixels as the picture.
-    let display = Display::default().with_size(height, width)?;
+    let display = Display::default().with_size(Size { width, height })?;
     let session = ImageSession::new(SessionOptions::for_target(display))?;
 
     // A frame borrows the images' bytes. A plane takes the number of bytes from one row to the next and from one pixel
     // to the next.
     let colour = Plane::new(&rgb, 3 * width, 3);
-    let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[colour])?;
+    let colour = ColourImage::new(ColourFormat::Rgb, Size { width, height }, &[colour])?;
     let depth = Plane::new(&depth, depth_width, 1);
-    let depth = DepthImage::new(DepthFormat::NormalizedU8, depth_width, depth_height, depth)?;
+    let depth = DepthImage::new(
+        DepthFormat::NormalizedU8,
+        Size {
+            width: depth_width,
+            height: depth_height,
+        },
+        depth,
+    )?;
     let made = session.process(&CameraFrame::new(0, colour, depth))?;
 
     println!("{width}×{height} pixels in {:.0?}", made.times().total());

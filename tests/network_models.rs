@@ -1,6 +1,7 @@
 //! Builds ONNX files of residual chains with random weights, in the form that a training package exports.
 #![allow(clippy::unwrap_used, dead_code, unreachable_pub)]
 
+use phasefront_core::Size;
 use prost::Message;
 use rand::{RngExt, SeedableRng};
 use tract_onnx::pb::*;
@@ -332,7 +333,8 @@ fn planes(name: &str, channels: i64) -> ValueInfoProto {
 }
 
 /// Returns a frame of random RGB-D minus 0.5.
-pub fn frame(channels: usize, height: usize, width: usize, seed: u64) -> Vec<f32> {
+pub fn frame(channels: usize, size: Size, seed: u64) -> Vec<f32> {
+    let Size { width, height } = size;
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     (0..channels * height * width)
         .map(|_| rng.random_range(-0.5f32..0.5))

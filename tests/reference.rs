@@ -5,6 +5,7 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
 use ndarray::{Array2, Array3, s};
+use phasefront_core::Size;
 use rustfft::FftPlanner;
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -53,9 +54,9 @@ pub fn asm_periodic(u: &Array2<Complex64>, pitch: f64, lambda: f64, s: f64) -> A
 }
 
 /// Computes Eq. 2 as a linear convolution, in a plane padded with zeros to `padded` and then cropped.
-pub fn asm(u: &Array2<Complex64>, pitch: f64, lambda: f64, distance: f64, padded: (usize, usize)) -> Array2<Complex64> {
+pub fn asm(u: &Array2<Complex64>, pitch: f64, lambda: f64, distance: f64, padded: Size) -> Array2<Complex64> {
     let (h, w) = u.dim();
-    let mut plane = Array2::zeros(padded);
+    let mut plane = Array2::zeros(padded.shape());
     plane.slice_mut(s![..h, ..w]).assign(u);
     asm_periodic(&plane, pitch, lambda, distance)
         .slice(s![..h, ..w])
@@ -69,12 +70,12 @@ pub fn sm_lbm(
     volume: f64,
     pitch: f64,
     lambda: f64,
-    padded: (usize, usize),
+    padded: Size,
 ) -> Array2<Complex64> {
     let (h, w) = layers[0].0.dim();
     let step = volume / planes as f64;
     let z = |k: usize| volume / 2.0 - volume * (k as f64 + 0.5) / planes as f64;
-    let mut field: Array2<Complex64> = Array2::zeros(padded);
+    let mut field: Array2<Complex64> = Array2::zeros(padded.shape());
     for k in (0..planes).rev() {
         if k + 1 < planes {
             field = asm_periodic(&field, pitch, lambda, step);
@@ -114,13 +115,13 @@ pub fn relative_error(a: &Array2<Complex64>, b: &Array2<Complex64>) -> f64 {
 }
 
 /// Converts a plane of the library to f64.
-pub fn widen(plane: &[Complex32], (h, w): (usize, usize)) -> Array2<Complex64> {
+pub fn widen(plane: &[Complex32], Size { width: w, height: h }: Size) -> Array2<Complex64> {
     let values = plane.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).collect();
     Array2::from_shape_vec((h, w), values).unwrap()
 }
 
 /// Returns a plane with detail at every scale and no symmetry. It is the same for the same `seed`.
-pub fn test_plane((h, w): (usize, usize), seed: u32) -> Vec<Complex32> {
+pub fn test_plane(Size { width: w, height: h }: Size, seed: u32) -> Vec<Complex32> {
     let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12345);
     let mut random = move || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

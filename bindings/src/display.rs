@@ -61,8 +61,8 @@ impl From<phasefront::Display> for Display {
             _ => ([638.0, 520.0, 450.0], nm.first().copied()),
         };
         Display {
-            width: display.width(),
-            height: display.height(),
+            width: display.size().width,
+            height: display.size().height,
             pitch_um: round(display.pitch_m() * 1e6),
             red_nm,
             green_nm,

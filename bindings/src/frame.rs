@@ -1,6 +1,7 @@
 //! Camera frames: the layout of the memory that is passed with them.
 
 use crate::error::PhasefrontError;
+use phasefront::Size;
 use phasefront::input::{
     self, CameraFrame, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics, Orientation, Plane,
     Rotation, YuvMatrix,
@@ -240,16 +241,37 @@ impl FrameInfo {
                 self.timestamp_ns
             ))
         })?;
-        let colour = ColourImage::new(format, self.colour.width, self.colour.height, &planes)?;
+        let colour = ColourImage::new(
+            format,
+            Size {
+                width: self.colour.width,
+                height: self.colour.height,
+            },
+            &planes,
+        )?;
 
         let mut frame = CameraFrame::without_depth(timestamp_ns, colour);
         if let Some(info) = &self.depth {
             let plane = info.plane.plane(memory.depth);
-            let depth = DepthImage::new(info.format, info.width, info.height, plane)?;
+            let depth = DepthImage::new(
+                info.format,
+                Size {
+                    width: info.width,
+                    height: info.height,
+                },
+                plane,
+            )?;
             frame.depth = Some(match &self.confidence {
                 Some(info) => {
                     let plane = info.plane.plane(memory.confidence);
-                    depth.with_confidence(info.format, info.width, info.height, plane)?
+                    depth.with_confidence(
+                        info.format,
+                        Size {
+                            width: info.width,
+                            height: info.height,
+                        },
+                        plane,
+                    )?
                 }
                 None => depth,
             });

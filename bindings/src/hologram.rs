@@ -5,6 +5,7 @@ use crate::options::EncoderOptions;
 use crate::statistics::FrameTimes;
 use crate::target::Target;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::output::{self, Layout, Output, Placement};
 use phasefront::session;
 use std::sync::Arc;
@@ -32,8 +33,8 @@ pub struct OutputSize {
 impl From<output::OutputSize> for OutputSize {
     fn from(size: output::OutputSize) -> Self {
         OutputSize {
-            width: size.width,
-            height: size.height,
+            width: size.size.width,
+            height: size.size.height,
             pixel_bytes: size.pixel_bytes,
             images: size.images,
         }
@@ -132,8 +133,8 @@ impl RawHologram {
                     )
                 })
                 .collect();
-            let shape = (height, width);
-            let core = session::Hologram::of_field(&values, shape, z_mm / 1e3, &target.core, &(&options).into())?;
+            let size = Size { width, height };
+            let core = session::Hologram::of_field(&values, size, z_mm / 1e3, &target.core, &(&options).into())?;
             Ok(RawHologram::new(core))
         })
     }
@@ -155,7 +156,7 @@ impl RawHologram {
 
     /// Returns the properties of the hologram.
     pub fn info(&self) -> HologramInfo {
-        let (height, width) = self.core.shape();
+        let Size { width, height } = self.core.size();
         let (near_m, far_m) = self.core.range_m().unzip();
         HologramInfo {
             timestamp_ns: self.core.timestamp_ns() as i64,
@@ -187,8 +188,7 @@ impl RawHologram {
 
     /// Returns the number of bytes of a plane.
     pub fn plane_len(&self) -> u64 {
-        let (height, width) = self.core.shape();
-        (height * width) as u64
+        self.core.size().pixels() as u64
     }
 
     /// Returns the z in mm of the scene point at (`x`, `y`) of the picture, for example to focus where the user taps.
@@ -210,7 +210,7 @@ impl RawHologram {
         to: RawMemory,
     ) -> Result<(), PhasefrontError> {
         guard(|| {
-            let screen = (height, width);
+            let screen = Size { width, height };
             Ok(self
                 .core
                 .write_preview(z_mm / 1e3, screen, layout, to.bytes()?, to.row_stride)?)
@@ -236,7 +236,7 @@ impl RawHologram {
 
     /// Returns the size of the images of `layout` for the modulator.
     pub fn output_size(&self, layout: Layout) -> OutputSize {
-        let (height, width) = self.core.target().modulator();
+        let Size { width, height } = self.core.target().modulator();
         OutputSize {
             width,
             height,
@@ -252,7 +252,7 @@ impl RawHologram {
     /// Returns an error if the layout does not have this image or the image does not fit.
     pub fn write_output(&self, placement: Placement, image: usize, to: RawMemory) -> Result<(), PhasefrontError> {
         guard(|| {
-            let plan = Output::new(self.core.target(), self.core.shape(), placement)?;
+            let plan = Output::new(self.core.target(), self.core.size(), placement)?;
             let (levels, bytes) = (self.core.output_levels(), to.bytes()?);
             Ok(self
                 .core
@@ -264,7 +264,7 @@ impl RawHologram {
 impl RawHologram {
     /// Returns planes of the hologram's shape with `numbers`.
     fn planes(&self, numbers: Numbers) -> Arc<RawPlanes> {
-        let (height, width) = self.core.shape();
+        let Size { width, height } = self.core.size();
         Arc::new(RawPlanes {
             numbers,
             width,

@@ -3,6 +3,7 @@
 use crate::error::{PhasefrontError, guard};
 use crate::hologram::{OutputSize, RawHologram, RawMemory};
 use crate::target::Target;
+use phasefront::Size;
 use phasefront::output::{Layout, Levels, ModulatorInput, ModulatorSpec};
 use phasefront::session::Hologram;
 use std::sync::Arc;
@@ -91,7 +92,7 @@ impl RawModulator {
     /// Returns an error for another number of bytes, or for cells that are those of no level.
     pub fn read(&self, images: &[u8], width: usize, height: usize, to: RawMemory) -> Result<(), PhasefrontError> {
         guard(|| {
-            let input = self.core.input((height, width), &self.target.core)?;
+            let input = self.core.input(Size { width, height }, &self.target.core)?;
             let mut levels = vec![0; self.core.display.colours() * height * width];
             let (bytes, _) = to.bytes()?.as_chunks_mut::<2>();
             if bytes.len() != levels.len() {
@@ -121,7 +122,7 @@ impl RawModulator {
         to: RawMemory,
         write: impl FnOnce(&ModulatorInput, Levels<'_>, &mut [u8]) -> phasefront::Result<()> + Send,
     ) -> Result<(), PhasefrontError> {
-        let input = self.core.input(hologram.shape(), hologram.target())?;
+        let input = self.core.input(hologram.size(), hologram.target())?;
         let (levels, bytes) = (hologram.output_levels(), to.bytes()?);
         Ok(hologram.on_threads(|| write(&input, levels, bytes))?)
     }

@@ -3,6 +3,7 @@
 use crate::error::{PhasefrontError, guard};
 use crate::network::{DepthNetwork, Network};
 use crate::target::Target;
+use phasefront::Size;
 use phasefront::Sweep;
 use phasefront::input::DepthRange;
 use phasefront::output::{Layout, Placement};
@@ -319,8 +320,8 @@ impl SessionOptions {
             quality_levels: (core.quality_levels.iter())
                 .map(|quality_level| QualityLevel {
                     method: method.clone(),
-                    width: quality_level.width,
-                    height: quality_level.height,
+                    width: quality_level.size.width,
+                    height: quality_level.size.height,
                     local_steps: None,
                     midpoint_steps: None,
                 })
@@ -409,8 +410,10 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         to.quality_levels = (options.quality_levels.iter())
             .map(|quality_level| session::QualityLevel {
                 method: method(quality_level),
-                height: quality_level.height,
-                width: quality_level.width,
+                size: Size {
+                    width: quality_level.width,
+                    height: quality_level.height,
+                },
                 backend: None,
                 encoder: Some(phasefront::EncoderOptions {
                     local_steps: quality_level.local_steps.unwrap_or(to.encoder.local_steps),

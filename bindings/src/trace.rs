@@ -129,7 +129,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
-    use phasefront::{Display, ImageSession, Method, SessionOptions, Sweep};
+    use phasefront::{Display, ImageSession, Method, SessionOptions, Size, Sweep};
     use std::sync::Mutex;
 
     /// Keeps what it receives, and panics each time.
@@ -149,15 +149,25 @@ mod tests {
 
     fn frame(session: &ImageSession) {
         let (rgb, depth) = (vec![180; 24 * 16 * 3], vec![90; 24 * 16]);
-        let colour = ColourImage::new(ColourFormat::Rgb, 24, 16, &[Plane::new(&rgb, 24 * 3, 3)]).unwrap();
-        let depth = DepthImage::new(DepthFormat::NormalizedU8, 24, 16, Plane::new(&depth, 24, 1)).unwrap();
+        let colour = ColourImage::new(
+            ColourFormat::Rgb,
+            Size { width: 24, height: 16 },
+            &[Plane::new(&rgb, 24 * 3, 3)],
+        )
+        .unwrap();
+        let depth = DepthImage::new(
+            DepthFormat::NormalizedU8,
+            Size { width: 24, height: 16 },
+            Plane::new(&depth, 24, 1),
+        )
+        .unwrap();
         session.process(&CameraFrame::new(0, colour, depth)).unwrap();
     }
 
     /// There is one listener per process, so one test covers everything.
     #[test]
     fn a_listener_hears_each_stage_begin_and_end_until_it_is_gone() {
-        let display = Display::default().with_size(16, 24).unwrap();
+        let display = Display::default().with_size(Size { width: 24, height: 16 }).unwrap();
         let method = Method::Sweep(Sweep::for_display(&display));
         let session = ImageSession::new(SessionOptions::new(display, method)).unwrap();
         frame(&session);

@@ -298,8 +298,9 @@ fn the_default_depends_on_the_edges_of_depth() {
 /// Writes the suite: a picture and its depth in each format.
 mod write {
     use super::*;
+    use phasefront::Size;
 
-    const DISPLAY: (usize, usize) = (48, 36);
+    const DISPLAY: Size = Size { width: 48, height: 36 };
 
     /// Returns colour and metres at (x, y) of a picture with sides 0..1 at time t: a ball in front of a striped wall.
     fn scene(x: f64, y: f64, t: f64) -> ([f64; 3], f64) {
@@ -344,8 +345,7 @@ mod write {
         /// Writes a plane with gaps after rows and pixels, filled with bytes that must not be read.
         fn plane(
             &mut self,
-            width: usize,
-            height: usize,
+            Size { width, height }: Size,
             size: usize,
             pixel: usize,
             pad: usize,
@@ -363,15 +363,8 @@ mod write {
             json!({"offset": offset, "length": bytes.len(), "row_stride": row, "pixel_stride": pixel})
         }
 
-        fn colour(
-            &mut self,
-            format: &str,
-            width: usize,
-            height: usize,
-            matrix: &str,
-            video_range: bool,
-            t: f64,
-        ) -> Value {
+        fn colour(&mut self, format: &str, size: Size, matrix: &str, video_range: bool, t: f64) -> Value {
+            let Size { width, height } = size;
             let rgb = |x: usize, y: usize| scene(at(x, width), at(y, height), t).0;
             let (kr, kb) = if matrix == "bt709" {
                 (0.2126, 0.0722)
@@ -391,38 +384,42 @@ mod write {
                     [y, u + 128.0 / 255.0, v + 128.0 / 255.0]
                 }
             };
-            let (half_w, half_h) = (width.div_ceil(2), height.div_ceil(2));
-            let chroma = |x: usize, y: usize| yuv(scene(at(x, half_w), at(y, half_h), t).0);
+            let half = Size {
+                width: width.div_ceil(2),
+                height: height.div_ceil(2),
+            };
+            let chroma = |x: usize, y: usize| yuv(scene(at(x, half.width), at(y, half.height), t).0);
             let luma = |x, y| vec![byte(yuv(rgb(x, y))[0])];
             let planes = match format {
-                "rgba" => vec![self.plane(width, height, 4, 4, 12, |x, y| {
+                "rgba" => vec![self.plane(size, 4, 4, 12, |x, y| {
                     let [r, g, b] = rgb(x, y);
                     vec![byte(r), byte(g), byte(b), 7]
                 })],
-                "bgra" => vec![self.plane(width, height, 4, 4, 0, |x, y| {
+                "bgra" => vec![self.plane(size, 4, 4, 0, |x, y| {
                     let [r, g, b] = rgb(x, y);
                     vec![byte(b), byte(g), byte(r), 9]
                 })],
                 "rgb" => {
-                    vec![self.plane(width, height, 3, 3, 1, |x, y| rgb(x, y).map(byte).to_vec())]
+                    vec![self.plane(size, 3, 3, 1, |x, y| rgb(x, y).map(byte).to_vec())]
                 }
                 "nv12" => vec![
-                    self.plane(width, height, 1, 1, 8, luma),
-                    self.plane(half_w, half_h, 2, 2, 8, |x, y| {
+                    self.plane(size, 1, 1, 8, luma),
+                    self.plane(half, 2, 2, 8, |x, y| {
                         chroma(x, y)[1..].iter().map(|v| byte(*v)).collect()
                     }),
                 ],
                 "yuv420" => vec![
-                    self.plane(width, height, 1, 1, 3, luma),
-                    self.plane(half_w, half_h, 1, 2, 5, |x, y| vec![byte(chroma(x, y)[1])]),
-                    self.plane(half_w, half_h, 1, 2, 5, |x, y| vec![byte(chroma(x, y)[2])]),
+                    self.plane(size, 1, 1, 3, luma),
+                    self.plane(half, 1, 2, 5, |x, y| vec![byte(chroma(x, y)[1])]),
+                    self.plane(half, 1, 2, 5, |x, y| vec![byte(chroma(x, y)[2])]),
                 ],
                 other => panic!("{other}"),
             };
             json!({"format": format, "width": width, "height": height, "matrix": matrix, "video_range": video_range, "planes": planes})
         }
 
-        fn depth(&mut self, format: &str, width: usize, height: usize, t: f64) -> Value {
+        fn depth(&mut self, format: &str, size: Size, t: f64) -> Value {
+            let Size { width, height } = size;
             let hole = |x: usize, y: usize| (x * 7 + y * 3).is_multiple_of(19);
             let pixel = if format.ends_with("f32") {
                 4
@@ -431,7 +428,7 @@ mod write {
             } else {
                 2
             };
-            let plane = self.plane(width, height, pixel, pixel, 2 * pixel, |x, y| {
+            let plane = self.plane(size, pixel, pixel, 2 * pixel, |x, y| {
                 let metres = scene(at(x, width), at(y, height), t).1;
                 let measured = if hole(x, y) { 0.0 } else { metres };
                 let normalized = (metres - 0.4) / 1.4;
@@ -464,8 +461,9 @@ mod write {
             json!({"format": format, "width": width, "height": height, "plane": plane})
         }
 
-        fn confidence(&mut self, format: &str, width: usize, height: usize) -> Value {
-            let plane = self.plane(width, height, 1, 1, 1, |x, y| {
+        fn confidence(&mut self, format: &str, size: Size) -> Value {
+            let Size { width, height } = size;
+            let plane = self.plane(size, 1, 1, 1, |x, y| {
                 let low = (x * 5 + y * 11) % 13 == 0;
                 vec![match (format, low) {
                     (_, true) => 0,
@@ -491,8 +489,7 @@ mod write {
         use phasefront::target::Aberration;
         use phasefront_core::display::response::per_pixel::PerPixel;
         use phasefront_core::display::response::per_pixel::nodes;
-        let (w, h) = DISPLAY;
-        let (rows, columns) = nodes(h, w, 12);
+        let (rows, columns) = nodes(DISPLAY, 12);
         let levels: Vec<f32> = (0..3 * rows * columns)
             .flat_map(|node| {
                 let most = 200.0 + (node * 11 % 50) as f32;
@@ -500,7 +497,7 @@ mod write {
             })
             .collect();
         let turns = vec![std::f32::consts::TAU; 3 * rows * columns];
-        let table = PerPixel::new(h, w, 12, 8, &levels, &turns).unwrap();
+        let table = PerPixel::new(DISPLAY, 12, 8, &levels, &turns).unwrap();
         let amplitude = ndarray::Array3::from_shape_fn((3, 4, 5), |(c, y, x)| {
             1.0 - 0.05 * ((x as f32 - 2.0).powi(2) + (y as f32 - 1.5).powi(2)) - 0.01 * c as f32
         });
@@ -518,7 +515,7 @@ mod write {
     #[expect(clippy::too_many_lines, reason = "case after case")]
     pub(super) fn suite() {
         let mut frames = Frames::default();
-        let (w, h) = DISPLAY;
+        let Size { width: w, height: h } = DISPLAY;
         let display = format!("width = {w}\nheight = {h}\n");
         let still = |colour: Value, depth: Value| json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false});
         let case = |name: &str, frames: Vec<Value>| {
@@ -527,15 +524,15 @@ mod write {
         };
         let mut cases = Vec::new();
 
-        let colour = frames.colour("rgba", 64, 48, "bt601", false, 0.0);
-        let depth = frames.depth("metres-f32", 32, 24, 0.0);
+        let colour = frames.colour("rgba", Size { width: 64, height: 48 }, "bt601", false, 0.0);
+        let depth = frames.depth("metres-f32", Size { width: 32, height: 24 }, 0.0);
         let plain = still(colour, depth);
         cases.push(case("RGBA and metres", vec![plain.clone()]));
 
         let mut one = case("BGRA and 16-bit metres, sensor turned", vec![]);
         let mut frame = still(
-            frames.colour("bgra", 36, 48, "bt601", false, 0.0),
-            frames.depth("metres-f16", 18, 24, 0.0),
+            frames.colour("bgra", Size { width: 36, height: 48 }, "bt601", false, 0.0),
+            frames.depth("metres-f16", Size { width: 18, height: 24 }, 0.0),
         );
         frame["rotation"] = json!(90);
         frame["mirrored"] = json!(true);
@@ -543,32 +540,32 @@ mod write {
         cases.push(one);
 
         let mut frame = still(
-            frames.colour("rgb", 61, 47, "bt601", false, 0.0),
-            frames.depth("disparity-f32", 31, 24, 0.0),
+            frames.colour("rgb", Size { width: 61, height: 47 }, "bt601", false, 0.0),
+            frames.depth("disparity-f32", Size { width: 31, height: 24 }, 0.0),
         );
         frame["rotation"] = json!(180);
         cases.push(case("RGB of odd size and disparity, upside down", vec![frame]));
 
         let mut frame = still(
-            frames.colour("nv12", 64, 48, "bt709", true, 0.0),
-            frames.depth("disparity-f16", 32, 24, 0.0),
+            frames.colour("nv12", Size { width: 64, height: 48 }, "bt709", true, 0.0),
+            frames.depth("disparity-f16", Size { width: 32, height: 24 }, 0.0),
         );
-        frame["confidence"] = frames.confidence("low-medium-high", 32, 24);
+        frame["confidence"] = frames.confidence("low-medium-high", Size { width: 32, height: 24 });
         cases.push(case("420v of BT.709 and 16-bit disparity with confidence", vec![frame]));
 
         let mut frame = still(
-            frames.colour("yuv420", 63, 47, "bt601", false, 0.0),
-            frames.depth("millimetres-u16", 40, 30, 0.0),
+            frames.colour("yuv420", Size { width: 63, height: 47 }, "bt601", false, 0.0),
+            frames.depth("millimetres-u16", Size { width: 40, height: 30 }, 0.0),
         );
-        frame["confidence"] = frames.confidence("u8", 40, 30);
+        frame["confidence"] = frames.confidence("u8", Size { width: 40, height: 30 });
         cases.push(case(
             "YUV_420_888 of odd size and millimetres with confidence",
             vec![frame],
         ));
 
         let mut frame = still(
-            frames.colour("yuv420", 48, 64, "bt601", true, 0.0),
-            frames.depth("android-depth16", 24, 32, 0.0),
+            frames.colour("yuv420", Size { width: 48, height: 64 }, "bt601", true, 0.0),
+            frames.depth("android-depth16", Size { width: 24, height: 32 }, 0.0),
         );
         frame["rotation"] = json!(270);
         cases.push(case(
@@ -577,8 +574,8 @@ mod write {
         ));
 
         let frame = still(
-            frames.colour("nv12", 64, 48, "bt601", false, 0.0),
-            frames.depth("normalized-u8", 64, 48, 0.0),
+            frames.colour("nv12", Size { width: 64, height: 48 }, "bt601", false, 0.0),
+            frames.depth("normalized-u8", Size { width: 64, height: 48 }, 0.0),
         );
         cases.push(case("420f and normalized depth", vec![frame]));
 
@@ -587,8 +584,8 @@ mod write {
             vec![],
         );
         one["frames"] = json!([still(
-            frames.colour("rgba", 24, 18, "bt601", false, 0.0),
-            frames.depth("normalized-u16", 24, 18, 0.0)
+            frames.colour("rgba", Size { width: 24, height: 18 }, "bt601", false, 0.0),
+            frames.depth("normalized-u16", Size { width: 24, height: 18 }, 0.0)
         )]);
         one["display"] = json!(format!("{display}offset_mm = 4.5\nbits = 5\n"));
         one["levels"] = json!(32);
@@ -640,8 +637,8 @@ mod write {
             .map(|i| {
                 let t = i as f64 / 3.0;
                 let mut frame = still(
-                    frames.colour("bgra", 48, 36, "bt601", false, t),
-                    frames.depth("metres-f32", 24, 18, t),
+                    frames.colour("bgra", Size { width: 48, height: 36 }, "bt601", false, t),
+                    frames.depth("metres-f32", Size { width: 24, height: 18 }, t),
                 );
                 frame["timestamp_ns"] = json!(1_000_000_000 + i * 33_000_000);
                 frame
@@ -655,15 +652,18 @@ mod write {
 
         for format in ["relative-f32", "relative-f16"] {
             let frame = still(
-                frames.colour("rgba", 64, 48, "bt601", false, 0.0),
-                frames.depth(format, 32, 24, 0.0),
+                frames.colour("rgba", Size { width: 64, height: 48 }, "bt601", false, 0.0),
+                frames.depth(format, Size { width: 32, height: 24 }, 0.0),
             );
             cases.push(case(&format!("depth of a network, {format}"), vec![frame]));
         }
 
         let mut one = case("depth of the session's own network", vec![]);
         one["depth_network"] = json!("depth.onnx");
-        one["frames"] = json!([still(frames.colour("rgba", 64, 48, "bt601", false, 0.0), Value::Null)]);
+        one["frames"] = json!([still(
+            frames.colour("rgba", Size { width: 64, height: 48 }, "bt601", false, 0.0),
+            Value::Null
+        )]);
         cases.push(one);
 
         let (width, height) = (96, 72);

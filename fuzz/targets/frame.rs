@@ -2,6 +2,7 @@
 //! through a video session.
 #![no_main]
 
+use phasefront::Size;
 use libfuzzer_sys::fuzz_target;
 use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
@@ -57,7 +58,7 @@ impl Numbers<'_> {
 fn session() -> &'static VideoSession {
     static SESSION: OnceLock<VideoSession> = OnceLock::new();
     SESSION.get_or_init(|| {
-        let display = Display::default().with_size(8, 12).expect("a display");
+        let display = Display::default().with_size(Size { width: 12, height: 8 }).expect("a display");
         // The results are not checked, so the method is cheap.
         let sweep = Sweep {
             hidden_layers: 0,
@@ -128,12 +129,12 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
         .iter()
         .map(|(row, pixel)| Plane::new(memory, *row, *pixel))
         .collect();
-    let colour = ColourImage::new(format, width, height, &planes)?;
+    let colour = ColourImage::new(format, Size { width, height }, &planes)?;
     let plane = Plane::new(memory, depth_strides.0, depth_strides.1);
-    let mut depth = DepthImage::new(depth_format, depth_width, depth_height, plane)?;
+    let mut depth = DepthImage::new(depth_format, Size { width: depth_width, height: depth_height }, plane)?;
     if confidence % 2 == 1 {
         let format = [ConfidenceFormat::U8, ConfidenceFormat::LowMediumHigh][confidence / 2 % 2];
-        depth = depth.with_confidence(format, depth_width, depth_height, Plane::new(memory, depth_width, 1))?;
+        depth = depth.with_confidence(format, Size { width: depth_width, height: depth_height }, Plane::new(memory, depth_width, 1))?;
     }
     let mut frame = CameraFrame::new(1, colour, depth);
     frame.orientation = orientation;
@@ -154,11 +155,11 @@ fn alone() {
 
 /// Converts the amplitudes and depth of a frame twice, the second time as its successor.
 fn take_in(frame: &CameraFrame<'_>) -> Result<()> {
-    const SHAPE: (usize, usize) = (8, 12);
+    const SIZE: Size = Size { width: 12, height: 8 };
     frame.check()?;
-    let plan = ColourPlan::new(&frame.colour, frame.orientation, SHAPE.0, SHAPE.1)?;
-    let mut depths = DepthStream::new(DepthOptions::default(), SHAPE)?;
-    let (mut rgb, mut depth) = ([f32::NAN; 3 * SHAPE.0 * SHAPE.1], [f32::NAN; SHAPE.0 * SHAPE.1]);
+    let plan = ColourPlan::new(&frame.colour, frame.orientation, SIZE)?;
+    let mut depths = DepthStream::new(DepthOptions::default(), SIZE)?;
+    let (mut rgb, mut depth) = ([f32::NAN; 3 * SIZE.pixels()], [f32::NAN; SIZE.pixels()]);
     for elapsed in [None, Some(Duration::from_millis(33))] {
         plan.convert(&frame.colour, &mut rgb, &mut plan.scratch())?;
         depths.next(frame, elapsed, &rgb, &mut depth)?;

@@ -1,6 +1,7 @@
 //! Reads ONNX files, plans them on the kernels and runs them on a small frame.
 #![no_main]
 
+use phasefront::Size;
 use libfuzzer_sys::fuzz_target;
 use num_complex::Complex32;
 use phasefront::Network;
@@ -25,7 +26,7 @@ fuzz_target!(|file: &[u8]| {
         Ok(network) if network.chain().macs_per_pixel() > 200_000 => {}
         Ok(network) => {
             let (height, width) = (5, 7);
-            if let Ok(plan) = network.plan(height, width) {
+            if let Ok(plan) = network.plan(Size { width, height }) {
                 let mut field = vec![Complex32::ZERO; 3 * height * width];
                 let _ = plan.field(&Flat, &mut field, &mut plan.scratch());
             }

@@ -1,6 +1,7 @@
 //! Fuzzes the readers of `phasefront-io` and `phasefront-lab`: the first byte selects the reader, the rest is the file.
 #![no_main]
 
+use phasefront::Size;
 use libfuzzer_sys::fuzz_target;
 use phasefront_io::{display, hologram, ldi, picture};
 use phasefront_lab::scene;
@@ -20,7 +21,7 @@ fuzz_target!(|data: &[u8]| {
             assert!(!why.to_string().contains(char::is_control), "{why}");
         }
     };
-    let model = |path: &Path| scene::read_model(path, 8, 8, None).map(|_| ());
+    let model = |path: &Path| scene::read_model(path, Size { width: 8, height: 8 }, None).map(|_| ());
     match kind % 12 {
         0 => told(picture::read_rgb(&write("a.png")).map(|_| ())),
         1 => told(picture::depth_map::read_depth(&write("a.npy"), false).map(|_| ())),

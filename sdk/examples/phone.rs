@@ -3,9 +3,9 @@
 #![allow(unsafe_code)]
 
 use ndarray::{Array2, Array3};
-use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Target};
+use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Size, Target};
 
-/// Makes `levels`, (3, `height`, `width`), of a frame, by the network of an ONNX file; 0 if that went well.
+/// Makes `levels`, (3, H, W), of a frame of `size`, by the network of an ONNX file; 0 if that went well.
 ///
 /// # Safety
 /// `onnx` holds `length` bytes, `rgb` three planes of the frame's size, `depth` one, and `levels` has room for three.
@@ -13,13 +13,12 @@ use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Ta
 pub unsafe extern "C" fn phasefront_levels(
     onnx: *const u8,
     length: usize,
-    height: usize,
-    width: usize,
+    size: Size,
     rgb: *const f32,
     depth: *const f32,
     levels: *mut u8,
 ) -> i32 {
-    let area = height * width;
+    let area = size.pixels();
     // SAFETY: the caller's promise.
     let (onnx, rgb, depth, levels) = unsafe {
         (
@@ -29,19 +28,14 @@ pub unsafe extern "C" fn phasefront_levels(
             std::slice::from_raw_parts_mut(levels, 3 * area),
         )
     };
-    match make(onnx, (height, width), rgb, depth, levels) {
+    match make(onnx, size, rgb, depth, levels) {
         Ok(()) => 0,
         Err(_) => 1,
     }
 }
 
-fn make(
-    onnx: &[u8],
-    (height, width): (usize, usize),
-    rgb: &[f32],
-    depth: &[f32],
-    levels: &mut [u8],
-) -> phasefront::Result<()> {
+fn make(onnx: &[u8], size: Size, rgb: &[f32], depth: &[f32], levels: &mut [u8]) -> phasefront::Result<()> {
+    let (height, width) = size.shape();
     let wrong = |e: ndarray::ShapeError| Error::Frame(e.to_string());
     let rgb = Array3::from_shape_vec((3, height, width), rgb.to_vec()).map_err(wrong)?;
     let depth = Array2::from_shape_vec((height, width), depth.to_vec()).map_err(wrong)?;
@@ -49,7 +43,7 @@ fn make(
     let network = Network::from_onnx(onnx)?;
     let method = Method::trained(network.into());
     let options = EncoderOptions::default();
-    let pipeline = Pipeline::new((height, width), method, &Target::default(), &options)?;
+    let pipeline = Pipeline::new(size, method, &Target::default(), &options)?;
     pipeline.process(&frame, levels, &mut pipeline.scratch())?;
     Ok(())
 }

@@ -6,12 +6,12 @@
 //!
 //! ```
 //! use phasefront::ndarray::{Array2, Array3};
-//! use phasefront::{Display, EncoderOptions, Method, Pipeline, RgbdFrame, Sweep, Target};
+//! use phasefront::{Display, EncoderOptions, Method, Pipeline, RgbdFrame, Size, Sweep, Target};
 //!
 //! let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 3.0")?;
 //! let method = Method::Sweep(Sweep::for_display(&display));
 //! let target = Target::from(display);
-//! let pipeline = Pipeline::new((48, 64), method, &target, &EncoderOptions::default())?;
+//! let pipeline = Pipeline::new(Size { width: 64, height: 48 }, method, &target, &EncoderOptions::default())?;
 //!
 //! // A bright square in front of a dark wall.
 //! let inside = |y: usize, x: usize| (16..32).contains(&y) && (24..40).contains(&x);
@@ -92,6 +92,7 @@ pub mod target {
     pub use phasefront_core::optics::zernike::Aberration;
 }
 
+pub use phasefront_core::Size;
 pub use phasefront_core::display::Display;
 pub use phasefront_core::display::target::Target;
 pub use phasefront_core::encode::brightness::Brightness;

@@ -102,8 +102,8 @@ pub struct VideoSession(Answering);
 /// loop {
 ///     let (timestamp_ns, colour, depth) = camera();
 ///     let colour = Plane::new(&colour, 4 * 1920, 4);
-///     let colour = ColourImage::new(ColourFormat::Bgra, 1920, 1440, &[colour])?;
-///     let depth = DepthImage::new(DepthFormat::MetresF32, 256, 192, Plane::new(&depth, 4 * 256, 4))?;
+///     let colour = ColourImage::new(ColourFormat::Bgra, Size { width: 1920, height: 1440 }, &[colour])?;
+///     let depth = DepthImage::new(DepthFormat::MetresF32, Size { width: 256, height: 192 }, Plane::new(&depth, 4 * 256, 4))?;
 ///     session.submit(&CameraFrame::new(timestamp_ns, colour, depth))?;
 /// }
 /// # #[allow(unreachable_code)]

@@ -8,6 +8,7 @@ mod counting;
 
 use camera::{Scene, depth, options};
 use counting::ALLOCATED;
+use phasefront::Size;
 use phasefront::input::{CameraFrame, DepthFormat};
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::Event;
@@ -35,12 +36,34 @@ fn count(what: &str, mut call: impl FnMut()) {
 }
 
 fn of(name: &str, options: &SessionOptions) {
-    let (scene, sensor) = (Scene::new(H, W, W / 3), Scene::new(H / 4, W / 4, W / 12));
+    let (scene, sensor) = (
+        Scene::new(Size { width: W, height: H }, W / 3),
+        Scene::new(
+            Size {
+                width: W / 4,
+                height: H / 4,
+            },
+            W / 12,
+        ),
+    );
     let fine = scene.depth_bytes(DepthFormat::NormalizedU8);
     let coarse = sensor.depth_bytes(DepthFormat::MetresF32);
     let depths = [
-        ("normalized depth", depth(&fine, DepthFormat::NormalizedU8, W, H)),
-        ("a sensor's depth", depth(&coarse, DepthFormat::MetresF32, W / 4, H / 4)),
+        (
+            "normalized depth",
+            depth(&fine, DepthFormat::NormalizedU8, Size { width: W, height: H }),
+        ),
+        (
+            "a sensor's depth",
+            depth(
+                &coarse,
+                DepthFormat::MetresF32,
+                Size {
+                    width: W / 4,
+                    height: H / 4,
+                },
+            ),
+        ),
     ];
     for (kind, depth) in depths {
         let session = VideoSession::new(options.clone()).unwrap();
@@ -73,11 +96,16 @@ fn views(name: &str, hologram: &Hologram) {
     let mut pixels = vec![0; 4 * H * W];
     count(&format!("{name}: write_preview"), || {
         hologram
-            .write_preview(0.0, (H, W), Layout::Rgba, &mut pixels, 4 * W)
+            .write_preview(0.0, Size { width: W, height: H }, Layout::Rgba, &mut pixels, 4 * W)
             .unwrap();
     });
     count(&format!("{name}: an output"), || {
-        let plan = Output::new(hologram.target(), (H, W), Placement::centred(Layout::Rgba)).unwrap();
+        let plan = Output::new(
+            hologram.target(),
+            Size { width: W, height: H },
+            Placement::centred(Layout::Rgba),
+        )
+        .unwrap();
         plan.write(hologram.output_levels(), 0, &mut pixels, 4 * W).unwrap();
     });
 }
@@ -90,7 +118,7 @@ fn a_frame_allocates_no_image() {
         ALLOCATED.load(Ordering::Relaxed) - before >= H * W,
         "allocations are counted"
     );
-    let mut options = options(W, H);
+    let mut options = options(Size { width: W, height: H });
     of("a network", &options);
     options.quality_levels[0].method = Method::Sweep(Sweep::for_display(&options.target.display));
     of("the sweep", &options);

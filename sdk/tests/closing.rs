@@ -7,6 +7,7 @@ mod counting;
 
 use camera::{Scene, frame, options};
 use counting::HELD;
+use phasefront::Size;
 use phasefront::input::DepthFormat;
 use phasefront::session::Event;
 use phasefront::{LiveSession, VideoSession};
@@ -33,18 +34,18 @@ fn more_than(before: usize) -> usize {
 /// This is one test, because the allocations of another would be counted.
 #[test]
 fn a_closed_session_gives_its_memory_back_before_it_is_dropped() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = |t| frame(t, &scene, &metres);
     let still = || {
-        let session = VideoSession::new(options(W, H)).unwrap();
+        let session = VideoSession::new(options(Size { width: W, height: H })).unwrap();
         (1..4).for_each(|t| drop(session.process(&frame(t)).unwrap()));
         session
     };
     let live = || {
         let (sender, events) = mpsc::channel();
         let listener = move |event| drop(sender.send(event));
-        let session = LiveSession::new(options(W, H), listener).unwrap();
+        let session = LiveSession::new(options(Size { width: W, height: H }), listener).unwrap();
         // Submit bursts, so that frames wait while one is computed.
         for t in 1..30 {
             session.submit(&frame(t)).unwrap();

@@ -8,6 +8,7 @@ mod on_gpu;
 
 use camera::{Scene, frame, options};
 use on_gpu::on_gpu;
+use phasefront::Size;
 use phasefront::input::DepthFormat;
 use phasefront::session::Event;
 use phasefront::{Error, LiveSession};
@@ -24,9 +25,9 @@ fn nothing_grows_where_devices_go() {
         assert!(again.status().unwrap().success());
         return;
     }
-    let options = on_gpu(options(32, 24));
+    let options = on_gpu(options(Size { width: 32, height: 24 }));
     let frames: u64 = std::env::var("PHASEFRONT_SOAK").map_or(240, |n| n.parse().unwrap());
-    let scene = Scene::new(24, 32, 10);
+    let scene = Scene::new(Size { width: 32, height: 24 }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let held = || {
         let statm = std::fs::read_to_string("/proc/self/statm").unwrap();

@@ -8,6 +8,7 @@ mod counting;
 
 use camera::{Scene, frame, options};
 use counting::HELD;
+use phasefront::Size;
 use phasefront::input::DepthFormat;
 use phasefront::output::Layout;
 use phasefront::session::{Event, Quality, SessionHandle};
@@ -67,7 +68,7 @@ fn handle(stage: &'static str, handler: impl Fn() + Send + Sync + 'static) {
 
 /// Returns options with two quality levels, so that the second is planned during a frame.
 fn two_levels() -> SessionOptions {
-    let mut options = options(W, H);
+    let mut options = options(Size { width: W, height: H });
     options.quality_levels.push(options.quality_levels[0].clone());
     options.quality = Quality::Fixed(0);
     options
@@ -78,13 +79,13 @@ fn video() -> Arc<VideoSession> {
 }
 
 fn process(session: &VideoSession, time: u64) -> phasefront::Result<Hologram> {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     session.process(&frame(time, &scene, &metres))
 }
 
 fn submit(session: &LiveSession, time: u64) {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     session.submit(&frame(time, &scene, &metres)).unwrap();
 }
@@ -139,7 +140,7 @@ fn calling_back() {
                     process(&calling, 9).map(|_| ()),
                     process(&other, 9).map(|_| ()),
                     calling.warm_up(),
-                    view.write_preview(0.0, (8, 8), Layout::Rgba, &mut rgba, 32),
+                    view.write_preview(0.0, Size { width: 8, height: 8 }, Layout::Rgba, &mut rgba, 32),
                 ];
                 calling.set_quality(Quality::Fixed(0)).unwrap();
                 calling.pause();

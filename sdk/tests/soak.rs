@@ -9,6 +9,7 @@ mod counting;
 
 use camera::{Scene, depth, frame, options};
 use counting::HELD;
+use phasefront::Size;
 use phasefront::input::{CameraFrame, DepthFormat};
 use phasefront::session::{Event, Quality, QualityLevel, Thermal};
 use phasefront::{Error, LiveSession, SessionOptions, Sweep};
@@ -78,12 +79,14 @@ impl Subscriber for Panicking {
 
 /// Returns options with a network and a sweep as quality levels, so that both are used.
 fn quality_levels() -> SessionOptions {
-    let mut options = options(W, H);
+    let mut options = options(Size { width: W, height: H });
     let sweep = Sweep::for_display(&options.target.display);
     options.quality_levels.push(QualityLevel {
         method: phasefront::Method::Sweep(sweep),
-        height: H / 2,
-        width: W / 2,
+        size: Size {
+            width: W / 2,
+            height: H / 2,
+        },
         backend: None,
         encoder: None,
     });
@@ -100,7 +103,7 @@ fn submit(session: &LiveSession, random: &mut ChaCha8Rng, scenes: &[(Scene, Vec<
         // The depth has no readings, so the frame fails.
         0 => {
             let nothing = vec![0; metres.len()];
-            let nothing = depth(&nothing, DepthFormat::MetresF32, W, H);
+            let nothing = depth(&nothing, DepthFormat::MetresF32, Size { width: W, height: H });
             session.submit(&CameraFrame::new(later, scene.colour(), nothing))
         }
         // The clock runs backwards.
@@ -142,7 +145,7 @@ fn run(frames: u64, seed: u64) -> Heard {
     let random = &mut ChaCha8Rng::seed_from_u64(seed);
     let scenes: Vec<_> = (0..4)
         .map(|i| {
-            let scene = Scene::new(H, W, 5 * i);
+            let scene = Scene::new(Size { width: W, height: H }, 5 * i);
             let metres = scene.depth_bytes(DepthFormat::MetresF32);
             (scene, metres)
         })

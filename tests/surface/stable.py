@@ -1,4 +1,4 @@
-"""Prints the public items of the crate `phasefront`, with its re-exports of `phasefront-core` and `phasefront-gpu`.
+"""Prints the public items of the crate `phasefront`, with its re-exports of the crates below it.
 
 `stable.py TARGET` reads the lists of `surface` for each crate in TARGET, and the JSON of rustdoc. It fails if a public
 signature names a type that `phasefront` does not re-export, or if there are too many items.
@@ -37,13 +37,14 @@ def exported(folder: Path) -> dict[str, str]:
 
 
 def defined(folder: Path, path: str) -> str:
-    """Returns the definition of an item that a crate's root re-exports from one of its modules."""
+    """Returns the definition of an item that a crate's root re-exports from one of its modules or another crate."""
     crate, *rest = path.split("::")
     if len(rest) == 1:
         for item in json.loads((folder / f"{crate}.json").read_text())["index"].values():
             use = item["inner"].get("use")
             if use and use["name"] == rest[0]:
-                return f"{crate}::{use['source'].removeprefix('crate::').removeprefix('self::')}"
+                source = use["source"].removeprefix("crate::").removeprefix("self::")
+                return defined(folder, source) if source.startswith("phasefront_") else f"{crate}::{source}"
     return path
 
 
@@ -52,7 +53,7 @@ def main(folder: Path) -> int:
     # Longest first, because a path may begin with another path.
     any_of = re.compile("|".join(rf"{re.escape(path)}\b" for path in sorted(paths, key=len, reverse=True)))
     lines = [line for line in (folder / "phasefront.txt").read_text().splitlines() if not line.startswith("pub use ")]
-    for crate in ("phasefront_core", "phasefront_gpu"):
+    for crate in ("phasefront_core", "phasefront_gpu", "phasefront_kernels"):
         for line in (folder / f"{crate}.txt").read_text().splitlines():
             # The subject of the line: the type of an implementation, or the first path.
             about = line.rsplit(" for ", 1)[-1] if line.startswith("impl") else line

@@ -1,6 +1,7 @@
 //! Camera frames: bytes and their layout.
 
 use crate::error::{Answer, error, of_core};
+use phasefront::Size;
 use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
     Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
@@ -31,8 +32,7 @@ impl Bytes {
 /// An image with one plane.
 struct Image<F> {
     format: F,
-    /// (width, height).
-    size: (usize, usize),
+    size: Size,
     memory: Bytes,
 }
 
@@ -41,8 +41,7 @@ struct Image<F> {
 pub struct RawFrame {
     timestamp_ns: u64,
     colour_format: ColourFormat,
-    /// (width, height).
-    colour_size: (usize, usize),
+    colour_size: Size,
     colour: Vec<Bytes>,
     depth: Option<Image<DepthFormat>>,
     confidence: Option<Image<ConfidenceFormat>>,
@@ -89,7 +88,10 @@ impl RawFrame {
         Ok(RawFrame {
             timestamp_ns,
             colour_format,
-            colour_size: (width as usize, height as usize),
+            colour_size: Size {
+                width: width as usize,
+                height: height as usize,
+            },
             colour: Vec::new(),
             depth: None,
             confidence: None,
@@ -137,7 +139,10 @@ impl RawFrame {
         };
         self.depth = Some(Image {
             format,
-            size: (width as usize, height as usize),
+            size: Size {
+                width: width as usize,
+                height: height as usize,
+            },
             memory: Bytes::new(bytes, row_stride, pixel_stride),
         });
         Ok(())
@@ -163,7 +168,10 @@ impl RawFrame {
         };
         self.confidence = Some(Image {
             format,
-            size: (width as usize, height as usize),
+            size: Size {
+                width: width as usize,
+                height: height as usize,
+            },
             memory: Bytes::new(bytes, row_stride, pixel_stride),
         });
         Ok(())
@@ -224,19 +232,16 @@ impl RawFrame {
     /// Throws an error of kind `frame` if [`ColourImage::new`] or [`DepthImage::new`] fails or the frame has no depth.
     pub(crate) fn frame(&self) -> Answer<CameraFrame<'_>> {
         let planes: Vec<Plane<'_>> = self.colour.iter().map(Bytes::plane).collect();
-        let (width, height) = self.colour_size;
-        let colour = ColourImage::new(self.colour_format, width, height, &planes).map_err(of_core)?;
+        let colour = ColourImage::new(self.colour_format, self.colour_size, &planes).map_err(of_core)?;
         let depth = self
             .depth
             .as_ref()
             .ok_or_else(|| error("frame", "frame: it has no depth"))?;
-        let (width, height) = depth.size;
-        let mut image = DepthImage::new(depth.format, width, height, depth.memory.plane()).map_err(of_core)?;
+        let mut image = DepthImage::new(depth.format, depth.size, depth.memory.plane()).map_err(of_core)?;
         if let Some(confidence) = &self.confidence {
-            let (width, height) = confidence.size;
             let plane = confidence.memory.plane();
             image = image
-                .with_confidence(confidence.format, width, height, plane)
+                .with_confidence(confidence.format, confidence.size, plane)
                 .map_err(of_core)?;
         }
         let mut frame = CameraFrame::new(self.timestamp_ns, colour, image);

@@ -1,9 +1,10 @@
 //! Results, which leave the module as copies, images into the memory of the page.
 
-#[cfg(not(target_feature = "atomics"))]
 use crate::error::error;
 use crate::error::{Answer, object, of_core, setting};
 use js_sys::{Array, Float32Array, Object, Uint8Array};
+#[cfg(not(target_feature = "atomics"))]
+use phasefront::Size;
 #[cfg(not(target_feature = "atomics"))]
 use phasefront::output::Levels;
 use phasefront::output::{Layout, Output, OutputSize, Placement};
@@ -37,7 +38,7 @@ pub struct RawHologram {
 impl RawHologram {
     /// Returns the metadata: an object of the form `HologramInfo`.
     pub fn info(&self) -> Object {
-        let (height, width) = self.core.shape();
+        let Size { width, height } = self.core.size();
         let range = self.core.range_m().map(|(near, far)| [near, far].map(JsValue::from));
         object([
             ("timestamp", (self.core.timestamp_ns() as f64 / 1e3).into()),
@@ -73,18 +74,18 @@ impl RawHologram {
     #[wasm_bindgen(js_name = paintLevels)]
     pub async fn paint_levels(&self, canvas: JsValue) -> Answer<()> {
         let levels = self.core.on_gpu().ok_or_else(elsewhere)?;
-        let (target, shape) = (self.core.target(), self.core.shape());
-        let size = target.modulator();
-        let around = if shape == size {
+        let (target, size) = (self.core.target(), self.core.size());
+        let modulator = target.modulator();
+        let around = if size == modulator {
             None
         } else {
-            let plan = Output::new(target, shape, Placement::centred(Layout::Rgba)).map_err(of_core)?;
-            let mut around = vec![0; 4 * size.0 * size.1];
-            let dark = vec![0; self.core.colours() * shape.0 * shape.1];
+            let plan = Output::new(target, size, Placement::centred(Layout::Rgba)).map_err(of_core)?;
+            let mut around = vec![0; 4 * modulator.pixels()];
+            let dark = vec![0; self.core.colours() * size.pixels()];
             (plan.write(Levels::Bytes(&dark), 0, &mut around, plan.row_bytes())).map_err(of_core)?;
             Some(around)
         };
-        let painted = paint(levels.texture(), size, around.as_deref(), &canvas).await;
+        let painted = paint(levels.texture(), modulator, around.as_deref(), &canvas).await;
         painted.map_err(of_gpu)
     }
 
@@ -96,7 +97,10 @@ impl RawHologram {
     #[wasm_bindgen(js_name = paintPreview)]
     pub async fn paint_preview(&self, z_mm: f64, width: u32, height: u32, canvas: JsValue) -> Answer<()> {
         let levels = self.core.on_gpu().ok_or_else(elsewhere)?;
-        let screen = (height as usize, width as usize);
+        let screen = Size {
+            width: width as usize,
+            height: height as usize,
+        };
         let draw = async |view: &GpuView| paint(view.texture(), screen, None, &canvas).await;
         let drawn = self.core.view_on_gpu(levels, z_mm / 1e3, screen, draw).await;
         drawn.map_err(of_gpu)
@@ -132,9 +136,13 @@ impl RawHologram {
         row_stride: u32,
     ) -> Answer<()> {
         let core = self.here()?;
-        let (layout, screen) = (layout(name)?, (height as usize, width as usize));
-        let row = layout.pixel_bytes() * screen.1;
-        copied(to, row_stride, (screen.0, row), |bytes| {
+        let layout = layout(name)?;
+        let screen = Size {
+            width: width as usize,
+            height: height as usize,
+        };
+        let row = layout.pixel_bytes() * screen.width;
+        copied(to, row_stride, (screen.height, row), |bytes| {
             core.write_preview(z_mm / 1e3, screen, layout, bytes, row)
         })
     }
@@ -165,11 +173,9 @@ impl RawHologram {
     /// Throws an error of kind `setting` if the layout is unknown.
     #[wasm_bindgen(js_name = outputSize)]
     pub fn output_size(&self, name: &str) -> Answer<Object> {
-        let (height, width) = self.core.target().modulator();
         let layout = layout(name)?;
         Ok(size(OutputSize {
-            height,
-            width,
+            size: self.core.target().modulator(),
             pixel_bytes: layout.pixel_bytes(),
             images: layout.images(self.core.colours()),
         }))
@@ -202,8 +208,8 @@ impl RawHologram {
             shift_y,
             ..Placement::centred(layout(name)?)
         };
-        let plan = Output::new(core.target(), core.shape(), placement).map_err(of_core)?;
-        copied(to, row_stride, (plan.shape().0, plan.row_bytes()), |bytes| {
+        let plan = Output::new(core.target(), core.size(), placement).map_err(of_core)?;
+        copied(to, row_stride, (plan.size().height, plan.row_bytes()), |bytes| {
             plan.write(core.output_levels(), image as usize, bytes, plan.row_bytes())
         })
     }
@@ -257,8 +263,8 @@ fn layout(name: &str) -> Answer<Layout> {
 /// Converts a size to an object of the form `OutputSize`.
 pub(crate) fn size(size: OutputSize) -> Object {
     object([
-        ("width", size.width.into()),
-        ("height", size.height.into()),
+        ("width", size.size.width.into()),
+        ("height", size.size.height.into()),
         ("pixelBytes", size.pixel_bytes.into()),
         ("images", size.images.into()),
     ])

@@ -59,10 +59,10 @@ impl RawModulator {
     #[wasm_bindgen(js_name = writeOutput)]
     pub fn write_output(&self, hologram: &RawHologram, image: u32, to: &Uint8Array, row_stride: u32) -> Answer<()> {
         let hologram = hologram.here()?;
-        let input = self.0.input(hologram.shape(), hologram.target()).map_err(of_core)?;
+        let input = self.0.input(hologram.size(), hologram.target()).map_err(of_core)?;
         let all = self.0.output_size();
-        let row = all.width * all.pixel_bytes;
-        copied(to, row_stride, (all.height, row), |bytes| {
+        let row = all.size.width * all.pixel_bytes;
+        copied(to, row_stride, (all.size.height, row), |bytes| {
             input.write(hologram.output_levels(), image as usize, bytes, row)
         })
     }
@@ -75,10 +75,10 @@ impl RawModulator {
     #[wasm_bindgen(js_name = writePixels)]
     pub fn write_pixels(&self, hologram: &RawHologram, image: u32, to: &Uint8Array, row_stride: u32) -> Answer<()> {
         let hologram = hologram.here()?;
-        let input = self.0.input(hologram.shape(), hologram.target()).map_err(of_core)?;
+        let input = self.0.input(hologram.size(), hologram.target()).map_err(of_core)?;
         let all = self.0.output_size();
-        let row = 4 * all.width;
-        copied(to, row_stride, (all.height, row), |bytes| {
+        let row = 4 * all.size.width;
+        copied(to, row_stride, (all.size.height, row), |bytes| {
             input.write_pixels(hologram.output_levels(), image as usize, Layout::Rgba, bytes, row)
         })
     }

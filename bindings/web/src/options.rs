@@ -3,6 +3,7 @@
 use crate::error::{Answer, setting};
 use crate::network::RawNetwork;
 use crate::target::RawTarget;
+use phasefront::Size;
 use phasefront::input::DepthRange;
 #[cfg(not(target_feature = "atomics"))]
 use phasefront::session::Backend;
@@ -205,8 +206,10 @@ impl RawOptions {
     ) {
         self.core.quality_levels.push(QualityLevel {
             method: method.core(&self.core.target),
-            width: width as usize,
-            height: height as usize,
+            size: Size {
+                width: width as usize,
+                height: height as usize,
+            },
             backend: None,
             encoder: Some(stepped(&self.core.encoder, local_steps, midpoint_steps)),
         });

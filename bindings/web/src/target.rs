@@ -61,8 +61,8 @@ impl RawTarget {
         let round = |value: f64| JsValue::from((value * 1e6).round() / 1e6);
         let lasers = display.wavelengths_m().iter().map(|l| round(l * 1e9));
         object([
-            ("width", display.width().into()),
-            ("height", display.height().into()),
+            ("width", display.size().width.into()),
+            ("height", display.size().height.into()),
             ("pitchUm", round(display.pitch_m() * 1e6)),
             ("wavelengthsNm", lasers.collect::<Array>().into()),
             ("volumeDepthMm", round(display.volume_depth_m() * 1e3)),

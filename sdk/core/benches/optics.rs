@@ -3,6 +3,7 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use num_complex::Complex32;
+use phasefront_core::Size;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::Encoder;
 use phasefront_core::encode::Encoding;
@@ -11,7 +12,10 @@ use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_core::output::BitPlanes;
 use phasefront_core::output::modulator::{ModulatorSpec, Packing};
 
-const SIZE: (usize, usize) = (540, 960);
+const SIZE: Size = Size {
+    width: 960,
+    height: 540,
+};
 
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
@@ -20,18 +24,18 @@ fn main() {
 
 /// Returns `planes` planes of a field with a curved phase.
 fn field(planes: usize) -> Vec<Complex32> {
-    (0..planes * SIZE.0 * SIZE.1)
+    (0..planes * SIZE.pixels())
         .map(|i| Complex32::from_polar(0.6 + 0.3 * (i as f32 * 0.01).sin(), i as f32 * 1e-4))
         .collect()
 }
 
 fn pixels(planes: usize) -> ItemsCount {
-    ItemsCount::new(planes * SIZE.0 * SIZE.1)
+    ItemsCount::new(planes * SIZE.pixels())
 }
 
 #[divan::bench(args = [1.0, 6.0, 20.0])]
 fn propagate_mm(bencher: Bencher<'_, '_>, mm: f64) {
-    let plan = Propagator::new(SIZE.0, SIZE.1, 8e-6, 638e-9, mm * 1e-3, Padding::Reach).unwrap();
+    let plan = Propagator::new(SIZE, 8e-6, 638e-9, mm * 1e-3, Padding::Reach).unwrap();
     let (mut plane, mut scratch) = (field(1), plan.scratch());
     let run = || plan.propagate(&mut plane, &mut scratch);
     bencher.counter(pixels(1)).bench_local(run);
@@ -39,7 +43,7 @@ fn propagate_mm(bencher: Bencher<'_, '_>, mm: f64) {
 
 #[divan::bench]
 fn aperture(bencher: Bencher<'_, '_>) {
-    let plan = Aperture::new(SIZE.0, SIZE.1, Opening::centred(1.0)).unwrap();
+    let plan = Aperture::new(SIZE, Opening::centred(1.0)).unwrap();
     let (mut plane, mut scratch) = (field(1), plan.scratch());
     let run = || plan.filter(&mut plane, &mut scratch);
     bencher.counter(pixels(1)).bench_local(run);
@@ -60,12 +64,12 @@ fn pack_24_maps(bencher: Bencher<'_, '_>, threads: usize) {
         unreachable!("it has cells")
     };
     let plan = BitPlanes::new(cells, SIZE, device.flip_x, device.flip_y);
-    let map = |n: usize| (0..SIZE.0 * SIZE.1).map(|i| ((i * 7 + n) % 16) as u8).collect();
+    let map = |n: usize| (0..SIZE.pixels()).map(|i| ((i * 7 + n) % 16) as u8).collect();
     let maps: Vec<Vec<u8>> = (0..24).map(map).collect();
     let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
     let mut frame = vec![0; plan.frame_bytes()];
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let run = || pool.install(|| plan.pack(&maps, &mut frame, 6 * SIZE.1).unwrap());
+    let run = || pool.install(|| plan.pack(&maps, &mut frame, 6 * SIZE.width).unwrap());
     bencher.counter(pixels(24)).bench_local(run);
 }
 

@@ -4,6 +4,7 @@
 mod bounds;
 mod picture;
 
+use crate::Size;
 use crate::runtime::caught::caught;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::file::{self, MOST_DEPTH_NETWORK};
@@ -39,9 +40,9 @@ pub struct DepthNetwork {
     planned: Arc<Mutex<Option<Planned>>>,
 }
 
-/// A network planned for pictures of (h, w) = `to`.
+/// A network planned for pictures of the size `to`.
 struct Planned {
-    to: (usize, usize),
+    to: Size,
     plan: Arc<TypedRunnableModel>,
 }
 
@@ -87,13 +88,13 @@ impl DepthNetwork {
         })
     }
 
-    /// Plans the network for pictures of (H, W) = `shape`, which are brought to the size that the network takes.
+    /// Plans the network for pictures of `size`, which are brought to the size that the network takes.
     ///
     /// # Errors
     /// Returns [`Error::Network`] if it is not a network for depth, or if it would take too much memory or time.
     #[doc(hidden)]
-    pub fn estimator(&self, shape: (usize, usize)) -> Result<DepthEstimator> {
-        let picture = flat(caught(|| Picture::of(&self.model, shape, self.colours)))?;
+    pub fn estimator(&self, size: Size) -> Result<DepthEstimator> {
+        let picture = flat(caught(|| Picture::of(&self.model, size, self.colours)))?;
         let mut planned = self.planned.lock().unwrap_or_else(PoisonError::into_inner);
         let plan = match &*planned {
             Some(Planned { to, plan }) if *to == picture.to() => plan.clone(),

@@ -10,6 +10,7 @@ pub mod registration;
 pub mod response;
 pub mod target;
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::keys;
 use serde::{Deserialize, Serialize};
@@ -24,8 +25,7 @@ const MOST_PIXELS: usize = 1 << 26;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "DisplayToml", into = "DisplayToml")]
 pub struct Display {
-    width: usize,
-    height: usize,
+    size: Size,
     pitch_m: f64,
     wavelengths_m: Vec<f64>,
     volume_depth_m: f64,
@@ -53,8 +53,10 @@ impl Default for Display {
     /// an aperture as wide as the first order.
     fn default() -> Self {
         Display {
-            width: 1920,
-            height: 1080,
+            size: Size {
+                width: 1920,
+                height: 1080,
+            },
             pitch_m: 8e-6,
             wavelengths_m: vec![638e-9, 520e-9, 450e-9],
             volume_depth_m: 6e-3,
@@ -76,8 +78,8 @@ impl From<Display> for DisplayToml {
         // Multiplying by 1e9 gives 637.9999…; files should say 638.
         let round = |x: f64| (x * 1e6).round() / 1e6;
         DisplayToml {
-            width: d.width,
-            height: d.height,
+            width: d.size.width,
+            height: d.size.height,
             pitch_um: round(d.pitch_m * 1e6),
             wavelengths_nm: d.wavelengths_m.iter().map(|l| round(l * 1e9)).collect(),
             volume_depth_mm: round(d.volume_depth_m * 1e3),
@@ -94,8 +96,10 @@ impl TryFrom<DisplayToml> for Display {
     fn try_from(t: DisplayToml) -> Result<Self> {
         // Dividing by a power of ten rounds once: 638/1e9 is the f64 nearest to 638e-9.
         let display = Display {
-            width: t.width,
-            height: t.height,
+            size: Size {
+                width: t.width,
+                height: t.height,
+            },
             pitch_m: t.pitch_um / 1e6,
             wavelengths_m: t.wavelengths_nm.iter().map(|l| l / 1e9).collect(),
             volume_depth_m: t.volume_depth_mm / 1e3,
@@ -134,16 +138,17 @@ impl Display {
 
     fn check(&self) -> Result<()> {
         let refuse = |what: String| Err(Error::Display(what));
-        if self.width == 0 || self.height == 0 || self.width > 65536 || self.height > 65536 {
+        let sides = 1..=65536;
+        if !sides.contains(&self.size.width) || !sides.contains(&self.size.height) {
             return refuse(format!(
-                "width and height are {}×{}; each must lie in 1..=65536",
-                self.width, self.height
+                "width and height are {}; each must lie in 1..=65536",
+                self.size
             ));
         }
-        if self.width * self.height > MOST_PIXELS {
+        if self.size.pixels() > MOST_PIXELS {
             return refuse(format!(
-                "width and height are {}×{}; {MOST_PIXELS} pixels in all are the most",
-                self.width, self.height
+                "width and height are {}; {MOST_PIXELS} pixels in all are the most",
+                self.size
             ));
         }
         if !(0.1e-6..=1e-3).contains(&self.pitch_m) {
@@ -200,14 +205,9 @@ impl Display {
         Ok(())
     }
 
-    /// Returns the number of pixels along x.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Returns the number of pixels along y.
-    pub fn height(&self) -> usize {
-        self.height
+    /// Returns the size of the modulator.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns the distance between neighbouring pixels, in metres.
@@ -262,12 +262,12 @@ impl Display {
         Ok(display)
     }
 
-    /// Returns this display with (`height`, `width`) pixels.
+    /// Returns this display with a modulator of `size`.
     ///
     /// # Errors
     /// Returns an error if a side lies outside 1..=65536, or if there are over 2²⁶ pixels.
-    pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
-        let display = Display { height, width, ..self };
+    pub fn with_size(self, size: Size) -> Result<Self> {
+        let display = Display { size, ..self };
         display.check()?;
         Ok(display)
     }
@@ -310,7 +310,7 @@ mod tests {
     fn toml_form_round_trips_and_fills_in_defaults() {
         let d = Display::from_toml("pitch_um = 3.74\nwavelengths_nm = [638, 520, 450]").unwrap();
         assert_eq!(d.pitch_m(), 3.74e-6);
-        assert_eq!(d.width(), 1920);
+        assert_eq!(d.size().width, 1920);
         assert_eq!(d.wavelengths_m(), Display::default().wavelengths_m());
         let text = toml::Value::try_from(&d).unwrap();
         assert_eq!(text["wavelengths_nm"][0].as_float(), Some(638.0));

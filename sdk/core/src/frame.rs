@@ -9,6 +9,7 @@ mod plane;
 pub mod reference;
 mod resample;
 
+use crate::Size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix, check_size};
 
 pub use convert::{ColourPlan, ColourScratch, luminance, yuv_constants};
@@ -85,7 +86,7 @@ impl RgbdFrame {
     /// amplitude, and Y = 0.2126·R + 0.7152·G + 0.0722·B (Rec. 709). For three lasers, a frame of one colour becomes
     /// grey.
     pub fn for_display(self, display: &Display) -> Self {
-        let (height, width) = self.shape();
+        let Size { width, height } = self.size();
         let rgb = match (self.colours(), display.colours()) {
             (3, 1) => {
                 let mut amplitude = Array3::zeros((1, height, width));
@@ -102,7 +103,7 @@ impl RgbdFrame {
 
     /// Creates a black frame with `colours` colours at the far end of the volume.
     #[doc(hidden)]
-    pub fn black(colours: usize, (height, width): (usize, usize)) -> Self {
+    pub fn black(colours: usize, Size { width, height }: Size) -> Self {
         RgbdFrame {
             rgb: Array3::zeros((colours, height, width)),
             depth: Array2::ones((height, width)),
@@ -116,9 +117,9 @@ impl RgbdFrame {
         planes.expect("both are made in standard layout")
     }
 
-    /// Returns (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.depth.dim()
+    /// Returns the size.
+    pub fn size(&self) -> Size {
+        Size::from_shape(self.depth.dim())
     }
 
     /// Returns the number of colours, C: 3 or 1.
@@ -146,18 +147,15 @@ impl RgbdFrame {
         )
     }
 
-    /// Checks that the frame has the shape and the number of colours of a plan.
+    /// Checks that the frame has the size and the number of colours of a plan.
     ///
     /// # Errors
-    /// Returns an error if the shape or the number of colours differs.
+    /// Returns an error if the size or the number of colours differs.
     #[doc(hidden)]
-    pub fn check(&self, plan: (usize, usize), colours: usize) -> Result<()> {
-        let (height, width) = self.shape();
-        if (height, width) != plan {
-            return Err(Error::Frame(format!(
-                "the frame is {width}×{height}; this plan takes {}×{}",
-                plan.1, plan.0
-            )));
+    pub fn check(&self, plan: Size, colours: usize) -> Result<()> {
+        let size = self.size();
+        if size != plan {
+            return Err(Error::Frame(format!("the frame is {size}; this plan takes {plan}")));
         }
         if self.colours() != colours {
             return Err(Error::Frame(format!(
@@ -199,7 +197,13 @@ mod tests {
                 .outer_iter()
                 .all(|plane| plane == shown.rgb().index_axis(ndarray::Axis(0), 0))
         );
-        assert!(frame.check((2, 4), 1).unwrap_err().to_string().contains("for_display"));
+        assert!(
+            frame
+                .check(Size { width: 4, height: 2 }, 1)
+                .unwrap_err()
+                .to_string()
+                .contains("for_display")
+        );
     }
 
     #[test]

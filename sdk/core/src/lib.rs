@@ -34,3 +34,5 @@ pub mod output;
 pub mod pipeline;
 pub mod runtime;
 pub mod view;
+
+pub use phasefront_kernels::Size;

@@ -4,6 +4,7 @@ pub mod network;
 pub mod seeded;
 pub mod sweep;
 
+use crate::Size;
 use crate::depth::softness;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
@@ -58,21 +59,21 @@ impl Method {
     }
 }
 
-/// Plans `sweep` for frames of (`height`, `width`). The sweep ends at the display if that is close enough, otherwise at
+/// Plans `sweep` for frames of `size`. The sweep ends at the display if that is close enough, otherwise at
 /// the midpoint.
-pub fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) -> Result<SweepPlan> {
+pub fn sweep_plan(size: Size, sweep: Sweep, display: &Display) -> Result<SweepPlan> {
     let offset_m = display.offset_m();
     let z_m = if sweep::reaches(display, offset_m) {
         offset_m
     } else {
         0.0
     };
-    SweepPlan::new(height, width, display, sweep, z_m)
+    SweepPlan::new(size, display, sweep, z_m)
 }
 
 /// A plan of a [`Method`] for one frame shape. It is immutable and can be shared between threads.
 pub struct MethodPlan {
-    shape: (usize, usize),
+    size: Size,
     colours: usize,
     plan: Plan,
 }
@@ -124,37 +125,37 @@ impl MethodScratch {
 }
 
 impl MethodPlan {
-    /// Plans `method` for frames of (`height`, `width`) and the volume of `display`.
+    /// Plans `method` for frames of `size` and the volume of `display`.
     ///
     /// # Errors
     /// Returns an error if a network is for layered input or for another display, or if the method cannot be planned
     /// for this shape.
-    pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
+    pub fn new(size: Size, method: Method, display: &Display) -> Result<Self> {
         method.check(display)?;
         let plan = match method {
-            Method::Network(network) => Plan::Network(Box::new(network.plan_for(height, width, display)?)),
+            Method::Network(network) => Plan::Network(Box::new(network.plan_for(size, display)?)),
             Method::Seeded(network) => {
-                let plan = SeededPlan::new(height, width, &network, display)?;
+                let plan = SeededPlan::new(size, &network, display)?;
                 Plan::Seeded(Box::new(plan))
             }
-            Method::Sweep(sweep) => Plan::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
+            Method::Sweep(sweep) => Plan::Sweep(Box::new(sweep_plan(size, sweep, display)?)),
             Method::Auto(sweep, network) => {
                 // Both methods end at the midpoint, as the network does.
-                let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
-                let trained = MethodPlan::new(height, width, Method::trained(network), display)?;
+                let sweep = SweepPlan::new(size, display, sweep, 0.0)?;
+                let trained = MethodPlan::new(size, Method::trained(network), display)?;
                 Plan::Auto(Box::new(sweep), Box::new(trained))
             }
         };
         Ok(MethodPlan {
-            shape: (height, width),
+            size,
             colours: display.colours(),
             plan,
         })
     }
 
     /// Returns the frame shape (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.shape
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns the position of the hologram in metres from the midpoint toward the viewer. A sweep continues to the
@@ -219,7 +220,7 @@ impl MethodPlan {
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
-        frame.check(self.shape, self.colours)?;
+        frame.check(self.size, self.colours)?;
         match (&self.plan, &mut scratch.0) {
             (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
             (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),

@@ -12,6 +12,7 @@ mod input;
 pub mod modulator;
 mod split;
 
+use crate::Size;
 pub use cells::{BitPlanes, Cells};
 pub use input::{ModulatorInput, OutputSize};
 pub use split::Split;
@@ -151,8 +152,8 @@ impl Placement {
 #[derive(Debug, Clone)]
 pub struct Output {
     colours: usize,
-    modulator: (usize, usize),
-    hologram: (usize, usize),
+    modulator: Size,
+    hologram: Size,
     placement: Placement,
     /// The position of the image's upper left pixel in the hologram. It may lie outside.
     from: (i64, i64),
@@ -178,13 +179,13 @@ impl Output {
     ///
     /// # Errors
     /// Returns an error if the hologram is larger than the modulator or a per-pixel table is for a smaller one.
-    pub fn new(target: &Target, (height, width): (usize, usize), placement: Placement) -> Result<Self> {
+    pub fn new(target: &Target, Size { width, height }: Size, placement: Placement) -> Result<Self> {
         target.check()?;
         let (modulator, bits) = (target.modulator(), target.display.bits());
-        if height > modulator.0 || width > modulator.1 {
+        if height > modulator.height || width > modulator.width {
             return Err(Error::Setting(format!(
                 "a hologram of {width}×{height} does not fit the modulator of {}×{}",
-                modulator.1, modulator.0
+                modulator.width, modulator.height
             )));
         }
         let from =
@@ -192,11 +193,11 @@ impl Output {
         Ok(Output {
             colours: target.display.colours(),
             modulator,
-            hologram: (height, width),
+            hologram: Size { width, height },
             placement,
             from: (
-                from(modulator.0, height, placement.shift_y),
-                from(modulator.1, width, placement.shift_x),
+                from(modulator.height, height, placement.shift_y),
+                from(modulator.width, width, placement.shift_x),
             ),
             bits: match &target.response {
                 Response::Linear { bits: bytes } => (*bytes, bits),
@@ -212,16 +213,16 @@ impl Output {
 
     /// Returns the number of bytes of an image without gaps between rows.
     pub fn image_bytes(&self) -> usize {
-        self.modulator.0 * self.row_bytes()
+        self.modulator.height * self.row_bytes()
     }
 
     /// Returns the number of bytes of a row of an image.
     pub fn row_bytes(&self) -> usize {
-        self.modulator.1 * self.placement.layout.pixel_bytes()
+        self.modulator.width * self.placement.layout.pixel_bytes()
     }
 
     /// Returns the shape (H, W) of an image.
-    pub fn shape(&self) -> (usize, usize) {
+    pub fn size(&self) -> Size {
         self.modulator
     }
 
@@ -234,7 +235,7 @@ impl Output {
     /// # Panics
     /// Panics if `levels` does not have the planned length.
     pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8], row_stride: usize) -> Result<()> {
-        let size = self.colours * self.hologram.0 * self.hologram.1;
+        let size = self.colours * self.hologram.height * self.hologram.width;
         let (byte_bits, word_bits) = self.bits;
         match levels {
             Levels::Bytes(levels) => {
@@ -243,7 +244,7 @@ impl Output {
                 let dark = |odd: usize, colour: usize, (y, x): (usize, usize)| match &self.around {
                     Dark::Everywhere(levels) => levels[odd].into(),
                     Dark::PerPixel(table) => {
-                        let (height, width) = self.modulator;
+                        let Size { width, height } = self.modulator;
                         let at = (colour * height + y) * width + x;
                         table.level(DARK[odd], at).into()
                     }
@@ -271,8 +272,11 @@ impl Output {
     /// Panics if `levels` or `bytes` does not have the planned length.
     pub fn read(&self, bytes: &[u8], image: usize, levels: &mut [u16]) -> Result<()> {
         let layout = self.placement.layout;
-        let (height, width) = self.hologram;
-        let (out_height, out_width) = self.modulator;
+        let Size { width, height } = self.hologram;
+        let Size {
+            width: out_width,
+            height: out_height,
+        } = self.modulator;
         assert_eq!(bytes.len(), self.image_bytes());
         assert_eq!(levels.len(), self.colours * height * width);
         self.check_image(image)?;
@@ -320,8 +324,11 @@ impl Output {
         (bytes, row_stride): (&mut [u8], usize),
     ) -> Result<()> {
         let layout = self.placement.layout;
-        let (height, width) = self.hologram;
-        let (out_height, out_width) = self.modulator;
+        let Size { width, height } = self.hologram;
+        let Size {
+            width: out_width,
+            height: out_height,
+        } = self.modulator;
         self.check_image(image)?;
         let place = layout.place_bits();
         let placed = |level: u16| {
@@ -379,12 +386,12 @@ fn check_rows(len: usize, row_stride: usize, (height, row_bytes): (usize, usize)
 pub(crate) fn rows(
     bytes: &mut [u8],
     row_stride: usize,
-    shape: (usize, usize),
+    (height, row_bytes): (usize, usize),
 ) -> Result<impl IndexedParallelIterator<Item = &mut [u8]>> {
-    let len = check_rows(bytes.len(), row_stride, shape)?;
+    let len = check_rows(bytes.len(), row_stride, (height, row_bytes))?;
     Ok(bytes[..len]
         .par_chunks_mut(row_stride)
-        .map(move |row| &mut row[..shape.1]))
+        .map(move |row| &mut row[..row_bytes]))
 }
 
 /// Returns position `at` of `n`, counted from the other end if `flipped`.
@@ -398,13 +405,15 @@ mod tests {
     use super::*;
     use crate::display::Display;
 
-    fn target(width: usize, height: usize, bits: u32) -> Target {
+    fn target(size: Size, bits: u32) -> Target {
+        let Size { width, height } = size;
         let toml = format!("width = {width}\nheight = {height}\nbits = {bits}");
         Display::from_toml(&toml).unwrap().into()
     }
 
     /// Returns levels that identify colour, row and column.
-    fn levels(height: usize, width: usize) -> Vec<u8> {
+    fn levels(size: Size) -> Vec<u8> {
+        let Size { width, height } = size;
         (0..3 * height * width)
             .map(|i| {
                 let (c, y, x) = (i / (height * width), i / width % height, i % width);
@@ -423,7 +432,7 @@ mod tests {
 
     #[test]
     fn each_layout_holds_each_colour_in_its_place() {
-        let levels = levels(2, 3);
+        let levels = levels(Size { width: 3, height: 2 });
         for (layout, expected) in [
             (Layout::Rgb, vec![100, 150, 200, 101, 151, 201]),
             (Layout::Rgba, vec![100, 150, 200, 255, 101, 151]),
@@ -431,7 +440,11 @@ mod tests {
             (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
             (Layout::Grey16, vec![0, 100, 0, 101, 0, 102]),
         ] {
-            let output = Output::new(&target(3, 2, 8), (2, 3), Placement::centred(layout));
+            let output = Output::new(
+                &target(Size { width: 3, height: 2 }, 8),
+                Size { width: 3, height: 2 },
+                Placement::centred(layout),
+            );
             let output = output.unwrap();
             assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
             assert!(
@@ -452,7 +465,7 @@ mod tests {
 
     #[test]
     fn holograms_stand_in_the_middle_shifted_and_flipped_with_darkness_around() {
-        let levels = levels(2, 3);
+        let levels = levels(Size { width: 3, height: 2 });
         // In a 7×4 modulator the hologram has two columns to its left and one row above it.
         let place = |x: usize, y: usize, p: &Placement| {
             let x = if p.flip_x { 6 - x } else { x } as i32 - 2 - p.shift_x;
@@ -478,19 +491,36 @@ mod tests {
                 shift_y,
                 ..Placement::centred(Layout::Grey)
             };
-            let output = Output::new(&target(7, 4, 8), (2, 3), placement).unwrap();
+            let output = Output::new(
+                &target(Size { width: 7, height: 4 }, 8),
+                Size { width: 3, height: 2 },
+                placement,
+            )
+            .unwrap();
             for (i, byte) in image(&output, &levels, 0).into_iter().enumerate() {
                 assert_eq!(byte, place(i % 7, i / 7, &placement), "{placement:?} {i}");
             }
         }
-        assert!(Output::new(&target(2, 4, 8), (2, 3), Placement::centred(Layout::Rgb)).is_err());
+        assert!(
+            Output::new(
+                &target(Size { width: 2, height: 4 }, 8),
+                Size { width: 3, height: 2 },
+                Placement::centred(Layout::Rgb)
+            )
+            .is_err()
+        );
     }
 
     #[test]
     fn rows_with_gaps_have_the_same_pixels_and_keep_their_gaps() {
-        let levels = levels(2, 3);
+        let levels = levels(Size { width: 3, height: 2 });
         for layout in [Layout::Rgb, Layout::Bgra, Layout::Grey16] {
-            let output = Output::new(&target(5, 4, 8), (2, 3), Placement::centred(layout)).unwrap();
+            let output = Output::new(
+                &target(Size { width: 5, height: 4 }, 8),
+                Size { width: 3, height: 2 },
+                Placement::centred(layout),
+            )
+            .unwrap();
             let (plain, row) = (image(&output, &levels, 0), output.row_bytes());
             let stride = row + 7;
             let mut gaps = vec![7; 3 * stride + row];
@@ -512,7 +542,12 @@ mod tests {
     fn few_bits_stand_in_the_upper_ones() {
         for bits in 1..=8 {
             let placement = Placement::centred(Layout::Grey);
-            let output = Output::new(&target(1, 1, bits), (1, 1), placement).unwrap();
+            let output = Output::new(
+                &target(Size { width: 1, height: 1 }, bits),
+                Size { width: 1, height: 1 },
+                placement,
+            )
+            .unwrap();
             let top = ((1u32 << bits) - 1) as u8;
             assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
         }
@@ -536,7 +571,12 @@ mod tests {
                 shift_x: 1,
                 ..Placement::centred(layout)
             };
-            let output = Output::new(&target(9, 6, bits), (3, 5), placement).unwrap();
+            let output = Output::new(
+                &target(Size { width: 9, height: 6 }, bits),
+                Size { width: 5, height: 3 },
+                placement,
+            )
+            .unwrap();
             let words: Vec<u16> = (0..45).map(|i| (i * 37 + 5) % (1 << bits)).collect();
             let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
             let mut read = vec![0; words.len()];
@@ -552,14 +592,19 @@ mod tests {
             }
             assert_eq!(read, words, "{layout:?}");
         }
-        let output = Output::new(&target(2, 1, 10), (1, 2), Placement::centred(Layout::Grey)).unwrap();
+        let output = Output::new(
+            &target(Size { width: 2, height: 1 }, 10),
+            Size { width: 2, height: 1 },
+            Placement::centred(Layout::Grey),
+        )
+        .unwrap();
         let error = output.read(&[0; 2], 0, &mut [0; 6]).unwrap_err().to_string();
         assert!(error.contains("10"), "{error}");
     }
 
     #[test]
     fn ten_bits_stand_in_words() {
-        let target = target(2, 1, 10);
+        let target = target(Size { width: 2, height: 1 }, 10);
         let words = [1023, 5, 512, 6, 256, 7];
         for (layout, expected) in [
             (
@@ -569,14 +614,19 @@ mod tests {
             (Layout::Grey16, (1023u16 << 6).to_le_bytes().to_vec()),
             (Layout::Rgb, vec![255, 128, 64]),
         ] {
-            let output = Output::new(&target, (1, 2), Placement::centred(layout)).unwrap();
+            let output = Output::new(&target, Size { width: 2, height: 1 }, Placement::centred(layout)).unwrap();
             let mut bytes = vec![0; output.image_bytes()];
             output
                 .write(Levels::Words(&words), 0, &mut bytes, output.row_bytes())
                 .unwrap();
             assert_eq!(bytes[..expected.len()], expected, "{layout:?}");
         }
-        let around = Output::new(&target, (1, 1), Placement::centred(Layout::Grey16)).unwrap();
+        let around = Output::new(
+            &target,
+            Size { width: 1, height: 1 },
+            Placement::centred(Layout::Grey16),
+        )
+        .unwrap();
         let mut bytes = vec![0; around.image_bytes()];
         around
             .write(Levels::Words(&[1, 2, 3]), 1, &mut bytes, around.row_bytes())

@@ -4,6 +4,7 @@
 pub mod display_plan;
 pub mod field;
 
+use crate::Size;
 use crate::display::levels::LevelsMut;
 use crate::display::target::Target;
 use crate::encode::EncoderOptions;
@@ -90,15 +91,15 @@ impl PipelineScratch {
 }
 
 impl Pipeline {
-    /// Plans `method` for frames of (H, W) = `shape` and for `target`.
+    /// Plans `method` for frames of `size` and for `target`.
     ///
     /// # Errors
     /// Returns an error if [`Method`] or the propagation to the target cannot be planned: the network is for another
     /// display, an offset or correction moves light farther than can be padded, or a parameter is out of its range.
-    pub fn new(shape: (usize, usize), method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
-        let method = MethodPlan::new(shape.0, shape.1, method, &target.display)?;
+    pub fn new(size: Size, method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
+        let method = MethodPlan::new(size, method, &target.display)?;
         // The display plan covers the remaining distance to the modulator.
-        let display = DisplayPlan::from_z(shape, method.z_m(), target, options)?;
+        let display = DisplayPlan::from_z(size, method.z_m(), target, options)?;
         Ok(Pipeline { method, display })
     }
 
@@ -108,8 +109,8 @@ impl Pipeline {
     }
 
     /// Returns the frame shape (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.method.shape()
+    pub fn size(&self) -> Size {
+        self.method.size()
     }
 
     /// Returns the plan of the method.
@@ -199,7 +200,7 @@ impl Pipeline {
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
         let mut field = std::mem::take(&mut scratch.field);
-        let (height, width) = self.shape();
+        let Size { width, height } = self.size();
         field.resize(self.colours() * height * width, Complex32::ZERO);
         let report = self.process_in(&mut field, past, frame, levels, scratch);
         scratch.field = field;
@@ -241,7 +242,7 @@ impl Pipeline {
     /// # Errors
     /// Returns an error if the frame has another shape.
     pub fn levels(&self, frame: &RgbdFrame) -> Result<Vec<u8>> {
-        let (height, width) = self.shape();
+        let Size { width, height } = self.size();
         let mut levels = vec![0; self.colours() * height * width];
         self.process(frame, &mut levels, &mut self.scratch())?;
         Ok(levels)
@@ -251,7 +252,7 @@ impl Pipeline {
 impl Debug for Pipeline {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         let mut all = f.debug_struct("Pipeline");
-        all.field("shape", &self.shape()).field("colours", &self.colours());
+        all.field("shape", &self.size()).field("colours", &self.colours());
         all.finish_non_exhaustive()
     }
 }
@@ -295,7 +296,7 @@ mod tests {
             encoding: Encoding::Deep(deep),
             ..EncoderOptions::default()
         };
-        let mut frame = RgbdFrame::black(3, (height, width));
+        let mut frame = RgbdFrame::black(3, Size { width, height });
         let (amplitude, depth) = frame.planes_mut();
         (amplitude.iter_mut().enumerate()).for_each(|(i, a)| *a = (i % 7) as f32 / 7.0);
         (depth.iter_mut().enumerate()).for_each(|(i, d)| *d = (i % 5) as f32 / 5.0);
@@ -306,7 +307,7 @@ mod tests {
             (Method::Sweep(sweep), target, steps),
             (Method::Auto(sweep, int8), target, EncoderOptions::default()),
         ] {
-            let pipeline = Pipeline::new((height, width), method, target, &options).unwrap();
+            let pipeline = Pipeline::new(Size { width, height }, method, target, &options).unwrap();
             let values = 3 * height * width;
             let untouched = Complex32::new(1.5, -2.5);
             let run = |scratch: &mut PipelineScratch| {

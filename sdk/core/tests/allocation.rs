@@ -11,6 +11,7 @@ use counting::ALLOCATIONS;
 use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
+use phasefront_core::Size;
 use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
@@ -59,13 +60,24 @@ fn count(mut call: impl FnMut()) -> usize {
 fn camera_frames_and_previews() {
     let (h, w) = (30, 40);
     let bytes: Vec<u8> = (0..4 * 50 * 60).map(|i| (i * 37 % 251) as u8).collect();
-    let image = ColourImage::new(ColourFormat::Rgba, 60, 50, &[Plane::new(&bytes, 240, 4)]).unwrap();
-    let plan = ColourPlan::new(&image, Orientation::default(), h, w).unwrap();
+    let image = ColourImage::new(
+        ColourFormat::Rgba,
+        Size { width: 60, height: 50 },
+        &[Plane::new(&bytes, 240, 4)],
+    )
+    .unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), Size { width: w, height: h }).unwrap();
     let mut scratch = plan.scratch();
     let mut rgb = vec![0.0; 3 * h * w];
     let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
     assert_eq!(count(convert), 0);
-    let plan = Conditioner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w), false).unwrap();
+    let plan = Conditioner::new(
+        Size { width: 20, height: 15 },
+        Crop::cover(Size { width: 20, height: 15 }, Size { width: w, height: h }),
+        Size { width: w, height: h },
+        false,
+    )
+    .unwrap();
     let mut scratch = plan.scratch();
     let depth: Vec<f32> = (0..300)
         .map(|i| if i % 7 == 0 { f32::NAN } else { (i % 20) as f32 / 20.0 })
@@ -73,7 +85,13 @@ fn camera_frames_and_previews() {
     let mut conditioned = vec![0.0; h * w];
     let condition = || plan.condition(&depth, &rgb, &mut conditioned, &mut scratch).unwrap();
     assert_eq!(count(condition), 0);
-    let plan = Preview::new((h, w), &Target::default(), 2e-3, (20, 20)).unwrap();
+    let plan = Preview::new(
+        Size { width: w, height: h },
+        &Target::default(),
+        2e-3,
+        Size { width: 20, height: 20 },
+    )
+    .unwrap();
     let mut scratch = plan.scratch();
     let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
     let look = || {
@@ -81,7 +99,12 @@ fn camera_frames_and_previews() {
             .unwrap()
     };
     assert_eq!(count(look), 0);
-    let plan = Output::new(&Target::default(), (h, w), Placement::centred(Layout::Bgra)).unwrap();
+    let plan = Output::new(
+        &Target::default(),
+        Size { width: w, height: h },
+        Placement::centred(Layout::Bgra),
+    )
+    .unwrap();
     let mut image = vec![0; plan.image_bytes()];
     let write = || {
         plan.write(Levels::Bytes(&levels), 0, &mut image, plan.row_bytes())
@@ -91,17 +114,17 @@ fn camera_frames_and_previews() {
 }
 
 /// Returns a target with all possible results of calibration and bench measurements.
-fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
-    let (rows, columns) = per_pixel::nodes(h, w, 8);
+fn calibrated(display: &Display, Size { width: w, height: h }: Size) -> Target {
+    let (rows, columns) = per_pixel::nodes(Size { width: w, height: h }, 8);
     let levels_of = |i: usize| (i % 9) as f32 * 32.0;
     let table: Vec<f32> = (0..27 * rows * columns).map(levels_of).collect();
     let turns = vec![6.0; 3 * rows * columns];
-    let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
+    let table = PerPixel::new(Size { width: w, height: h }, 8, 8, &table, &turns).unwrap();
     let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
     let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
-    let flatness = Flatness::new((h, w), (0..h * w).map(|i| 7 * i as u16).collect()).unwrap();
+    let flatness = Flatness::new(Size { width: w, height: h }, (0..h * w).map(|i| 7 * i as u16).collect()).unwrap();
     Target {
-        display: display.clone().with_size(h, w).unwrap(),
+        display: display.clone().with_size(Size { width: w, height: h }).unwrap(),
         panel: Panel {
             flatness: Some(flatness),
             ..Panel::default()
@@ -120,13 +143,13 @@ fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
 /// Tests whole frames on a display of one laser, on the current thread pool.
 fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
     let display = Display::from_toml("wavelengths_nm = [520]\noffset_mm = 6").unwrap();
-    let (h, w) = frame.shape();
+    let Size { width: w, height: h } = frame.size();
     let frame = frame.clone().for_display(&display);
     let mut levels = vec![0; h * w];
     let model = model::Model::new((3, 4), vec![ColourModel::ideal((3, 4))]).unwrap();
     let learned = Target {
         model: Some(model.into()),
-        ..Target::from(display.clone().with_size(h, w).unwrap())
+        ..Target::from(display.clone().with_size(Size { width: w, height: h }).unwrap())
     };
     let steps = EncoderOptions {
         midpoint_steps: 2,
@@ -139,7 +162,7 @@ fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
         (Method::trained(seeded), plain),
         (sweep, (learned, steps)),
     ] {
-        let plan = Pipeline::new((h, w), method.clone(), &target, &options).unwrap();
+        let plan = Pipeline::new(Size { width: w, height: h }, method.clone(), &target, &options).unwrap();
         let mut scratch = plan.scratch();
         let mut process = || {
             plan.process(&frame, &mut levels, &mut scratch).unwrap();
@@ -176,10 +199,10 @@ fn hot_calls_allocate_nothing() {
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let plan = Propagator::new(h, w, 8e-6, 520e-9, 3e-3, Padding::Reach).unwrap();
+            let plan = Propagator::new(Size { width: w, height: h }, 8e-6, 520e-9, 3e-3, Padding::Reach).unwrap();
             let mut scratch = plan.scratch();
             assert_eq!(count(|| plan.propagate(&mut plane, &mut scratch)), 0);
-            let plan = Aperture::new(h, w, Opening::centred(1.0)).unwrap();
+            let plan = Aperture::new(Size { width: w, height: h }, Opening::centred(1.0)).unwrap();
             let mut scratch = plan.scratch();
             assert_eq!(count(|| plan.filter(&mut plane, &mut scratch)), 0);
             for encoding in [
@@ -188,7 +211,12 @@ fn hot_calls_allocate_nothing() {
                 Encoding::BAND_LIMIT,
                 Encoding::Deep(prefilter.clone()),
             ] {
-                let plan = DisplayPlan::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
+                let plan = DisplayPlan::new(
+                    Size { width: w, height: h },
+                    &(&display).into(),
+                    &encoding.clone().into(),
+                )
+                .unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
@@ -196,8 +224,8 @@ fn hot_calls_allocate_nothing() {
                 };
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
-            let target = calibrated(&display, (h, w));
-            let plan = DisplayPlan::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
+            let target = calibrated(&display, Size { width: w, height: h });
+            let plan = DisplayPlan::new(Size { width: w, height: h }, &target, &Encoding::DoublePhase.into()).unwrap();
             let mut scratch = plan.scratch();
             let frame = || {
                 plan.propagate(&mut field, &mut scratch);
@@ -210,7 +238,7 @@ fn hot_calls_allocate_nothing() {
                 Method::trained(seeded.clone()),
                 Method::Auto(Sweep::for_display(&display), seeded.clone()),
             ] {
-                let plan = MethodPlan::new(h, w, method.clone(), &display).unwrap();
+                let plan = MethodPlan::new(Size { width: w, height: h }, method.clone(), &display).unwrap();
                 let mut scratch = plan.scratch();
                 let sweep = || plan.field(&swept, &mut field, &mut scratch).unwrap();
                 assert_eq!(count(sweep), 0, "{method:?}");

@@ -1,6 +1,7 @@
 //! Tests depth networks that would exhaust memory, run forever, or make tract panic. Each is refused with one line.
 #![allow(clippy::unwrap_used)]
 
+use phasefront_core::Size;
 use phasefront_core::depth_network::{ColourScale, DepthNetwork};
 use prost::Message;
 use std::path::Path;
@@ -105,7 +106,10 @@ fn file(output: &str, nodes: Vec<NodeProto>, initializer: Vec<TensorProto>) -> V
 fn run(path: &Path) -> phasefront_core::runtime::error::Result<(usize, usize)> {
     let mut network = DepthNetwork::open(path)?;
     network.colours = ColourScale::Unit;
-    Ok(network.estimator((16, 24))?.estimate(&[0.5; 3 * 16 * 24])?.dim())
+    Ok(network
+        .estimator(Size { width: 24, height: 16 })?
+        .estimate(&[0.5; 3 * 16 * 24])?
+        .dim())
 }
 
 /// Returns networks that make tract 0.23 panic.

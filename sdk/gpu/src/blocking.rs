@@ -5,6 +5,7 @@ use crate::device::{Device, DeviceOptions};
 use crate::input::{Colour, Depth, Frame};
 use crate::pipeline::{Deliver, GpuPipeline, GpuReport, Job, Ticket};
 use crate::{ChainOptions, GpuNetworkPlan, Past, Result, probe_async};
+use phasefront_core::Size;
 use phasefront_core::method::network::Network;
 use pollster::block_on;
 use std::sync::Arc;
@@ -46,18 +47,12 @@ impl Device {
 }
 
 impl GpuNetworkPlan {
-    /// Prepares `network` for frames of `height` × `width` pixels.
+    /// Prepares `network` for frames of `size`.
     ///
     /// # Errors
     /// Returns the errors of [`GpuNetworkPlan::new_async`].
-    pub fn new(
-        device: &Arc<Device>,
-        network: &Network,
-        height: usize,
-        width: usize,
-        options: ChainOptions,
-    ) -> Result<Self> {
-        block_on(Self::new_async(device, network, height, width, options))
+    pub fn new(device: &Arc<Device>, network: &Network, size: Size, options: ChainOptions) -> Result<Self> {
+        block_on(Self::new_async(device, network, size, options))
     }
 
     /// Runs the network on one frame, as [`GpuNetworkPlan::run_async`] does.

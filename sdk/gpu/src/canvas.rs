@@ -3,6 +3,7 @@
 use super::device::{Device, one_line};
 use super::{GpuError, Result};
 use js_sys::Reflect;
+use phasefront_core::Size;
 use std::cell::RefCell;
 use std::sync::Arc;
 use wasm_bindgen::{JsCast, JsValue};
@@ -18,7 +19,7 @@ struct Canvas {
     surface: wgpu::Surface<'static>,
     device: wgpu::Device,
     /// (H, W).
-    size: (usize, usize),
+    size: Size,
 }
 
 thread_local! {
@@ -34,7 +35,7 @@ thread_local! {
 /// Returns [`GpuError::Refused`] if it is no canvas or a canvas with a context of another kind, and [`GpuError::Lost`].
 pub async fn paint(
     (device, texture): (&Arc<Device>, &wgpu::Texture),
-    size: (usize, usize),
+    size: Size,
     around: Option<&[u8]>,
     canvas: &JsValue,
 ) -> Result<()> {
@@ -78,24 +79,18 @@ impl Canvas {
             element: element.clone(),
             surface,
             device: device.inner.clone(),
-            size: (0, 0),
+            size: Size { width: 0, height: 0 },
         })
     }
 
-    fn copy(
-        &mut self,
-        device: &Device,
-        texture: &wgpu::Texture,
-        size: (usize, usize),
-        around: Option<&[u8]>,
-    ) -> Result<()> {
+    fn copy(&mut self, device: &Device, texture: &wgpu::Texture, size: Size, around: Option<&[u8]>) -> Result<()> {
         // A page may have given the canvas another size since.
         let side = |name: &str| {
             Reflect::get(&self.element, &name.into())
                 .ok()
                 .and_then(|side| side.as_f64())
         };
-        let fits = [("height", size.0), ("width", size.1)]
+        let fits = [("height", size.height), ("width", size.width)]
             .iter()
             .all(|(name, n)| side(name) == Some(*n as f64));
         if !fits || self.size != size || self.device != device.inner {
@@ -103,8 +98,8 @@ impl Canvas {
                 usage: wgpu::TextureUsages::COPY_DST,
                 format: wgpu::TextureFormat::Rgba8Unorm,
                 color_space: wgpu::SurfaceColorSpace::Auto,
-                width: size.1 as u32,
-                height: size.0 as u32,
+                width: size.width as u32,
+                height: size.height as u32,
                 present_mode: wgpu::PresentMode::Fifo,
                 desired_maximum_frame_latency: 2,
                 alpha_mode: wgpu::CompositeAlphaMode::Opaque,
@@ -122,7 +117,7 @@ impl Canvas {
         if let Some(around) = around {
             let layout = wgpu::TexelCopyBufferLayout {
                 offset: 0,
-                bytes_per_row: Some(4 * size.1 as u32),
+                bytes_per_row: Some(4 * size.width as u32),
                 rows_per_image: None,
             };
             let all = to.texture.size();
@@ -132,8 +127,8 @@ impl Canvas {
         }
         let mut encoder = device.inner.create_command_encoder(&Default::default());
         let mut place = to.texture.as_image_copy();
-        place.origin.x = (size.1 as u32 - texture.width()) / 2;
-        place.origin.y = (size.0 as u32 - texture.height()) / 2;
+        place.origin.x = (size.width as u32 - texture.width()) / 2;
+        place.origin.y = (size.height as u32 - texture.height()) / 2;
         encoder.copy_texture_to_texture(texture.as_image_copy(), place, texture.size());
         device.queue.submit([encoder.finish()]);
         device.queue.present(to);

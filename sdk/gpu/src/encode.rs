@@ -11,6 +11,7 @@ mod midpoint;
 mod shared;
 
 pub(super) use mean_phase::MeanPhase;
+use phasefront_core::Size;
 
 use super::Result;
 use super::brightness::Smoother;
@@ -36,9 +37,9 @@ pub(super) struct LevelsBuffers {
 }
 
 impl LevelsBuffers {
-    pub(super) fn new(device: &Device, size: (usize, usize)) -> Result<Self> {
+    pub(super) fn new(device: &Device, size: Size) -> Result<Self> {
         Ok(LevelsBuffers {
-            levels: device.buffer("levels", 4 * size.0 * size.1)?,
+            levels: device.buffer("levels", 4 * size.height * size.width)?,
             texture: device.picture("levels", size, wgpu::TextureUsages::STORAGE_BINDING)?,
         })
     }
@@ -49,7 +50,7 @@ pub(super) struct EncoderJob<'a> {
     /// (3, H, W) complex f32.
     pub(super) field: &'a wgpu::Buffer,
     /// (H, W).
-    pub(super) size: (usize, usize),
+    pub(super) size: Size,
     pub(super) options: &'a EncoderOptions,
     /// The options for computing a pre-filter.
     pub(super) chain: ChainOptions,
@@ -73,7 +74,7 @@ pub(super) struct Encoder {
 
 impl Encoder {
     pub(super) fn new(device: &Device, job: &EncoderJob<'_>, buffers: &[LevelsBuffers]) -> Result<Self> {
-        let (height, width) = job.size;
+        let Size { width, height } = job.size;
         let frame = [width, height, width * height, 0].map(|n| n as u32);
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
         let (filter, filtered) = Filter::new(device, job, &frame)?;
@@ -158,27 +159,63 @@ mod tests {
         let five = Encoding::AntiAlias { sigma: 1.0, width: 5 };
         let eight = Response::Linear { bits: 8 };
         let wide = || wide.clone();
-        let (nodes, intervals) = (per_pixel::nodes(61, 47, 16), 8);
+        let (nodes, intervals) = (per_pixel::nodes(Size { width: 47, height: 61 }, 16), 8);
         let count = 3 * nodes.0 * nodes.1;
         // Each node has a different curve. The steepest curves do not reach 2π.
         let knots: Vec<f32> = (0..count)
             .flat_map(|n| (0..=intervals).map(move |k| 3.0 + k as f32 * (20.0 + n as f32 * 0.35)))
             .collect();
         let turns: Vec<f32> = (0..count).map(|n| 6.27 - 0.01 * n as f32).collect();
-        let table = PerPixel::new(61, 47, 16, intervals, &knots, &turns).unwrap();
+        let table = PerPixel::new(Size { width: 47, height: 61 }, 16, intervals, &knots, &turns).unwrap();
         let pixels = Response::PerPixel(Arc::new(table));
         let cases = [
-            ((61, 47), Encoding::ANTI_ALIAS, Fixed(1.0), pixels.clone()),
-            ((61, 47), Encoding::DoublePhase, FrameMax, pixels),
-            ((61, 47), Encoding::DoublePhase, FrameMax, eight.clone()),
-            ((61, 47), Encoding::ANTI_ALIAS, FrameMax, lut.clone()),
-            ((61, 47), Encoding::ANTI_ALIAS, Fixed(0.7), Response::Linear { bits: 5 }),
-            ((61, 47), five, FrameMax, eight.clone()),
-            ((61, 47), wide(), Fixed(1.1), eight.clone()),
-            ((61, 47), Encoding::BAND_LIMIT, FrameMax, lut),
-            ((1, 1), wide(), FrameMax, eight.clone()),
-            ((384, 384), Encoding::ANTI_ALIAS, FrameMax, eight.clone()),
-            ((540, 960), Encoding::ANTI_ALIAS, Fixed(1.0), eight),
+            (
+                Size { width: 47, height: 61 },
+                Encoding::ANTI_ALIAS,
+                Fixed(1.0),
+                pixels.clone(),
+            ),
+            (Size { width: 47, height: 61 }, Encoding::DoublePhase, FrameMax, pixels),
+            (
+                Size { width: 47, height: 61 },
+                Encoding::DoublePhase,
+                FrameMax,
+                eight.clone(),
+            ),
+            (
+                Size { width: 47, height: 61 },
+                Encoding::ANTI_ALIAS,
+                FrameMax,
+                lut.clone(),
+            ),
+            (
+                Size { width: 47, height: 61 },
+                Encoding::ANTI_ALIAS,
+                Fixed(0.7),
+                Response::Linear { bits: 5 },
+            ),
+            (Size { width: 47, height: 61 }, five, FrameMax, eight.clone()),
+            (Size { width: 47, height: 61 }, wide(), Fixed(1.1), eight.clone()),
+            (Size { width: 47, height: 61 }, Encoding::BAND_LIMIT, FrameMax, lut),
+            (Size { width: 1, height: 1 }, wide(), FrameMax, eight.clone()),
+            (
+                Size {
+                    width: 384,
+                    height: 384,
+                },
+                Encoding::ANTI_ALIAS,
+                FrameMax,
+                eight.clone(),
+            ),
+            (
+                Size {
+                    width: 960,
+                    height: 540,
+                },
+                Encoding::ANTI_ALIAS,
+                Fixed(1.0),
+                eight,
+            ),
         ];
         let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
         let laser = Illumination::new(beam.view()).unwrap();
@@ -206,13 +243,13 @@ mod tests {
             };
             let aperture_radius = if lit { 0.9 } else { 1.0 };
             let display = Display::from_toml(&format!("aperture_radius = {aperture_radius:?}")).unwrap();
-            let display = display.with_size(size.0, size.1).unwrap();
+            let display = display.with_size(size).unwrap();
             let target = Target {
                 response: response.clone(),
                 illumination: lit.then(|| laser.clone()),
                 ..display.into()
             };
-            let area = size.0 * size.1;
+            let area = size.height * size.width;
             let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
             let turn = upload(&device, &turns);
             let mut expected = field(area);

@@ -6,6 +6,7 @@
 use super::device::{Constants, Device, Dispatch};
 use super::{GpuError, Result};
 use num_complex::Complex32;
+use phasefront_core::Size;
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -16,7 +17,10 @@ const PER_THREAD: usize = 8;
 
 /// Returns one quadrant, `(W'/2 + 1, H'/2 + 1)`, of `factor`(kx, ky), times the transforms' 1/(H'·W').
 pub(super) fn quadrant(
-    (padded_height, padded_width): (usize, usize),
+    Size {
+        width: padded_width,
+        height: padded_height,
+    }: Size,
     factor: impl Fn(usize, usize) -> f32,
 ) -> Vec<Complex32> {
     let scale = 1.0 / (padded_height * padded_width) as f32;
@@ -30,10 +34,8 @@ pub(super) fn quadrant(
 pub(super) struct Planes<'a> {
     /// (3, H, W). The filtered field replaces it.
     pub(super) field: &'a wgpu::Buffer,
-    /// (H, W).
-    pub(super) size: (usize, usize),
-    /// (H', W').
-    pub(super) padded: (usize, usize),
+    pub(super) size: Size,
+    pub(super) padded: Size,
     /// One filter for all colours or three, including the factor 1/(H'·W'). Each is one quadrant, (W'/2 + 1, H'/2 + 1),
     /// if it is even in both frequencies, else (W', H').
     pub(super) factors: &'a [&'a [Complex32]],
@@ -77,8 +79,11 @@ struct Shared<'a> {
 
 impl Convolution {
     pub(super) fn new(device: &Device, planes: &Planes<'_>) -> Result<Self> {
-        let (height, width) = planes.size;
-        let (padded_height, padded_width) = planes.padded;
+        let Size { width, height } = planes.size;
+        let Size {
+            width: padded_width,
+            height: padded_height,
+        } = planes.padded;
         let one = planes.factors[0].len();
         let even = one == (padded_height / 2 + 1) * (padded_width / 2 + 1);
         let table: Vec<Complex32> = planes.factors.concat();
@@ -169,7 +174,7 @@ impl Stage {
     /// Returns the stages for rows, columns and rows back. `even` means that the filter is one quadrant.
     fn of(planes: &Planes<'_>, even: bool) -> [Stage; 3] {
         let row = Stage {
-            length: planes.padded.1,
+            length: planes.padded.width,
             forward: true,
             filter: false,
             inverse: false,
@@ -178,7 +183,7 @@ impl Stage {
             turn: planes.turn.is_some(),
         };
         let column = Stage {
-            length: planes.padded.0,
+            length: planes.padded.height,
             filter: true,
             inverse: true,
             in_place: true,
@@ -385,16 +390,16 @@ mod twins {
 
     const WAVELENGTHS_M: [f64; 3] = [638e-9, 520e-9, 450e-9];
 
-    fn check(size: (usize, usize), distance_m: f64, padding: Padding) {
+    fn check(size: Size, distance_m: f64, padding: Padding) {
         let device = device();
-        let plans = Propagator::for_colours(size.0, size.1, 8e-6, &WAVELENGTHS_M, distance_m, padding).unwrap();
-        let given = field(size.0 * size.1);
+        let plans = Propagator::for_colours(size, 8e-6, &WAVELENGTHS_M, distance_m, padding).unwrap();
+        let given = field(size.height * size.width);
         let buffer = upload(&device, &given);
         let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
         let planes = Planes {
             field: &buffer,
             size,
-            padded: plans[0].padded_shape(),
+            padded: plans[0].padded_size(),
             factors: &plans.iter().map(|plan| plan.transfer().factors()).collect::<Vec<_>>(),
             turn: Some(&upload(&device, &turns)),
         };
@@ -402,7 +407,7 @@ mod twins {
         run(&device, |pass| convolution.run(pass));
         let mut expected = given;
         let mut scratch = plans[0].scratch();
-        let colours = expected.chunks_exact_mut(size.0 * size.1);
+        let colours = expected.chunks_exact_mut(size.height * size.width);
         for ((plan, plane), turn) in plans.iter().zip(colours).zip(turns) {
             plane.iter_mut().for_each(|value| *value *= turn);
             plan.propagate(plane, &mut scratch);
@@ -414,14 +419,28 @@ mod twins {
     #[test]
     fn propagation_agrees_with_the_cpu() {
         for (size, distance_m, padding) in [
-            ((61, 47), 6e-3, Padding::Reach),
-            ((61, 47), -20e-3, Padding::Double),
+            (Size { width: 47, height: 61 }, 6e-3, Padding::Reach),
+            (Size { width: 47, height: 61 }, -20e-3, Padding::Double),
             // 7 and 49 have their own butterflies; 11, 13 and 61 do not.
-            ((49, 22), 1e-3, Padding::Circular),
-            ((61, 26), 1e-3, Padding::Circular),
-            ((1, 1), 1e-3, Padding::Reach),
-            ((384, 384), 6e-3, Padding::Reach),
-            ((540, 960), 10e-3, Padding::Reach),
+            (Size { width: 22, height: 49 }, 1e-3, Padding::Circular),
+            (Size { width: 26, height: 61 }, 1e-3, Padding::Circular),
+            (Size { width: 1, height: 1 }, 1e-3, Padding::Reach),
+            (
+                Size {
+                    width: 384,
+                    height: 384,
+                },
+                6e-3,
+                Padding::Reach,
+            ),
+            (
+                Size {
+                    width: 960,
+                    height: 540,
+                },
+                10e-3,
+                Padding::Reach,
+            ),
         ] {
             check(size, distance_m, padding);
         }
@@ -431,27 +450,33 @@ mod twins {
     fn aperture_and_band_limit_agree_with_the_cpu() {
         let device = device();
         for size in [
-            (61, 47),
-            (48, 96),
-            (7, 5),
-            (3, 2),
-            (1, 6),
-            (4, 61),
-            (1, 1),
-            (384, 384),
-            (540, 960),
+            Size { width: 47, height: 61 },
+            Size { width: 96, height: 48 },
+            Size { width: 5, height: 7 },
+            Size { width: 2, height: 3 },
+            Size { width: 6, height: 1 },
+            Size { width: 61, height: 4 },
+            Size { width: 1, height: 1 },
+            Size {
+                width: 384,
+                height: 384,
+            },
+            Size {
+                width: 960,
+                height: 540,
+            },
         ] {
             let plans = (
-                Aperture::new(size.0, size.1, Opening::centred(0.8)).unwrap(),
-                BandLimit::new(size.0, size.1, 1.0).unwrap(),
+                Aperture::new(size, Opening::centred(0.8)).unwrap(),
+                BandLimit::new(size, 1.0).unwrap(),
             );
             let round = |kx: usize, ky: usize| {
-                let (fx, fy) = (kx as f64 / size.1 as f64, ky as f64 / size.0 as f64);
+                let (fx, fy) = (kx as f64 / size.width as f64, ky as f64 / size.height as f64);
                 f32::from(u8::from(aperture::passes(fx, fy, 0.8)))
             };
             let limit = |kx, ky| f32::from(u8::from(plans.1.keeps(kx, ky)));
             for (name, kept) in [("aperture", quadrant(size, round)), ("limit", quadrant(size, limit))] {
-                let given = field(size.0 * size.1);
+                let given = field(size.height * size.width);
                 let buffer = upload(&device, &given);
                 let planes = Planes {
                     field: &buffer,
@@ -463,7 +488,7 @@ mod twins {
                 let convolution = device.guarded(|| Convolution::new(&device, &planes)).unwrap();
                 run(&device, |pass| convolution.run(pass));
                 let mut expected = given;
-                for plane in expected.chunks_exact_mut(size.0 * size.1) {
+                for plane in expected.chunks_exact_mut(size.height * size.width) {
                     match name {
                         "aperture" => plans.0.filter(plane, &mut plans.0.scratch()),
                         _ => plans.1.filter(plane, &mut plans.1.scratch()),
@@ -479,7 +504,7 @@ mod twins {
     fn a_line_that_does_not_fit_is_refused() {
         let device = device();
         let buffer = upload(&device, &field(9000));
-        let size = (1, 9000);
+        let size = Size { width: 9000, height: 1 };
         let planes = Planes {
             field: &buffer,
             size,

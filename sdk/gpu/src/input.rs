@@ -8,6 +8,7 @@ mod rounding;
 mod source;
 
 pub use frame::{Colour, ColourData, Depth, DepthData, Frame};
+use phasefront_core::Size;
 pub(super) use source::Source;
 
 use super::Result;
@@ -114,16 +115,16 @@ pub(super) struct Packer {
 }
 
 impl Packer {
-    /// Plans the stage for frames of `size` (height, width). It writes to new memory or to `input`, the memory of
+    /// Plans the stage for frames of `size`. It writes to new memory or to `input`, the memory of
     /// another stage of the same form and size.
     pub(super) fn new(
         device: &Device,
         form: Form<'_>,
-        size: (usize, usize),
+        size: Size,
         source: Source<'_>,
         input: Option<ChainInput>,
     ) -> Result<Self> {
-        let Source::Frame(_, Depth::Readings { height, width }) = source else {
+        let Source::Frame(_, Depth::Readings(readings)) = source else {
             return Self::alone(device, form, size, source, input);
         };
         let (is_last, surfaces) = match form {
@@ -133,7 +134,7 @@ impl Packer {
         let mut packer = Self::alone(device, Form::Surfaces, size, source, surfaces)?;
         let surfaces = packer.input.first.clone();
         if let Some(frames) = &mut packer.frames {
-            frames.conditioning = Some(Conditioning::new(device, (height, width), size, &surfaces)?);
+            frames.conditioning = Some(Conditioning::new(device, readings, size, &surfaces)?);
         }
         if !is_last {
             let last = Self::alone(device, form, size, Source::Surfaces(&surfaces), input)?;
@@ -147,11 +148,11 @@ impl Packer {
     fn alone(
         device: &Device,
         form: Form<'_>,
-        size: (usize, usize),
+        size: Size,
         source: Source<'_>,
         input: Option<ChainInput>,
     ) -> Result<Self> {
-        let (height, width) = size;
+        let Size { width, height } = size;
         let area = height * width;
         let (rows, columns) = (height.div_ceil(form.side()), width.div_ceil(form.side()));
         let groups = form.channels().div_ceil(GROUP) * form.side().pow(2);
@@ -234,6 +235,7 @@ mod tests {
 
     /// Checks camera images of odd sizes, rotated, enlarged and reduced, in the number formats of float chains.
     #[test]
+    #[expect(clippy::too_many_lines, reason = "a table of cases")]
     fn the_input_is_that_of_the_cpu() {
         let device = device();
         let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
@@ -242,35 +244,52 @@ mod tests {
             rotation: Rotation::Clockwise90,
             mirrored: true,
         };
-        for ((height, width), sensor) in [
-            ((61, 47), (75, 101)),
-            ((384, 384), (301, 407)),
-            ((540, 960), (1081, 607)),
+        for (size, sensor) in [
+            (Size { width: 47, height: 61 }, Size { width: 101, height: 75 }),
+            (
+                Size {
+                    width: 384,
+                    height: 384,
+                },
+                Size {
+                    width: 407,
+                    height: 301,
+                },
+            ),
+            (
+                Size {
+                    width: 960,
+                    height: 540,
+                },
+                Size {
+                    width: 607,
+                    height: 1081,
+                },
+            ),
         ] {
+            let Size { width, height } = size;
             let colour = Colour::Camera {
                 format,
-                height: sensor.0,
-                width: sensor.1,
+                size: sensor,
                 orientation,
             };
             let byte = |i: usize| (i * 7 % 251) as u8;
-            let luma: Vec<u8> = (0..sensor.0 * sensor.1).map(byte).collect();
-            let half = (sensor.0.div_ceil(2), sensor.1.div_ceil(2));
+            let luma: Vec<u8> = (0..sensor.pixels()).map(byte).collect();
+            let half = (sensor.height.div_ceil(2), sensor.width.div_ceil(2));
             let chroma: Vec<u8> = (0..2 * half.0 * half.1).map(byte).collect();
-            let planes = [Plane::new(&luma, sensor.1, 1), Plane::new(&chroma, 2 * half.1, 2)];
-            let image = ColourImage::new(format, sensor.1, sensor.0, &planes).unwrap();
+            let planes = [Plane::new(&luma, sensor.width, 1), Plane::new(&chroma, 2 * half.1, 2)];
+            let image = ColourImage::new(format, sensor, &planes).unwrap();
             let words: Vec<u16> = (0..height * width).map(|i| (i * 4099) as u16).collect();
             let frame = Frame {
                 colour: ColourData::Camera(image),
                 depth: DepthData::U16(&words),
             };
-            let twin = frame.read(orientation, height, width).unwrap();
+            let twin = frame.read(orientation, size).unwrap();
             for (numbers, most) in [(Numbers::F32, 1e-4), (Numbers::F16, 5e-4)] {
                 if numbers == Numbers::F16 && !device.has_half() {
                     continue;
                 }
                 let source = Source::Frame(colour, Depth::U16);
-                let size = (height, width);
                 let form = Form::Chain(network.chain(), numbers, 1.0);
                 let packer = device
                     .guarded(|| Packer::new(&device, form, size, source, None))
@@ -311,7 +330,7 @@ mod tests {
         let colours: Vec<f32> = (0..3 << 16).map(|i| (i % 977) as f32 / 977.0).collect();
         let (size, source) = ((256, 256), Source::Frame(Colour::Planar, Depth::U16));
         let packer = device
-            .guarded(|| Packer::new(&device, Form::Surfaces, size, source, None))
+            .guarded(|| Packer::new(&device, Form::Surfaces, Size::from_shape(size), source, None))
             .unwrap();
         let frame = Frame {
             colour: ColourData::Planar(&colours),
@@ -319,7 +338,15 @@ mod tests {
         };
         packer.upload(&device, &frame).unwrap();
         run(&device, |pass| packer.run(pass));
-        let twin = frame.read(Orientation::default(), 256, 256).unwrap();
+        let twin = frame
+            .read(
+                Orientation::default(),
+                Size {
+                    width: 256,
+                    height: 256,
+                },
+            )
+            .unwrap();
         let (rgb, depth) = (twin.rgb(), twin.depth());
         let expected: Vec<[f32; 4]> = depth
             .indexed_iter()

@@ -38,7 +38,7 @@
 //!
 //! fn show(network: Arc<Network>, frame: &RgbdFrame) -> Result<(), GpuError> {
 //!     let device = Arc::new(Device::open(&DeviceOptions::default())?);
-//!     let job = Job::new((1080, 1920), Method::Network(network), Target::default());
+//!     let job = Job::new(Size { width: 1920, height: 1080 }, Method::Network(network), Target::default());
 //!     probe(&device, &job)?;
 //!     let mut pipeline = GpuPipeline::new(&device, &job)?;
 //!     let ticket = pipeline.submit(&Frame::of(frame), Deliver::Shown)?;

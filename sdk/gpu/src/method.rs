@@ -10,6 +10,7 @@ use super::input::{Colour, Depth, Form, Frame, Packer, Source};
 use super::numbers::Numbers;
 use super::{GpuError, Result};
 use chain::{ChainOptions, ChainPlan, End};
+use phasefront_core::Size;
 use phasefront_core::depth::softness::is_soft;
 use phasefront_core::display::Display;
 use phasefront_core::method::network::{InputKind, Network};
@@ -22,7 +23,7 @@ use sweep::Sweeper;
 
 /// A method for one frame size.
 pub(super) struct MethodPlan {
-    size: (usize, usize),
+    size: Size,
     /// Converts the frame to the input of the network or the sweep.
     packer: Packer,
     plan: Plan,
@@ -63,7 +64,7 @@ impl Trained {
         device: &Device,
         network: &Arc<Network>,
         (numbers, depth_scale): (Numbers, f32),
-        size: (usize, usize),
+        size: Size,
         packer: &Packer,
         options: ChainOptions,
     ) -> Result<Self> {
@@ -85,11 +86,11 @@ impl Trained {
 }
 
 impl MethodPlan {
-    /// Plans `method` for frames of `size` (height, width) in `formats`.
+    /// Plans `method` for frames of `size` in `formats`.
     pub(super) fn new(
         device: &Device,
         method: &Method,
-        size: (usize, usize),
+        size: Size,
         display: &Display,
         formats: (Colour, Depth),
         options: ChainOptions,
@@ -104,7 +105,6 @@ impl MethodPlan {
             let sweep = Sweeper::new(device, &plan, display, &packer.input.first)?;
             Ok::<_, GpuError>((packer, sweep))
         };
-        let (height, width) = size;
         let (packer, plan) = match method {
             Method::Network(network) => {
                 let how = how(network)?;
@@ -114,7 +114,7 @@ impl MethodPlan {
                 (packer, Plan::Network(trained))
             }
             Method::Sweep(sweep) => {
-                let (packer, sweep) = swept(sweep_plan(height, width, *sweep, display)?)?;
+                let (packer, sweep) = swept(sweep_plan(size, *sweep, display)?)?;
                 (packer, Plan::Sweep(sweep))
             }
             Method::Seeded(network) if network.input() == InputKind::SeededColour => {
@@ -124,7 +124,7 @@ impl MethodPlan {
             }
             Method::Seeded(network) => {
                 let sweep = seed(network, display);
-                let plan = SweepPlan::new(height, width, display, sweep, 0.0)?;
+                let plan = SweepPlan::new(size, display, sweep, 0.0)?;
                 let (packer, sweep) = swept(plan)?;
                 let how = how(network)?;
                 let form = Form::Chain(network.chain(), how.0, how.1);
@@ -136,7 +136,7 @@ impl MethodPlan {
             Method::Auto(sweep, network) => {
                 let packer = Packer::new(device, Form::Surfaces, size, source, None)?;
                 let surfaces = &packer.input.first;
-                let at_midpoint = |sweep| SweepPlan::new(height, width, display, sweep, 0.0);
+                let at_midpoint = |sweep| SweepPlan::new(size, display, sweep, 0.0);
                 let seed = match network.input() {
                     InputKind::Seeded => {
                         let plan = at_midpoint(seed(network, display))?;

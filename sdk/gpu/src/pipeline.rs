@@ -10,6 +10,7 @@ use super::{GpuError, Result};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::device::peak::Peak;
 use crate::method::chain::ChainOptions;
+use phasefront_core::Size;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::{EncoderOptions, Encoding};
@@ -31,7 +32,7 @@ const STAMPS: u32 = 10;
 #[derive(Clone)]
 pub struct Job {
     /// (H, W).
-    pub shape: (usize, usize),
+    pub size: Size,
     /// The method that computes the midpoint hologram.
     pub method: Method,
     /// The display that the holograms are computed for.
@@ -49,9 +50,9 @@ pub struct Job {
 impl Job {
     /// Describes frames of type [`phasefront_core::frame::RgbdFrame`] that `method` computes for `target`, with the
     /// defaults of [`phasefront_core::pipeline::Pipeline`].
-    pub fn new(shape: (usize, usize), method: Method, target: impl Into<Target>) -> Self {
+    pub fn new(size: Size, method: Method, target: impl Into<Target>) -> Self {
         Job {
-            shape,
+            size,
             method,
             target: target.into(),
             encoder: EncoderOptions::default(),
@@ -66,7 +67,7 @@ impl Job {
     /// # Errors
     /// Returns the errors of [`phasefront_core::pipeline::Pipeline::new`].
     pub fn on_cpu(&self) -> phasefront_core::runtime::error::Result<phasefront_core::pipeline::Pipeline> {
-        phasefront_core::pipeline::Pipeline::new(self.shape, self.method.clone(), &self.target, &self.encoder)
+        phasefront_core::pipeline::Pipeline::new(self.size, self.method.clone(), &self.target, &self.encoder)
     }
 }
 
@@ -99,7 +100,7 @@ pub struct GpuReport {
 pub struct GpuLevels {
     pub(crate) device: Arc<Device>,
     /// (H, W).
-    pub(crate) shape: (usize, usize),
+    pub(crate) size: Size,
     /// 8-bit RGBA, with the levels of red, green and blue.
     pub(crate) texture: wgpu::Texture,
 }
@@ -121,7 +122,7 @@ impl Drop for GpuLevels {
 /// A plan for one [`Job`] on one device. Creating the plan creates all buffers and programs.
 pub struct GpuPipeline {
     device: Arc<Device>,
-    size: (usize, usize),
+    size: Size,
     method: MethodPlan,
     /// Of a field that a network writes and of one that a sweep writes. Empty for an encoding that was trained on the
     /// field's unmodified phase.
@@ -157,8 +158,8 @@ impl GpuPipeline {
     pub async fn new_async(device: &Arc<Device>, job: &Job) -> Result<Self> {
         let display = &job.target.display;
         job.method.check(display)?;
-        let size = job.shape;
-        phasefront_core::method::network::check_size(size.0, size.1, phasefront_core::method::network::MAX_PIXELS)?;
+        let size = job.size;
+        phasefront_core::method::network::check_size(size, phasefront_core::method::network::MAX_PIXELS)?;
         job.encoder.check()?;
         job.target.check()?;
         if display.colours() != 3 {
@@ -178,7 +179,7 @@ impl GpuPipeline {
         device.guarded_async(|| Self::build(device, job, size)).await
     }
 
-    fn build(device: &Arc<Device>, job: &Job, size: (usize, usize)) -> Result<Self> {
+    fn build(device: &Arc<Device>, job: &Job, size: Size) -> Result<Self> {
         let (target, formats) = (&job.target, (job.colour, job.depth));
         let (display, encoder) = (&target.display, &job.encoder);
         let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
@@ -207,7 +208,7 @@ impl GpuPipeline {
                 &Planes {
                     field: method.field(),
                     size,
-                    padded: plans[0].padded_shape(),
+                    padded: plans[0].padded_size(),
                     factors: &plans.iter().map(|plan| plan.transfer().factors()).collect::<Vec<_>>(),
                     turn: turn.take(),
                 },
@@ -216,7 +217,7 @@ impl GpuPipeline {
         let buffers = (0..FLIGHTS)
             .map(|_| LevelsBuffers::new(device, size))
             .collect::<Result<Vec<_>>>()?;
-        let response = target.response.clone().centred(size.0, size.1)?;
+        let response = target.response.clone().centred(size)?;
         let encoder = EncoderJob {
             field: method.field(),
             size,
@@ -242,7 +243,7 @@ impl GpuPipeline {
     }
 
     /// Returns (H, W).
-    pub fn shape(&self) -> (usize, usize) {
+    pub fn size(&self) -> Size {
         self.size
     }
 
@@ -402,7 +403,7 @@ impl GpuPipeline {
             encoder.copy_buffer_to_buffer(resolved, 0, &slot.readable, STAMPS_AT, bytes);
         }
         if deliver == Deliver::Levels {
-            let bytes = (4 * self.size.0 * self.size.1) as u64;
+            let bytes = (4 * self.size.height * self.size.width) as u64;
             let levels = &self.buffers[at].levels;
             encoder.copy_buffer_to_buffer(levels, 0, &slot.readable, LEVELS_AT as u64, bytes);
         }
@@ -437,7 +438,7 @@ impl GpuPipeline {
         Ok(GpuLevels {
             texture: device.guarded_async(copy).await?,
             device: device.clone(),
-            shape: self.size,
+            size: self.size,
         })
     }
 
@@ -449,7 +450,7 @@ impl GpuPipeline {
     /// # Panics
     /// Panics if `levels` does not have 3·H·W values.
     pub async fn collect_async(&mut self, ticket: Ticket, levels: &mut [u8]) -> Result<GpuReport> {
-        let area = self.size.0 * self.size.1;
+        let area = self.size.height * self.size.width;
         assert_eq!(levels.len(), 3 * area);
         self.take(ticket, Deliver::Levels, |bytes| {
             let words = &bytes[LEVELS_AT..][..4 * area];
@@ -524,7 +525,7 @@ impl GpuPipeline {
 }
 
 impl Slot {
-    fn new(device: &Device, (height, width): (usize, usize)) -> Self {
+    fn new(device: &Device, Size { width, height }: Size) -> Self {
         let stamps = device.features().timestamps.then(|| {
             let set = device.inner.create_query_set(&wgpu::QuerySetDescriptor {
                 label: None,

@@ -6,6 +6,7 @@ use super::pipeline::{Deliver, GpuPipeline, Job};
 use super::{GpuError, Result};
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
+use phasefront_core::Size;
 use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
@@ -15,9 +16,9 @@ use phasefront_core::pipeline::Pipeline;
 use std::sync::Arc;
 
 /// The rows and columns of the frame: odd, and more than one tile of every program.
-const SIZE: (usize, usize) = (37, 43);
+const SIZE: Size = Size { width: 43, height: 37 };
 /// The rows and columns of the readings that become the depth of such a frame.
-const READINGS: (usize, usize) = (9, 11);
+const READINGS: Size = Size { width: 11, height: 9 };
 
 /// Runs small frames of `job`, with depth of their size and with readings, on `device` and on the CPU and compares
 /// their phases. Tries both methods of an automatic choice.
@@ -38,7 +39,7 @@ pub async fn probe_async(device: &Arc<Device>, job: &Job) -> Result<()> {
 
 async fn compare_small(device: &Arc<Device>, job: &Job) -> Result<()> {
     let job = Job {
-        shape: SIZE,
+        size: SIZE,
         target: Target {
             // A per-pixel table fits only one frame size.
             response: match &job.target.response {
@@ -62,9 +63,7 @@ async fn compare_small(device: &Arc<Device>, job: &Job) -> Result<()> {
     let mut scratch = plan.scratch();
     plan.find(&readings(), &rgb, &mut scratch)?;
     plan.decide(&rgb, frame.planes_mut().1, &mut scratch);
-    let (height, width) = READINGS;
-    gpu.expect_async(Colour::Planar, Depth::Readings { height, width })
-        .await?;
+    gpu.expect_async(Colour::Planar, Depth::Readings(READINGS)).await?;
     let given = Frame {
         colour: ColourData::Planar(&rgb),
         depth: DepthData::Readings(plan.readings(&scratch)),
@@ -74,7 +73,7 @@ async fn compare_small(device: &Arc<Device>, job: &Job) -> Result<()> {
 
 /// Returns the CPU's levels.
 fn on_cpu(cpu: &Pipeline, frame: &RgbdFrame) -> Result<Vec<u8>> {
-    let mut levels = vec![0; 3 * SIZE.0 * SIZE.1];
+    let mut levels = vec![0; 3 * SIZE.pixels()];
     cpu.process(frame, &mut levels, &mut cpu.scratch())?;
     Ok(levels)
 }
@@ -110,7 +109,7 @@ pub(super) fn apart(levels: &[u8], others: &[u8], response: &Response) -> f32 {
 
 /// Creates a frame with waves of several lengths in colour, and steps and a ramp in depth.
 fn frame() -> Result<RgbdFrame> {
-    let (height, width) = SIZE;
+    let Size { width, height } = SIZE;
     let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
         let phase = (c + 1) as f32 * 0.13 * x as f32 + 0.21 * y as f32;
         0.5 + 0.45 * phase.sin()
@@ -127,7 +126,7 @@ fn frame() -> Result<RgbdFrame> {
 
 /// Creates readings of two surfaces with mixed readings between them, and holes.
 fn readings() -> Vec<f32> {
-    let (height, width) = READINGS;
+    let Size { width, height } = READINGS;
     let reading = |i: usize| match (i / width, i % width) {
         (2, 7) => f32::NAN,
         (_, x) if 2 * x < width => 0.1 + 0.01 * x as f32,
@@ -154,7 +153,7 @@ mod tests {
     fn a_device_that_answers_wrongly_is_not_used() {
         let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
         let method = Method::Network(Arc::new(network.unwrap()));
-        let job = Job::new((21, 34), method, Display::default());
+        let job = Job::new(Size { width: 34, height: 21 }, method, Display::default());
         let source = include_str!("encode/mean_phase.wgsl");
         let forged = source.replace("turn[c] = select(", "turn[c] = vec2f(0, 1) + 0.0 * select(");
         assert_ne!(forged, source);

@@ -233,6 +233,7 @@ mod tests {
     use super::super::{ChainOptions, Float};
     use super::*;
     use ndarray::{Array2, Array3};
+    use phasefront_core::Size;
     use phasefront_core::display::Display;
     use phasefront_core::encode::brightness::Brightness;
     use phasefront_core::frame::RgbdFrame;
@@ -240,7 +241,7 @@ mod tests {
     use phasefront_core::method::network::Network;
     use pollster::block_on;
 
-    const SIZE: (usize, usize) = (21, 34);
+    const SIZE: Size = Size { width: 34, height: 21 };
 
     fn network() -> Arc<Network> {
         let bytes = include_bytes!("../../../models/rgbd-8-int8.onnx");
@@ -254,10 +255,10 @@ mod tests {
     }
 
     fn frame() -> RgbdFrame {
-        let rgb = Array3::from_shape_fn((3, SIZE.0, SIZE.1), |(c, y, x)| {
+        let rgb = Array3::from_shape_fn((3, SIZE.height, SIZE.width), |(c, y, x)| {
             ((c * 5 + y * 3 + x) % 17) as f32 / 16.0
         });
-        RgbdFrame::new(rgb, Array2::from_elem(SIZE, 0.3)).unwrap()
+        RgbdFrame::new(rgb, Array2::from_elem(SIZE.shape(), 0.3)).unwrap()
     }
 
     /// Destroys the device, as drivers do.
@@ -271,7 +272,7 @@ mod tests {
         assert!(renderer.reason().is_none() && renderer.pipeline().is_some());
         let frame = frame();
         let bytes = Frame::of(&frame);
-        let mut before = vec![0; 3 * SIZE.0 * SIZE.1];
+        let mut before = vec![0; 3 * SIZE.pixels()];
         let first = block_on(renderer.submit(None, &bytes, Deliver::Levels)).unwrap();
         block_on(renderer.collect(first, &mut before)).unwrap();
 
@@ -347,7 +348,10 @@ mod tests {
         let plan = GpuPipeline::new(&device, &job(&network)).unwrap();
         assert_eq!(plan.numbers(), "f32");
         let wide = Job {
-            shape: (600, 40_000),
+            size: Size {
+                width: 40_000,
+                height: 600,
+            },
             ..job(&network)
         };
         let refused = GpuPipeline::new(&device, &wide).err().unwrap();

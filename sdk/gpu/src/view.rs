@@ -4,6 +4,7 @@ use super::device::{Constants, Device, Dispatch, Program};
 use super::fft::{Convolution, Planes};
 use super::pipeline::GpuLevels;
 use super::{GpuError, Result};
+use phasefront_core::Size;
 use phasefront_core::view::preview::Preview;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,16 +15,16 @@ const COLUMNS: usize = 64;
 /// The programs and memory for views of one shape on screens of one size, at any z.
 pub struct GpuView {
     device: Arc<Device>,
-    /// (H, W) of the hologram and of the screen.
-    shapes: [(usize, usize); 2],
-    small: (usize, usize),
+    /// The sizes of the hologram and of the screen.
+    sizes: [Size; 2],
+    small: Size,
     /// (3, h, w) complex f32.
     field: wgpu::Buffer,
     sum: Program,
     lights: Constants,
     weights: Constants,
-    /// The propagation of the small field by padded shape. Neighbouring distances share it.
-    propagations: HashMap<(usize, usize), Convolution>,
+    /// The propagation of the small field by padded size. Neighbouring distances share it.
+    propagations: HashMap<Size, Convolution>,
     scale: Constants,
     draw: Dispatch,
     image: wgpu::Texture,
@@ -37,19 +38,17 @@ impl GpuView {
     /// the modulator responds differently.
     pub async fn new(levels: &GpuLevels, preview: &Preview) -> Result<Self> {
         let device = &levels.device;
-        device
-            .guarded_async(|| Self::build(device, levels.shape, preview))
-            .await
+        device.guarded_async(|| Self::build(device, levels.size, preview)).await
     }
 
-    fn build(device: &Arc<Device>, shape: (usize, usize), preview: &Preview) -> Result<Self> {
+    fn build(device: &Arc<Device>, size: Size, preview: &Preview) -> Result<Self> {
         let Some(lights) = preview.lights() else {
             return Err(GpuError::Refused(
                 "a view of a modulator whose pixels respond differently, which is the CPU's".into(),
             ));
         };
         let (small, screen) = (preview.small(), preview.screen());
-        let area = small.0 * small.1;
+        let area = small.pixels();
         let [x, y] = preview.axes();
         let mut taps = Vec::new();
         let mut counts = [(0, 0); 2];
@@ -70,9 +69,9 @@ impl GpuView {
             const COUNT_Y: u32 = {}u;
             ",
             preview.factor(),
-            small.1,
-            screen.1,
-            screen.0,
+            small.width,
+            screen.width,
+            screen.height,
             counts[0].1,
             counts[1].0,
             counts[1].1,
@@ -92,10 +91,10 @@ impl GpuView {
             ),
         ];
         let draw = device.program("drawing a view", source.clone(), "draw");
-        let draw = draw.on(device, &arguments, [screen.1.div_ceil(COLUMNS), screen.0, 1])?;
+        let draw = draw.on(device, &arguments, [screen.width.div_ceil(COLUMNS), screen.height, 1])?;
         Ok(GpuView {
             device: device.clone(),
-            shapes: [shape, screen],
+            sizes: [size, screen],
             small,
             field,
             sum: device.program("a view's light", source, "sum"),
@@ -110,7 +109,7 @@ impl GpuView {
 
     /// Checks whether this plan is for `levels` and the screen of `preview`, on the same device.
     pub fn fits(&self, levels: &GpuLevels, preview: &Preview) -> bool {
-        Arc::ptr_eq(&self.device, &levels.device) && self.shapes == [levels.shape, preview.screen()]
+        Arc::ptr_eq(&self.device, &levels.device) && self.sizes == [levels.size, preview.screen()]
     }
 
     /// Returns the device and the texture of the latest view, 8-bit RGBA of the screen's size.
@@ -145,7 +144,7 @@ impl GpuView {
             (2, self.weights.buffer.as_entire_binding()),
             (3, self.field.as_entire_binding()),
         ];
-        let (height, width) = self.small;
+        let Size { width, height } = self.small;
         let sum = self.sum.on(device, &arguments, [width.div_ceil(COLUMNS), height, 1])?;
         let scale = [scale; 4];
         device
@@ -154,7 +153,7 @@ impl GpuView {
         let propagation = match preview.propagators() {
             None => None,
             Some(plans) => {
-                let padded = plans[0].padded_shape();
+                let padded = plans[0].padded_size();
                 let factors: Vec<_> = plans.iter().map(|plan| plan.transfer().factors()).collect();
                 let planes = Planes {
                     field: &self.field,

@@ -11,6 +11,7 @@ mod skip;
 use ndarray::{Array2, Array3};
 use network_models::{Model, frame};
 use num_complex::Complex32;
+use phasefront_core::Size;
 use phasefront_core::depth::condition::Conditioner;
 use phasefront_core::display::Display;
 use phasefront_core::display::illumination::Illumination;
@@ -58,15 +59,19 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
         .fold(0.0, |worst, d| if d > worst || d.is_nan() { d } else { worst })
 }
 
-fn run(network: &Network, options: ChainOptions, (h, w): (usize, usize), input: &[f32]) -> Vec<f32> {
+fn run(network: &Network, options: ChainOptions, Size { width: w, height: h }: Size, input: &[f32]) -> Vec<f32> {
     let device = device();
-    let plan = GpuNetworkPlan::new(&device, network, h, w, options).unwrap();
+    let plan = GpuNetworkPlan::new(&device, network, Size { width: w, height: h }, options).unwrap();
     let mut output = vec![f32::NAN; 6 * h * w];
     plan.run(input, &mut output).unwrap();
     output
 }
 
-const SIZES: [(usize, usize); 3] = [(1, 1), (7, 33), (47, 61)];
+const SIZES: [Size; 3] = [
+    Size { width: 1, height: 1 },
+    Size { width: 33, height: 7 },
+    Size { width: 61, height: 47 },
+];
 
 #[test]
 fn chains_in_f32_and_f16_agree_with_the_definition() {
@@ -103,8 +108,8 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         for size in SIZES {
-            let input = frame(model.inputs, size.0, size.1, 7);
-            let expected = reference::run(network.chain(), &input, size.0, size.1);
+            let input = frame(model.inputs, size, 7);
+            let expected = reference::run(network.chain(), &input, size);
             let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
             let mut fused = Vec::new();
             for (float, fusion, tolerance) in [
@@ -149,10 +154,20 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
             continue;
         }
         let network = Network::from_onnx(&model.bytes()).unwrap();
-        for size in [(61, 47), (384, 384), (540, 960)] {
-            let input = frame(model.inputs, size.0, size.1, 7);
-            let plan = network.plan(size.0, size.1).unwrap();
-            let mut expected = vec![0.0; 6 * size.0 * size.1];
+        for size in [
+            Size { width: 47, height: 61 },
+            Size {
+                width: 384,
+                height: 384,
+            },
+            Size {
+                width: 960,
+                height: 540,
+            },
+        ] {
+            let input = frame(model.inputs, size, 7);
+            let plan = network.plan(size).unwrap();
+            let mut expected = vec![0.0; 6 * size.height * size.width];
             plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
             let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
             for fusion in [Fusion::Layers, Fusion::Pairs] {
@@ -200,9 +215,9 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         for size in SIZES {
-            let input = frame(model.inputs, size.0, size.1, 7);
-            let plan = network.plan_on(Isa::Portable, size.0, size.1).unwrap();
-            let mut expected = vec![0.0; 6 * size.0 * size.1];
+            let input = frame(model.inputs, size, 7);
+            let plan = network.plan_on(Isa::Portable, size).unwrap();
+            let mut expected = vec![0.0; 6 * size.height * size.width];
             plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
             for fusion in [Fusion::Layers, Fusion::Pairs] {
                 let options = ChainOptions {
@@ -222,7 +237,8 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
 }
 
 /// Creates a frame with detail everywhere and values that 8 bits and 16 bits represent.
-fn rgbd(height: usize, width: usize) -> RgbdFrame {
+fn rgbd(size: Size) -> RgbdFrame {
+    let Size { width, height } = size;
     let byte = |c: usize, y: usize, x: usize| ((c * 70 + x * 3 + y * 5) % 256) as f32 / 255.0;
     RgbdFrame::new(
         Array3::from_shape_fn((3, height, width), |(c, y, x)| byte(c, y, x)),
@@ -250,25 +266,19 @@ fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
     sum / a.len() as f32
 }
 
-fn planned(
-    shape: (usize, usize),
-    method: Method,
-    display: &Display,
-    encoding: Encoding,
-    brightness: Brightness,
-) -> Job {
+fn planned(size: Size, method: Method, display: &Display, encoding: Encoding, brightness: Brightness) -> Job {
     Job {
         encoder: EncoderOptions {
             brightness,
             ..encoding.into()
         },
-        ..Job::new(shape, method, display)
+        ..Job::new(size, method, display)
     }
 }
 
 /// Returns the CPU's levels and scale of a job.
 fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
-    let (h, w) = job.shape;
+    let Size { width: w, height: h } = job.size;
     let plan = job.on_cpu().unwrap();
     let mut levels = vec![0; 3 * h * w];
     let report = plan.process(frame, &mut levels, &mut plan.scratch());
@@ -346,10 +356,10 @@ fn whole_frames_are_those_of_the_cpu() {
         let display = display.with_offset_m(offset_m).unwrap();
         let method = Method::Network(network.clone());
         let encoded = format!("{encoding:?} {scale:?}");
-        let mut job = planned((h, w), method, &display, encoding, scale);
+        let mut job = planned(Size { width: w, height: h }, method, &display, encoding, scale);
         job.target.response = response.clone();
         job.chain.float = float;
-        let frame = rgbd(h, w);
+        let frame = rgbd(Size { width: w, height: h });
         let (expected, expected_scale) = on_cpu(&job, &frame);
         let mut plan = GpuPipeline::new(&device, &job).unwrap();
         let mut levels = vec![0; 3 * h * w];
@@ -396,9 +406,15 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
         (seeded(&int8), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.02),
     ] {
         let display = display.clone().with_offset_m(offset_m).unwrap();
-        let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
+        let mut job = planned(
+            Size { width: w, height: h },
+            method,
+            &display,
+            encoding,
+            Brightness::FrameMax,
+        );
         job.chain.float = float;
-        let frame = rgbd(h, w);
+        let frame = rgbd(Size { width: w, height: h });
         let (expected, expected_scale) = on_cpu(&job, &frame);
         let mut plan = GpuPipeline::new(&device, &job).unwrap();
         let mut levels = vec![0; 3 * h * w];
@@ -430,7 +446,7 @@ struct Sensor {
 }
 
 impl Sensor {
-    fn all((h, w): (usize, usize)) -> Vec<Sensor> {
+    fn all(Size { width: w, height: h }: Size) -> Vec<Sensor> {
         let plane = |rows: usize, columns: usize, step: usize, pad: usize, seed: usize| {
             let row = columns * step + pad;
             let smooth = |i: usize| 127.0 + 100.0 * ((i % row) as f32 * 0.13 + seed as f32).sin();
@@ -472,13 +488,13 @@ impl Sensor {
         ]
     }
 
-    fn image(&self, (h, w): (usize, usize)) -> ColourImage<'_> {
+    fn image(&self, Size { width: w, height: h }: Size) -> ColourImage<'_> {
         let planes: Vec<Plane<'_>> = self
             .planes
             .iter()
             .map(|(bytes, row, step)| Plane::new(bytes, *row, *step))
             .collect();
-        ColourImage::new(self.format, w, h, &planes).unwrap()
+        ColourImage::new(self.format, Size { width: w, height: h }, &planes).unwrap()
     }
 }
 
@@ -492,19 +508,21 @@ fn images_of_cameras_are_read_as_on_the_cpu() {
     let display = Display::default();
     let method = Method::Network(network);
     let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-    let planar = planned((h, w), method, &display, encoding, scale);
+    let planar = planned(Size { width: w, height: h }, method, &display, encoding, scale);
     let turned = Orientation {
         rotation: Rotation::Clockwise90,
         mirrored: true,
     };
-    for (sensor, orientation) in [((33, 45), Orientation::default()), ((75, 49), turned)] {
+    for (sensor, orientation) in [
+        (Size { width: 45, height: 33 }, Orientation::default()),
+        (Size { width: 49, height: 75 }, turned),
+    ] {
         for camera in Sensor::all(sensor) {
             let image = camera.image(sensor);
             let job = Job {
                 colour: Colour::Camera {
                     format: camera.format,
-                    height: sensor.0,
-                    width: sensor.1,
+                    size: sensor,
                     orientation,
                 },
                 depth: Depth::U16,
@@ -514,7 +532,7 @@ fn images_of_cameras_are_read_as_on_the_cpu() {
                 colour: ColourData::Camera(image),
                 depth: DepthData::U16(&words),
             };
-            let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
+            let (expected, _) = on_cpu(&job, &frame.read(orientation, Size { width: w, height: h }).unwrap());
             let mut levels = vec![0; 3 * h * w];
             let mut plan = GpuPipeline::new(&device, &job).unwrap();
             plan.process(&frame, &mut levels).unwrap();
@@ -583,9 +601,15 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
         let display = Display::default();
         let method = Method::Network(f32_network());
         let encoding = Encoding::Deep(prefilter);
-        let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
+        let mut job = planned(
+            Size { width: w, height: h },
+            method,
+            &display,
+            encoding,
+            Brightness::FrameMax,
+        );
         job.chain.float = Float::F32;
-        let frame = rgbd(h, w);
+        let frame = rgbd(Size { width: w, height: h });
         let (expected, scale) = on_cpu(&job, &frame);
         let mut levels = vec![0; 3 * h * w];
         let mut plan = GpuPipeline::new(&device, &job).unwrap();
@@ -606,10 +630,10 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let display = Display::default();
     let method = Method::Network(network.clone());
     let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-    let job = planned((h, w), method, &display, encoding, scale);
+    let job = planned(Size { width: w, height: h }, method, &display, encoding, scale);
     let frames: Vec<RgbdFrame> = (0..3)
         .map(|i| {
-            let frame = rgbd(h, w);
+            let frame = rgbd(Size { width: w, height: h });
             let rgb = frame.rgb().mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
             RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
         })
@@ -652,9 +676,9 @@ fn an_app_shows_the_texture_itself() {
     let display = Display::default();
     let method = Method::Network(int8_network());
     let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-    let job = planned((h, w), method, &display, encoding, scale);
+    let job = planned(Size { width: w, height: h }, method, &display, encoding, scale);
     let mut plan = GpuPipeline::new(&device, &job).unwrap();
-    let frame = rgbd(h, w);
+    let frame = rgbd(Size { width: w, height: h });
     let mut expected = vec![0; 3 * h * w];
     plan.process(&Frame::of(&frame), &mut expected).unwrap();
     let ticket = plan.submit(&Frame::of(&frame), Deliver::Shown).unwrap();
@@ -776,9 +800,9 @@ fn networks_that_read_the_place_or_squares_of_pixels_are_those_of_the_cpu() {
         let display = Display::default();
         let method = Method::Network(network);
         let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-        let mut job = planned((h, w), method, &display, encoding, scale);
+        let mut job = planned(Size { width: w, height: h }, method, &display, encoding, scale);
         job.chain.float = Float::F32;
-        let frame = rgbd(h, w);
+        let frame = rgbd(Size { width: w, height: h });
         let (expected, _) = on_cpu(&job, &frame);
         let mut levels = vec![0; 3 * h * w];
         let mut plan = GpuPipeline::new(&device, &job).unwrap();
@@ -798,18 +822,23 @@ fn a_calibrated_display_gets_the_levels_of_the_cpu() {
     });
     let beam = Illumination::new(beam.view()).unwrap();
     let bent = Aberration::new([[0.4, -0.3, 0.2, 0.1, -0.2]; 3]).unwrap();
-    let frame = rgbd(h, w);
+    let frame = rgbd(Size { width: w, height: h });
     for (offset_m, illumination, correction) in [
         (0.0, Some(beam.clone()), None),
         (2e-3, Some(beam), Some(bent.clone())),
         (0.0, None, Some(bent)),
     ] {
         // A modulator that is wider and lower than the frame.
-        let display = Display::default().with_size(h - 3, w + 9).unwrap();
+        let display = Display::default()
+            .with_size(Size {
+                width: w + 9,
+                height: h - 3,
+            })
+            .unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
         let method = Method::Network(network.clone());
         let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-        let mut job = planned((h, w), method, &display, encoding, scale);
+        let mut job = planned(Size { width: w, height: h }, method, &display, encoding, scale);
         job.target.illumination = illumination;
         job.target.correction = correction;
         let (expected, _) = on_cpu(&job, &frame);
@@ -834,13 +863,22 @@ fn a_device_is_tried_out_before_it_is_used() {
         let display = Display::default().with_offset_m(5e-3).unwrap();
         let method = Method::Network(network.clone());
         let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-        let job = planned((1080, 1920), method, &display, encoding, scale);
+        let job = planned(
+            Size {
+                width: 1920,
+                height: 1080,
+            },
+            method,
+            &display,
+            encoding,
+            scale,
+        );
         phasefront_gpu::probe(&device, &job).unwrap();
     }
 }
 
 /// Returns jobs that need every program between them, with the largest mean distance of phases.
-fn small_jobs((h, w): (usize, usize)) -> Vec<(Job, f32)> {
+fn small_jobs(Size { width: w, height: h }: Size) -> Vec<(Job, f32)> {
     let of = |model: Model| Arc::new(Network::from_onnx(&model.bytes()).unwrap());
     let network = |model| Method::Network(of(model));
     let seeded = Model {
@@ -859,7 +897,7 @@ fn small_jobs((h, w): (usize, usize)) -> Vec<(Job, f32)> {
     let maximal = Brightness::FrameMax;
     let job = |method, offset_m, encoding, brightness| {
         let display = display.clone().with_offset_m(offset_m).unwrap();
-        let mut job = planned((h, w), method, &display, encoding, brightness);
+        let mut job = planned(Size { width: w, height: h }, method, &display, encoding, brightness);
         job.chain.float = Float::F32;
         job
     };
@@ -903,8 +941,8 @@ fn every_program_agrees_with_the_cpu_on_a_small_frame() {
         device.has_half(),
     );
     let (h, w) = (13, 37);
-    let frame = rgbd(h, w);
-    for (mut job, tolerance) in small_jobs((h, w)) {
+    let frame = rgbd(Size { width: w, height: h });
+    for (mut job, tolerance) in small_jobs(Size { width: w, height: h }) {
         if job.chain.fusion == Fusion::Pairs && driver::software() == "SwiftShader" {
             skip::or_fail("pairs of layers", "SwiftShader would compile them for minutes");
             job.chain.fusion = Fusion::Layers;
@@ -935,23 +973,22 @@ fn every_program_agrees_with_the_cpu_on_a_small_frame() {
 #[test]
 fn every_program_agrees_with_the_cpu_on_a_camera_image() {
     let device = device();
-    let ((h, w), sensor) = ((13, 37), (29, 21));
+    let (Size { width: w, height: h }, sensor) = (Size { width: 37, height: 13 }, (29, 21));
     let orientation = Orientation {
         rotation: Rotation::Clockwise90,
         mirrored: true,
     };
-    let camera = Sensor::all(sensor).remove(3);
-    let depth = rgbd(h, w);
+    let camera = Sensor::all(Size::from_shape(sensor)).remove(3);
+    let depth = rgbd(Size { width: w, height: h });
     let frame = Frame {
-        colour: ColourData::Camera(camera.image(sensor)),
+        colour: ColourData::Camera(camera.image(Size::from_shape(sensor))),
         ..Frame::of(&depth)
     };
-    let (mut job, tolerance) = small_jobs((h, w)).swap_remove(3);
-    let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
+    let (mut job, tolerance) = small_jobs(Size { width: w, height: h }).swap_remove(3);
+    let (expected, _) = on_cpu(&job, &frame.read(orientation, Size { width: w, height: h }).unwrap());
     job.colour = Colour::Camera {
         format: camera.format,
-        height: sensor.0,
-        width: sensor.1,
+        size: Size::from_shape(sensor),
         orientation,
     };
     let mut levels = vec![0; 3 * h * w];
@@ -967,30 +1004,38 @@ fn every_program_agrees_with_the_cpu_on_a_camera_image() {
 #[test]
 fn every_program_agrees_with_the_cpu_on_readings() {
     let device = device();
-    let (out, jobs) = ((13, 37), small_jobs((13, 37)));
-    for (cells, which) in [((5, 11), 3), ((13, 37), 0), ((5, 11), 1), ((7, 9), 4)] {
+    let (out, jobs) = (
+        Size { width: 37, height: 13 },
+        small_jobs(Size { width: 37, height: 13 }),
+    );
+    for (cells, which) in [
+        (Size { width: 11, height: 5 }, 3),
+        (Size { width: 37, height: 13 }, 0),
+        (Size { width: 11, height: 5 }, 1),
+        (Size { width: 9, height: 7 }, 4),
+    ] {
         let (mut job, tolerance) = jobs[which].clone();
         job.chain.fusion = Fusion::Layers;
-        let display = rgbd(out.0, out.1);
+        let display = rgbd(out);
         let rgb = display.values().0;
         let plan = Conditioner::new(cells, Crop::cover(cells, out), out, true).unwrap();
         let mut scratch = plan.scratch();
         let mut gpu = GpuPipeline::new(&device, &job).unwrap();
-        let (height, width) = cells;
-        gpu.expect(Colour::Planar, Depth::Readings { height, width }).unwrap();
+        let width = cells.width;
+        gpu.expect(Colour::Planar, Depth::Readings(cells)).unwrap();
         for time in 0..3 {
             let reading = |i: usize| match (i / width, i % width) {
                 (1, 3) => f32::NAN,
                 (y, x) if 3 * x + y < width + time => 0.2 + 0.004 * (i * 7 % 5) as f32,
                 (_, x) => 0.8 + 0.01 * x as f32,
             };
-            let depth: Vec<f32> = (0..height * width).map(reading).collect();
+            let depth: Vec<f32> = (0..cells.pixels()).map(reading).collect();
             plan.find(&depth, rgb, &mut scratch).unwrap();
             let frame = Frame {
                 colour: ColourData::Planar(rgb),
                 depth: DepthData::Readings(plan.readings(&scratch)),
             };
-            let mut levels = vec![0; 3 * out.0 * out.1];
+            let mut levels = vec![0; 3 * out.height * out.width];
             // The second frame is only read, and the third has it as its past.
             match time {
                 1 => block_on(gpu.read_async(None, &frame)).unwrap(),
@@ -1006,7 +1051,7 @@ fn every_program_agrees_with_the_cpu_on_readings() {
             }
         }
         let flat = Frame::of(&display);
-        assert!(gpu.process(&flat, &mut vec![0; 3 * out.0 * out.1]).is_err());
+        assert!(gpu.process(&flat, &mut vec![0; 3 * out.height * out.width]).is_err());
     }
 }
 
@@ -1042,9 +1087,9 @@ fn pixels((device, texture): (&Arc<Device>, &wgpu::Texture)) -> Vec<u8> {
 
 /// Makes a hologram whose levels are read back and kept on the GPU. Returns both and the scale.
 fn kept(job: &Job) -> (Vec<u8>, GpuLevels, f32) {
-    let (h, w) = job.shape;
+    let Size { width: w, height: h } = job.size;
     let mut plan = GpuPipeline::new(&device(), job).unwrap();
-    let frame = rgbd(h, w);
+    let frame = rgbd(Size { width: w, height: h });
     let mut levels = vec![0; 3 * h * w];
     let scale = plan.process(&Frame::of(&frame), &mut levels).unwrap().scale;
     let ticket = plan.submit(&Frame::of(&frame), Deliver::Shown).unwrap();
@@ -1058,25 +1103,35 @@ fn views_of_levels_on_the_gpu_are_those_of_the_cpu() {
     let beam = Array3::from_shape_fn((3, 2, 3), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
     let lit = Illumination::new(beam.view()).unwrap();
     let lut = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));
-    for (shape, screen, response, illumination) in [
-        ((29, 47), (29, 47), Response::Linear { bits: 8 }, None),
-        ((64, 90), (21, 29), lut, Some(lit)),
-        ((9, 5), (70, 81), Response::Linear { bits: 5 }, None),
+    for (size, screen, response, illumination) in [
+        (
+            Size { width: 47, height: 29 },
+            (29, 47),
+            Response::Linear { bits: 8 },
+            None,
+        ),
+        (Size { width: 90, height: 64 }, (21, 29), lut, Some(lit)),
+        (
+            Size { width: 5, height: 9 },
+            (70, 81),
+            Response::Linear { bits: 5 },
+            None,
+        ),
     ] {
         let display = Display::from_toml("offset_mm = 3.0\nvolume_depth_mm = 1").unwrap();
-        let display = display.with_size(shape.0, shape.1).unwrap();
+        let display = display.with_size(size).unwrap();
         let method = Method::Sweep(Sweep::for_display(&display));
-        let mut job = planned(shape, method, &display, Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let mut job = planned(size, method, &display, Encoding::ANTI_ALIAS, Brightness::FrameMax);
         (job.target.response, job.target.illumination) = (response, illumination);
         let (levels, on_gpu, scale) = kept(&job);
-        let area = shape.0 * shape.1;
+        let area = size.height * size.width;
         let words = pixels(on_gpu.texture());
         let same = |(i, pixel): (usize, &[u8])| (0..3).all(|c| pixel[c] == levels[c * area + i]) && pixel[3] == 255;
         assert!(words.chunks_exact(4).enumerate().all(same));
         let mut view = None;
         // One plan draws views at every z: the modulator's, one beside it, and one again.
         for z_m in [-2e-3, 3e-3, 2.9e-3, -2e-3] {
-            let preview = Preview::new(shape, &job.target, z_m, screen).unwrap();
+            let preview = Preview::new(size, &job.target, z_m, Size::from_shape(screen)).unwrap();
             let view = view.get_or_insert_with(|| block_on(GpuView::new(&on_gpu, &preview)).unwrap());
             assert!(view.fits(&on_gpu, &preview));
             block_on(view.draw(&on_gpu, &preview, scale)).unwrap();
@@ -1085,8 +1140,8 @@ fn views_of_levels_on_the_gpu_are_those_of_the_cpu() {
             let image = (Layout::Rgba, &mut expected[..], 4 * screen.1);
             preview.look(&levels, scale, image, &mut preview.scratch()).unwrap();
             let most = drawn.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
-            println!("a view of {shape:?} at {z_m} m: {most:?} of 255 apart");
-            assert!(most <= Some(1), "{shape:?} {screen:?} {z_m}: {most:?}");
+            println!("a view of {size} at {z_m} m: {most:?} of 255 apart");
+            assert!(most <= Some(1), "{size} {screen:?} {z_m}: {most:?}");
         }
     }
 }
@@ -1096,15 +1151,34 @@ fn views_that_a_gpu_cannot_have_are_refused() {
     let (h, w) = (12, 16);
     let display = Display::from_toml("volume_depth_mm = 1")
         .unwrap()
-        .with_size(h, w)
+        .with_size(Size { width: w, height: h })
         .unwrap();
     let method = Method::Sweep(Sweep::for_display(&display));
-    let mut job = planned((h, w), method, &display, Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let mut job = planned(
+        Size { width: w, height: h },
+        method,
+        &display,
+        Encoding::ANTI_ALIAS,
+        Brightness::FrameMax,
+    );
     // Two by two nodes for each colour.
-    let table = PerPixel::new(h, w, 16, 1, &[0.0, 255.0].repeat(12), &[6.2; 12]).unwrap();
+    let table = PerPixel::new(
+        Size { width: w, height: h },
+        16,
+        1,
+        &[0.0, 255.0].repeat(12),
+        &[6.2; 12],
+    )
+    .unwrap();
     job.target.response = Response::PerPixel(Arc::new(table));
     let (_, on_gpu, _) = kept(&job);
-    let preview = Preview::new((h, w), &job.target, 0.0, (6, 8)).unwrap();
+    let preview = Preview::new(
+        Size { width: w, height: h },
+        &job.target,
+        0.0,
+        Size { width: 8, height: 6 },
+    )
+    .unwrap();
     let refused = block_on(GpuView::new(&on_gpu, &preview)).err().unwrap().to_string();
     assert!(
         refused.contains("respond differently") && !refused.contains('\n'),

@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use divan::{Bencher, counter::ItemsCount};
+use phasefront_kernels::Size;
 use phasefront_kernels::*;
 
-const SIZE: (usize, usize) = (64, 512);
+const SIZE: Size = Size { width: 512, height: 64 };
 
 /// (network inputs, filters, layers).
 const SHAPES: [(usize, usize, usize); 2] = [(4, 24, 8), (6, 8, 8)];
@@ -45,7 +46,7 @@ fn cases(isas: Vec<Isa>) -> Vec<Case> {
 }
 
 fn run(bencher: Bencher<'_, '_>, shape: (usize, usize, usize), frame: impl Fn(&[f32], &mut [f32]) + Sync) {
-    let area = SIZE.0 * SIZE.1;
+    let area = SIZE.pixels();
     let input: Vec<f32> = (0..shape.0 * area)
         .map(|k| (k * 7919 % 255) as f32 / 255.0 - 0.5)
         .collect();
@@ -93,7 +94,7 @@ fn int8(bencher: Bencher<'_, '_>, Case { isa, shape }: Case) {
     let chain = Int8Chain::new(&layers, input, concatenated, false, isa).unwrap();
     let scratch = Scratch::default();
     run(bencher, shape, |input, output| {
-        chain.run(input, output, SIZE, chain.tiling(SIZE.0, SIZE.1), &scratch);
+        chain.run(input, output, SIZE, chain.tiling(SIZE), &scratch);
     });
 }
 
@@ -113,6 +114,6 @@ fn f32(bencher: Bencher<'_, '_>, Case { isa, shape }: Case) {
     let chain = F32Chain::new(&layers, isa).unwrap();
     let scratch = Scratch::default();
     run(bencher, shape, |input, output| {
-        chain.run(input, output, SIZE, chain.tiling(SIZE.0, SIZE.1), &scratch);
+        chain.run(input, output, SIZE, chain.tiling(SIZE), &scratch);
     });
 }

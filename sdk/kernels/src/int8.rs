@@ -15,6 +15,7 @@
 //! The channels of a row are in groups of four: `[channel/4][pixel][4]`. The concatenated network input starts a new
 //! group.
 
+use crate::Size;
 use crate::rows::Rows;
 use crate::wavefront::{self, Chain, Geometry, LastRows, Scratch, Slots, SlotsMut, SourceRow, Tiling};
 use crate::winograd;
@@ -353,16 +354,16 @@ impl Int8Chain {
     }
 
     /// Returns the tiling for a frame size and the current rayon pool.
-    pub fn tiling(&self, height: usize, width: usize) -> Tiling {
-        wavefront::tiling_for(self, height, width)
+    pub fn tiling(&self, size: Size) -> Tiling {
+        wavefront::tiling_for(self, size)
     }
 
     /// Runs the chain on the current rayon pool. `input` is planar `(C, H, W)` and `output` is `(6, H, W)`.
     ///
     /// # Panics
     /// Panics if a length does not match the size.
-    pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<u8>) {
-        let area = size.0 * size.1;
+    pub fn run(&self, input: &[f32], output: &mut [f32], size: Size, tiling: Tiling, scratch: &Scratch<u8>) {
+        let area = size.height * size.width;
         let inputs = self.inputs / (self.side * self.side);
         assert_eq!(input.len(), inputs * area, "planes of the input");
         assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
@@ -381,7 +382,7 @@ impl Int8Chain {
         &self,
         rows: &R,
         planes: [&mut [R::Value]; PLANES],
-        size: (usize, usize),
+        size: Size,
         tiling: Tiling,
         scratch: &Scratch<u8>,
     ) {

@@ -28,6 +28,7 @@ mod isa;
 mod peak;
 mod places;
 mod rows;
+mod size;
 mod tiles;
 mod wavefront;
 mod wide;
@@ -56,6 +57,7 @@ pub use isa::Isa;
 #[cfg(feature = "peak")]
 pub use peak::{f32_peak, int8_peak};
 pub use rows::{Band, Rows};
+pub use size::Size;
 pub use tiles::{TILE, TILE_VALUES, TileRows, each_tile_rows};
 pub use wavefront::{Scratch, Tiling};
 pub use wide::{has_avx2, has_avx512, in_avx2, in_avx512};

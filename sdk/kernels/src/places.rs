@@ -5,6 +5,7 @@
 //! holds for the outputs (SpaceToDepth and DepthToSpace of ONNX). If a side is odd, its last row or column is repeated.
 
 use crate::OUTPUTS;
+use crate::Size;
 use crate::rows::{Band, Rows, grown};
 
 /// The places of a frame.
@@ -12,20 +13,23 @@ use crate::rows::{Band, Rows, grown};
 pub(crate) struct Places {
     /// The pixels along each side of a place, 1 or 2.
     pub(crate) side: usize,
-    /// The frame's height and width in pixels.
-    pub(crate) frame: (usize, usize),
+    /// The size of the frame.
+    pub(crate) frame: Size,
 }
 
 impl Places {
-    /// Returns the rows and columns of places.
-    pub(crate) fn size(&self) -> (usize, usize) {
-        (self.frame.0.div_ceil(self.side), self.frame.1.div_ceil(self.side))
+    /// Returns the size of the frame in places.
+    pub(crate) fn size(&self) -> Size {
+        Size {
+            width: self.frame.width.div_ceil(self.side),
+            height: self.frame.height.div_ceil(self.side),
+        }
     }
 
     /// Returns the first column and the number of pixels in a row of `count` places from place `from` on.
     fn columns(&self, from: usize, count: usize) -> (usize, usize) {
         let left = self.side * from;
-        (left, (self.side * count).min(self.frame.1 - left))
+        (left, (self.side * count).min(self.frame.width - left))
     }
 
     /// Fills `into`, a run of `count` places for each of the chain's channels, with the places of `row` from `from` on.
@@ -44,7 +48,7 @@ impl Places {
         let row_values = into.len() / 2;
         let pixels = grown(pixels, row_values / (2 * count) * width);
         for (lower, into) in into.chunks_exact_mut(row_values).enumerate() {
-            rows.read((2 * row + lower).min(self.frame.0 - 1), left, band, pixels);
+            rows.read((2 * row + lower).min(self.frame.height - 1), left, band, pixels);
             let (even, odd) = into.split_at_mut(row_values / 2);
             let places = even.chunks_exact_mut(count).zip(odd.chunks_exact_mut(count));
             for (pixels, (even, odd)) in pixels.chunks_exact(width).zip(places) {
@@ -75,7 +79,7 @@ impl Places {
         let pixels = grown(pixels, OUTPUTS * width);
         for (lower, values) in values.chunks_exact(2 * OUTPUTS * count).enumerate() {
             let row = 2 * row + lower;
-            if row == self.frame.0 {
+            if row == self.frame.height {
                 break;
             }
             let (even, odd) = values.split_at(OUTPUTS * count);

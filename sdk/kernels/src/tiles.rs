@@ -39,7 +39,7 @@ impl<T> TileRows<'_, T> {
     }
 }
 
-/// Divides the rows of tiles of `plane` into as many parts as `work` has pieces of `piece` values, and calls `then`
+/// Divides the rows of tiles of `plane`, whose tiles have the `shape` (rows, columns), into as many parts as `work` has pieces of `piece` values, and calls `then`
 /// with each part and its piece. Tiles are stored column by column: the tile in row `r` and column `c` is at c·rows +
 /// r.
 ///
@@ -47,11 +47,12 @@ impl<T> TileRows<'_, T> {
 /// Panics if `plane` does not have rows·columns tiles.
 pub fn each_tile_rows<T: Send, W: Send>(
     plane: &mut [T],
-    (rows, columns): (usize, usize),
+    shape: (usize, usize),
     work: &mut [W],
     piece: usize,
     then: impl Fn(TileRows<'_, T>, &mut [W]) + Sync,
 ) {
+    let (rows, columns) = shape;
     assert_eq!(plane.len(), rows * columns * TILE_VALUES, "tiles");
     /// The plane's start, for threads that access different tiles.
     struct Start<T>(*mut T);

@@ -10,6 +10,7 @@
 //! bit-identical however the frame is cut. The same holds for columns if a band is cut into strips.
 
 use crate::OUTPUTS;
+use crate::Size;
 use crate::places::{Places, runs};
 use crate::rows::{Band, Rows, grown};
 use std::ops::Range;
@@ -33,12 +34,12 @@ pub struct Tiling {
 
 /// Returns a tiling for `chain` on the current pool: up to three bands per thread, so that a slower core gets fewer of
 /// them, if at most a sixteenth is computed twice; and strips whose rings fit in [`Chain::cache`].
-pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
+pub(crate) fn tiling_for<C: Chain>(chain: &C, size: Size) -> Tiling {
     let places = Places {
         side: chain.side(),
-        frame: (height, width),
+        frame: size,
     };
-    let (height, width) = places.size();
+    let Size { width, height } = places.size();
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
         .map(|i| (chain.step() + 2) * chain.groups(i) * C::GROUP * size_of::<C::Element>())
@@ -239,14 +240,14 @@ impl<'a> SourceRow<'a> {
 /// Planar input and output in memory.
 pub(crate) struct Planar<'a> {
     pub(crate) input: &'a [f32],
-    pub(crate) size: (usize, usize),
+    pub(crate) size: Size,
 }
 
 impl Rows<OUTPUTS> for Planar<'_> {
     type Value = f32;
 
     fn read(&self, row: usize, from: usize, _: &Band<'_, f32, OUTPUTS>, into: &mut [f32]) {
-        let (height, width) = self.size;
+        let Size { width, height } = self.size;
         let planes = self.input.chunks_exact(height * width);
         let count = into.len() / planes.len();
         for (into, plane) in into.chunks_exact_mut(count).zip(planes) {
@@ -373,14 +374,14 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
     chain: &C,
     rows: &R,
     planes: [&mut [R::Value]; PLANES],
-    (height, width): (usize, usize),
+    size: Size,
     tiling: Tiling,
     scratch: &Scratch<C::Element>,
 ) {
-    let area = height * width;
+    let area = size.pixels();
     let places = Places {
         side: chain.side(),
-        frame: (height, width),
+        frame: size,
     };
     assert!(
         PLANES > 0 && planes.iter().all(|plane| plane.len() == area),
@@ -389,7 +390,10 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
     if area == 0 {
         return;
     }
-    let (place_rows, place_columns) = places.size();
+    let Size {
+        width: place_columns,
+        height: place_rows,
+    } = places.size();
     let frame = Frame {
         chain,
         rows,
@@ -400,7 +404,11 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
         scratch,
     };
     let bands = place_rows.div_ceil(tiling.band_rows.max(1));
-    let whole = Band { top: 0, width, planes };
+    let whole = Band {
+        top: 0,
+        width: size.width,
+        planes,
+    };
     frame.bands(0, bands, whole);
 }
 
@@ -426,7 +434,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
         }
         let middle = (from + to) / 2;
         let rows = (middle - from) * self.tiling.band_rows.max(1) * self.places.side;
-        let width = self.places.frame.1;
+        let width = self.places.frame.width;
         let mut halves = band.planes.map(|plane| plane.split_at_mut(rows * width));
         let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
         let first = halves.map(|half| half.0);

@@ -4,10 +4,19 @@
 #[path = "../../../tests/skip.rs"]
 mod skip;
 
+use phasefront_kernels::Size;
 use phasefront_kernels::*;
 
 /// The frame sizes. The widths 128 and 192 are whole blocks of pixels, which no kernel may exceed.
-const SIZES: [(usize, usize); 7] = [(1, 1), (7, 5), (1, 128), (2, 192), (1, 300), (23, 67), (40, 131)];
+const SIZES: [Size; 7] = [
+    Size { width: 1, height: 1 },
+    Size { width: 5, height: 7 },
+    Size { width: 128, height: 1 },
+    Size { width: 192, height: 2 },
+    Size { width: 300, height: 1 },
+    Size { width: 67, height: 23 },
+    Size { width: 131, height: 40 },
+];
 
 /// A small linear congruential generator, which suffices for the tests and builds for every target.
 struct Random(u64);
@@ -33,13 +42,13 @@ impl Random {
 /// `(H, W)` planes. Reading outside returns `outside`.
 struct Planes<T> {
     data: Vec<T>,
-    size: (usize, usize),
+    size: Size,
     outside: T,
 }
 
 impl<T: Copy> Planes<T> {
     fn at(&self, c: usize, y: isize, x: isize) -> T {
-        let (h, w) = self.size;
+        let Size { width: w, height: h } = self.size;
         if y < 0 || x < 0 || y >= h as isize || x >= w as isize {
             return self.outside;
         }
@@ -47,7 +56,7 @@ impl<T: Copy> Planes<T> {
     }
 
     fn channels(&self) -> usize {
-        self.data.len() / (self.size.0 * self.size.1)
+        self.data.len() / (self.size.height * self.size.width)
     }
 }
 
@@ -128,8 +137,8 @@ impl Int8Case {
     }
 
     /// Computes the chain from its definition, plane by plane.
-    fn expected(&self, input: &[f32], size: (usize, usize)) -> Vec<f32> {
-        let (h, w) = size;
+    fn expected(&self, input: &[f32], size: Size) -> Vec<f32> {
+        let Size { width: w, height: h } = size;
         let quantise =
             |q: Quantiser, v: f32| ((v / q.scale).round_ties_even() + f32::from(q.zero_point)).clamp(0.0, 255.0) as u8;
         let dequantise = |q: Quantiser, v: u8| (f32::from(v) - f32::from(q.zero_point)) * q.scale;
@@ -186,15 +195,15 @@ impl Int8Case {
     }
 }
 
-fn frame(channels: usize, size: (usize, usize), seed: u64) -> Vec<f32> {
+fn frame(channels: usize, size: Size, seed: u64) -> Vec<f32> {
     let mut random = Random(seed);
-    (0..channels * size.0 * size.1)
+    (0..channels * size.height * size.width)
         .map(|_| random.between(-0.5, 0.5))
         .collect()
 }
 
-fn tilings(size: (usize, usize)) -> [Tiling; 4] {
-    [(size.0, size.1), (8, 64), (5, 17), (1, 1000)].map(|(band_rows, strip_columns)| Tiling {
+fn tilings(size: Size) -> [Tiling; 4] {
+    [(size.height, size.width), (8, 64), (5, 17), (1, 1000)].map(|(band_rows, strip_columns)| Tiling {
         band_rows,
         strip_columns,
     })
@@ -219,7 +228,7 @@ fn int8_is_the_definition_to_the_bit_on_every_instruction_set_and_tiling() {
             let case = Int8Case::random(inputs, filters, count, seed);
             for size in SIZES {
                 // The plain chain is slow, so the larger frames are only for the first shapes.
-                if size.0 > 10 && (k > 1 || seed % 2 == 1) {
+                if size.height > 10 && (k > 1 || seed % 2 == 1) {
                     continue;
                 }
                 let input = frame(inputs, size, seed + 100);
@@ -228,8 +237,8 @@ fn int8_is_the_definition_to_the_bit_on_every_instruction_set_and_tiling() {
                 for isa in Isa::int8() {
                     let chain = case.chain(isa).unwrap();
                     let scratch = Scratch::default();
-                    for tiling in tilings(size).into_iter().chain([chain.tiling(size.0, size.1)]) {
-                        if isa == Isa::Portable && tiling.band_rows < 8 && size.0 > 10 {
+                    for tiling in tilings(size).into_iter().chain([chain.tiling(size)]) {
+                        if isa == Isa::Portable && tiling.band_rows < 8 && size.height > 10 {
                             continue;
                         }
                         let mut output = vec![f32::NAN; expected.len()];
@@ -277,14 +286,14 @@ fn f32_layers(inputs: usize, filters: usize, count: usize, seed: u64) -> Vec<F32
         .collect()
 }
 
-fn f32_expected(layers: &[F32Layer], input: &[f32], size: (usize, usize)) -> Vec<f32> {
+fn f32_expected(layers: &[F32Layer], input: &[f32], size: Size) -> Vec<f32> {
     let mut x = vec![Planes {
         data: input.to_vec(),
         size,
         outside: 0.0,
     }];
     for (i, layer) in layers.iter().enumerate() {
-        let (h, w) = size;
+        let Size { width: w, height: h } = size;
         let mut data = vec![0.0; layer.outputs * h * w];
         for (y, column) in (0..h).flat_map(|y| (0..w).map(move |column| (y, column))) {
             let taps = taps(&x[i], y, column);
@@ -319,7 +328,7 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
     for (inputs, filters, count) in [(4, 24, 8), (4, 8, 2), (6, 8, 5), (4, 16, 4), (20, 24, 3), (4, 40, 3)] {
         let layers = f32_layers(inputs, filters, count, 5);
         for size in SIZES {
-            if size.0 > 10 && filters != 8 {
+            if size.height > 10 && filters != 8 {
                 continue;
             }
             let input = frame(inputs, size, 77);
@@ -328,7 +337,7 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
                 let chain = F32Chain::new(&layers, isa).unwrap();
                 let scratch = Scratch::default();
                 let mut whole = vec![f32::NAN; expected.len()];
-                chain.run(&input, &mut whole, size, chain.tiling(size.0, size.1), &scratch);
+                chain.run(&input, &mut whole, size, chain.tiling(size), &scratch);
                 let worst = whole
                     .iter()
                     .zip(&expected)
@@ -353,7 +362,7 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
 fn rows_of_every_width_agree_on_every_instruction_set() {
     let (case, layers) = (Int8Case::random(4, 8, 3, 2), f32_layers(4, 8, 3, 5));
     for width in 1..=400 {
-        let size = (1, width);
+        let size = Size { width, height: 1 };
         let input = frame(4, size, 7);
         let tiling = tilings(size)[0];
         let int8 = |isa| {
@@ -383,7 +392,7 @@ fn rows_of_every_width_agree_on_every_instruction_set() {
 }
 
 /// Converts `values` (C, H, W) to (4·C, ⌈H/2⌉, ⌈W/2⌉), with the pixels of a square of two by two one after another.
-fn squares(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
+fn squares(values: &[f32], Size { width, height }: Size) -> Vec<f32> {
     let pixels = [(0, 0), (0, 1), (1, 0), (1, 1)];
     let planes = pixels
         .iter()
@@ -400,7 +409,7 @@ fn squares(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
 }
 
 /// Computes the inverse of [`squares`].
-fn pixels(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
+fn pixels(values: &[f32], Size { width, height }: Size) -> Vec<f32> {
     let columns = width.div_ceil(2);
     let area = height.div_ceil(2) * columns;
     let at = |k: usize| {
@@ -432,13 +441,24 @@ fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
             last.kernel.extend(more.kernel);
             last.bias.extend(more.bias);
         }
-        for size in [(1, 1), (6, 4), (7, 5), (2, 256), (1, 301), (23, 66)] {
+        for size in [
+            Size { width: 1, height: 1 },
+            Size { width: 4, height: 6 },
+            Size { width: 5, height: 7 },
+            Size { width: 256, height: 2 },
+            Size { width: 301, height: 1 },
+            Size { width: 66, height: 23 },
+        ] {
             let input = frame(channels, size, 3);
-            let (given, half) = (squares(&input, size), (size.0.div_ceil(2), size.1.div_ceil(2)));
+            let given = squares(&input, size);
+            let half = Size {
+                width: size.width.div_ceil(2),
+                height: size.height.div_ceil(2),
+            };
             let expected = pixels(&case.expected(&given, half), size);
             for isa in Isa::int8() {
                 let (chain, scratch) = (case.chain(isa).unwrap(), Scratch::default());
-                for tiling in tilings(half).into_iter().chain([chain.tiling(size.0, size.1)]) {
+                for tiling in tilings(half).into_iter().chain([chain.tiling(size)]) {
                     let mut output = vec![f32::NAN; expected.len()];
                     chain.run(&input, &mut output, size, tiling, &scratch);
                     assert!(
@@ -450,7 +470,7 @@ fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
             let expected = pixels(&f32_expected(&layers, &given, half), size);
             for isa in Isa::f32() {
                 let (chain, scratch) = (F32Chain::new(&layers, isa).unwrap(), Scratch::default());
-                for tiling in tilings(half).into_iter().chain([chain.tiling(size.0, size.1)]) {
+                for tiling in tilings(half).into_iter().chain([chain.tiling(size)]) {
                     let mut output = vec![f32::NAN; expected.len()];
                     chain.run(&input, &mut output, size, tiling, &scratch);
                     let apart = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
@@ -465,8 +485,8 @@ fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
 /// slower.
 #[test]
 fn small_chains_agree_on_every_instruction_set() {
-    let size = (2, 3);
-    let tilings = [size, (1, 2)].map(|(band_rows, strip_columns)| Tiling {
+    let size = Size { width: 3, height: 2 };
+    let tilings = [size.shape(), (1, 2)].map(|(band_rows, strip_columns)| Tiling {
         band_rows,
         strip_columns,
     });
@@ -507,13 +527,19 @@ fn extreme_values_saturate_alike() {
             .collect();
         layer.multiplier.iter_mut().for_each(|m| *m = 60.0);
     }
-    let size = (6, 35);
+    let size = Size { width: 35, height: 6 };
     for value in [-1e30, 1e30, f32::NAN, f32::INFINITY] {
         let input = vec![value; 4 * 6 * 35];
         let outputs = Isa::int8().into_iter().map(|isa| {
             let chain = case.chain(isa).unwrap();
             let mut output = vec![0.0f32; 6 * 6 * 35];
-            chain.run(&input, &mut output, size, chain.tiling(6, 35), &Scratch::default());
+            chain.run(
+                &input,
+                &mut output,
+                size,
+                chain.tiling(Size { width: 35, height: 6 }),
+                &Scratch::default(),
+            );
             output.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
         });
         let outputs: Vec<_> = outputs.collect();
@@ -538,11 +564,25 @@ fn on_one_thread(work: impl FnOnce() + Send) {
 fn scratch_is_reused_and_small() {
     let case = Int8Case::random(4, 24, 8, 3);
     let chain = case.chain(Isa::int8()[0]).unwrap();
-    let size = (300, 700);
+    let size = Size {
+        width: 700,
+        height: 300,
+    };
     let (input, mut output) = (frame(4, size, 1), vec![0.0; 6 * 300 * 700]);
     let scratch = Scratch::default();
     let run = |output: &mut [f32]| {
-        on_one_thread(|| chain.run(&input, output, size, chain.tiling(300, 700), &scratch));
+        on_one_thread(|| {
+            chain.run(
+                &input,
+                output,
+                size,
+                chain.tiling(Size {
+                    width: 700,
+                    height: 300,
+                }),
+                &scratch,
+            )
+        });
     };
     run(&mut output);
     let (first, bytes) = (output.clone(), scratch.bytes());

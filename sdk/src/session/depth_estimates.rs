@@ -5,6 +5,7 @@ use super::SessionOptions;
 use super::live::lock;
 use super::stages::given_up;
 use ndarray::Array2;
+use phasefront_core::Size;
 use phasefront_core::depth_network::{DepthEstimator, DepthNetwork};
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::{Error, Result};
@@ -24,7 +25,7 @@ pub(super) enum DepthEstimates {
 /// A network, planned for the latest picture's shape.
 pub(super) struct Planned {
     network: Arc<DepthNetwork>,
-    latest: Option<((usize, usize), DepthEstimator)>,
+    latest: Option<(Size, DepthEstimator)>,
 }
 
 impl Planned {
@@ -32,10 +33,10 @@ impl Planned {
         Planned { network, latest: None }
     }
 
-    fn estimate(&mut self, rgb: &[f32], shape: (usize, usize)) -> Result<Arc<Array2<f32>>> {
+    fn estimate(&mut self, rgb: &[f32], size: Size) -> Result<Arc<Array2<f32>>> {
         let latest = match self.latest.take() {
-            Some(latest) if latest.0 == shape => latest,
-            _ => (shape, self.network.estimator(shape)?),
+            Some(latest) if latest.0 == size => latest,
+            _ => (size, self.network.estimator(size)?),
         };
         let (_, estimator) = self.latest.insert(latest);
         estimator.estimate(rgb).map(Arc::new)
@@ -45,7 +46,7 @@ impl Planned {
 /// A picture to estimate, (3, H, W), and its (H, W).
 struct Picture {
     rgb: Vec<f32>,
-    shape: (usize, usize),
+    size: Size,
 }
 
 #[derive(Default)]
@@ -92,7 +93,7 @@ impl DepthEstimates {
         Ok(Some(DepthEstimates::OwnThread(exchange)))
     }
 
-    /// Returns the relative inverse depth for a frame with the picture `rgb`, (3, H, W) with (H, W) = `shape`: that of
+    /// Returns the relative inverse depth for a frame with the picture `rgb`, (3, H, W), of `size`: that of
     /// the frame itself if it is `fresh` or each frame has its own, otherwise the newest there is.
     ///
     /// # Errors
@@ -100,13 +101,13 @@ impl DepthEstimates {
     pub(super) fn estimate(
         &mut self,
         rgb: &[f32],
-        shape: (usize, usize),
+        size: Size,
         fresh: bool,
         cancel: &Cancel,
     ) -> Result<Arc<Array2<f32>>> {
         match self {
-            DepthEstimates::EachFrame(planned) => planned.estimate(rgb, shape),
-            DepthEstimates::OwnThread(exchange) => exchange.estimate(rgb, shape, fresh, cancel),
+            DepthEstimates::EachFrame(planned) => planned.estimate(rgb, size),
+            DepthEstimates::OwnThread(exchange) => exchange.estimate(rgb, size, fresh, cancel),
         }
     }
 }
@@ -122,7 +123,7 @@ impl Drop for DepthEstimates {
 }
 
 impl Exchange {
-    fn estimate(&self, rgb: &[f32], shape: (usize, usize), fresh: bool, cancel: &Cancel) -> Result<Arc<Array2<f32>>> {
+    fn estimate(&self, rgb: &[f32], size: Size, fresh: bool, cancel: &Cancel) -> Result<Arc<Array2<f32>>> {
         let mut slots = lock(&self.slots);
         if fresh {
             slots.epoch += 1;
@@ -133,7 +134,7 @@ impl Exchange {
             let mut copy = waiting.unwrap_or_else(|| std::mem::take(&mut slots.spare));
             copy.clear();
             copy.extend_from_slice(rgb);
-            slots.picture = Some(Picture { rgb: copy, shape });
+            slots.picture = Some(Picture { rgb: copy, size });
             self.changed.notify_all();
         }
         loop {
@@ -165,7 +166,7 @@ impl Exchange {
             slots.busy = true;
             let epoch = slots.epoch;
             drop(slots);
-            let estimate = planned.estimate(&picture.rgb, picture.shape);
+            let estimate = planned.estimate(&picture.rgb, picture.size);
             slots = lock(&self.slots);
             slots.busy = false;
             slots.spare = picture.rgb;

@@ -5,6 +5,7 @@ use super::live::lock;
 use super::process_id::ProcessId;
 use super::threads::Threads;
 use num_complex::Complex32;
+use phasefront_core::Size;
 use phasefront_core::display::levels::{Levels, LevelsMut};
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
@@ -76,7 +77,7 @@ pub(super) struct Viewer {
 }
 
 struct ViewPlan {
-    shape: (usize, usize),
+    size: Size,
     z_m: f64,
     preview: Preview,
     scratch: PreviewScratch,
@@ -99,14 +100,14 @@ impl Viewer {
 /// Its memory returns to the session when it is dropped, even after the session's end.
 pub struct Hologram {
     pub(super) timestamp_ns: u64,
-    pub(super) shape: (usize, usize),
+    pub(super) size: Size,
     pub(super) levels: Pooled<u8>,
     /// The levels of a display with more than 8 bits.
     pub(super) words: Option<Pooled<u16>>,
     /// Normalized depth as d·65535. Empty if the hologram was made of a field, whose depth is not known.
     pub(super) depth: Pooled<u16>,
     /// The shape of `depth`, which covers the hologram at any resolution.
-    pub(super) depth_shape: (usize, usize),
+    pub(super) depth_size: Size,
     pub(super) scale: f32,
     pub(super) times: FrameTimes,
     pub(super) range_m: Option<(f32, f32)>,
@@ -122,7 +123,7 @@ impl std::fmt::Debug for Hologram {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Hologram")
             .field("timestamp_ns", &self.timestamp_ns)
-            .field("shape", &self.shape)
+            .field("shape", &self.size)
             .field("scale", &self.scale)
             .field("quality_level", &self.quality_level)
             .finish_non_exhaustive()
@@ -130,7 +131,7 @@ impl std::fmt::Debug for Hologram {
 }
 
 impl Hologram {
-    /// Makes the hologram of a complex field that comes from elsewhere: `field`, (C, H, W), of `shape` = (H, W) at
+    /// Makes the hologram of a complex field that comes from elsewhere: `field`, (C, H, W), of `size` at
     /// `z_m`, where z = 0 is the middle of the volume. C is the number of the target's lasers. The field propagates to
     /// the modulator, and is corrected and encoded for it. A smoothed brightness is that of the field alone.
     ///
@@ -140,7 +141,7 @@ impl Hologram {
     ///
     /// let target = Target::from(Display::from_toml("width = 64\nheight = 48\nwavelengths_nm = [532]")?);
     /// let field: Vec<_> = (0..48 * 64).map(|i| Complex32::from_polar(0.5, 0.01 * i as f32)).collect();
-    /// let hologram = Hologram::of_field(&field, (48, 64), 0.0, &target, &EncoderOptions::default())?;
+    /// let hologram = Hologram::of_field(&field, Size { width: 64, height: 48 }, 0.0, &target, &EncoderOptions::default())?;
     /// assert_eq!(hologram.levels().len(), 48 * 64);
     /// # Ok::<(), phasefront::Error>(())
     /// ```
@@ -150,7 +151,7 @@ impl Hologram {
     /// that are NaN or infinite; and if z is too far away or an option is out of its range.
     pub fn of_field(
         field: &[Complex32],
-        shape: (usize, usize),
+        size: Size,
         z_m: f64,
         target: &Target,
         options: &EncoderOptions,
@@ -159,8 +160,8 @@ impl Hologram {
         let pool = Threads::shared()?;
         let _computing = Computing::begin();
         pool.install(|| {
-            field::check(field, shape, target)?;
-            let plan = DisplayPlan::from_z(shape, z_m, target, options)?;
+            field::check(field, size, target)?;
+            let plan = DisplayPlan::from_z(size, z_m, target, options)?;
             let (mut scratch, mut field) = (plan.scratch(), field.to_vec());
             let mut levels = Pool::default().take(field.len());
             let stage = stage!("propagate");
@@ -179,11 +180,11 @@ impl Hologram {
             }
             Ok(Hologram {
                 timestamp_ns: 0,
-                shape,
+                size,
                 levels,
                 words,
                 depth: Pool::default().take(0),
-                depth_shape: (0, 0),
+                depth_size: Size { width: 0, height: 0 },
                 scale: modulation.scale,
                 times: FrameTimes {
                     propagate,
@@ -254,8 +255,8 @@ impl Hologram {
     }
 
     /// Returns the shape (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.shape
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns C, the number of colours of the levels.
@@ -288,7 +289,7 @@ impl Hologram {
     /// # Errors
     /// Returns an error for any other colour.
     pub fn plane(&self, colour: usize) -> Result<&[u8]> {
-        let size = self.shape.0 * self.shape.1;
+        let size = self.size.height * self.size.width;
         self.levels()
             .chunks_exact(size)
             .nth(colour)
@@ -336,7 +337,7 @@ impl Hologram {
         if self.depth.values.is_empty() {
             return 0.0;
         }
-        let (height, width) = self.depth_shape;
+        let Size { width, height } = self.depth_size;
         let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
         let d = self.depth.values[at(y, height) * width + at(x, width)];
         self.viewer.target.display.z_of_depth(f64::from(d) / 65535.0)
@@ -355,7 +356,7 @@ impl Hologram {
         self.viewer.pool.install(call)
     }
 
-    /// Writes the view of an eye focused at `z_m` into `bytes`, an image of `screen` = (H, W) pixels in `layout`, Rgb,
+    /// Writes the view of an eye focused at `z_m` into `bytes`, an image of the size `screen` in `layout`, Rgb,
     /// Rgba or Bgra, whose rows begin `row_stride` bytes apart. The plan is kept for the next call with the same z and
     /// size, on this or another result of the session.
     ///
@@ -366,7 +367,7 @@ impl Hologram {
     pub fn write_preview(
         &self,
         z_m: f64,
-        screen: (usize, usize),
+        screen: Size,
         layout: Layout,
         bytes: &mut [u8],
         row_stride: usize,
@@ -377,14 +378,13 @@ impl Hologram {
         // Lock the plan before entering the pool, whose threads could otherwise start another view while this one
         // waits.
         let mut plan = lock(&self.viewer.plan);
-        let fits =
-            |plan: &&mut ViewPlan| plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == screen;
+        let fits = |plan: &&mut ViewPlan| plan.size == self.size && plan.z_m == z_m && plan.preview.screen() == screen;
         if plan.as_mut().filter(fits).is_none() {
             let target = &self.viewer.target;
             *plan = Some(self.viewer.pool.install(|| -> Result<_> {
-                let preview = Preview::new(self.shape, target, z_m, screen)?;
+                let preview = Preview::new(self.size, target, z_m, screen)?;
                 Ok(ViewPlan {
-                    shape: self.shape,
+                    size: self.size,
                     z_m,
                     scratch: preview.scratch(),
                     preview,
@@ -419,10 +419,10 @@ impl Hologram {
         &self,
         levels: &GpuLevels,
         z_m: f64,
-        screen: (usize, usize),
+        screen: Size,
         take: impl AsyncFnOnce(&GpuView) -> std::result::Result<(), GpuError>,
     ) -> std::result::Result<(), GpuError> {
-        let preview = Preview::new(self.shape, &self.viewer.target, z_m, screen)?;
+        let preview = Preview::new(self.size, &self.viewer.target, z_m, screen)?;
         // No lock is held while the GPU is awaited.
         let kept = lock(&self.viewer.gpu_plan).take();
         let mut view = match kept.filter(|view| view.fits(levels, &preview)) {
@@ -444,7 +444,7 @@ impl Hologram {
     /// forked from the session's.
     pub fn field(&self, z_m: f64) -> Result<Vec<Complex32>> {
         self.viewer.process.check()?;
-        let seen = || seen_field(self.output_levels(), self.scale, self.target(), self.shape, z_m);
+        let seen = || seen_field(self.output_levels(), self.scale, self.target(), self.size, z_m);
         self.viewer.pool.install(seen)
     }
 

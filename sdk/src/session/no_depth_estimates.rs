@@ -2,6 +2,7 @@
 
 use super::SessionOptions;
 use ndarray::Array2;
+use phasefront_core::Size;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 use std::sync::Arc;
@@ -17,7 +18,7 @@ impl DepthEstimates {
         Ok(None)
     }
 
-    pub(super) fn estimate(&mut self, _: &[f32], _: (usize, usize), _: bool, _: &Cancel) -> Result<Arc<Array2<f32>>> {
+    pub(super) fn estimate(&mut self, _: &[f32], _: Size, _: bool, _: &Cancel) -> Result<Arc<Array2<f32>>> {
         match *self {}
     }
 }

@@ -1,8 +1,9 @@
 //! The options of a session.
 
-#[cfg(feature = "gpu")]
 use super::engine::GpuOptions;
 use super::quality::{self, Backend, Quality, QualityLevel};
+#[cfg(feature = "gpu")]
+use phasefront_core::Size;
 use phasefront_core::depth::stream::DepthOptions;
 #[cfg(feature = "tract")]
 use phasefront_core::depth_network::DepthNetwork;
@@ -72,12 +73,11 @@ impl SessionOptions {
     /// brightness, near and far limits by percentiles, no target rate.
     pub fn new(target: impl Into<Target>, method: Method) -> Self {
         let target = target.into();
-        let (height, width) = target.modulator();
+        let size = target.modulator();
         SessionOptions {
             quality_levels: vec![QualityLevel {
                 method,
-                height,
-                width,
+                size,
                 backend: None,
                 encoder: None,
             }],
@@ -99,7 +99,7 @@ impl SessionOptions {
     pub(super) fn check(&self) -> Result<()> {
         quality::check(&self.quality_levels, self.quality, self.target.modulator())?;
         // Quality levels are no larger than the modulator.
-        let (height, width) = self.target.modulator();
+        let Size { width, height } = self.target.modulator();
         if height.saturating_mul(width) > self.most_pixels {
             return Err(Error::Setting(format!(
                 "a session for {width}×{height} pixels; most_pixels allows {}: set it higher where the memory is there",

@@ -1,6 +1,7 @@
 //! A copy of a camera frame in the session's own memory, which a live session keeps when the camera reclaims its
 //! buffer.
 
+use phasefront_core::Size;
 use phasefront_core::depth::camera::{Alignment, CameraFrame};
 use phasefront_core::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
 use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
@@ -31,8 +32,8 @@ impl OwnedPlane {
 #[derive(Debug)]
 struct Description {
     timestamp_ns: u64,
-    colour: (ColourFormat, (usize, usize)),
-    depth: Option<(DepthFormat, (usize, usize))>,
+    colour: (ColourFormat, Size),
+    depth: Option<(DepthFormat, Size)>,
     confidence: Option<ConfidenceFormat>,
     orientation: Orientation,
     alignment: Alignment,
@@ -52,8 +53,8 @@ impl OwnedFrame {
     pub(super) fn copy(frame: &CameraFrame<'_>, spare: Option<OwnedFrame>) -> Self {
         let description = Description {
             timestamp_ns: frame.timestamp_ns,
-            colour: (frame.colour.format(), frame.colour.shape()),
-            depth: frame.depth.map(|depth| (depth.format(), depth.shape())),
+            colour: (frame.colour.format(), frame.colour.size()),
+            depth: frame.depth.map(|depth| (depth.format(), depth.size())),
             confidence: frame
                 .depth
                 .and_then(|depth| depth.confidence())
@@ -88,14 +89,14 @@ impl OwnedFrame {
     /// Returns an error only if the original frame was invalid.
     pub(super) fn frame(&self) -> Result<CameraFrame<'_>> {
         let d = &self.description;
-        let (format, (height, width)) = d.colour;
+        let (format, size) = d.colour;
         let planes: [Plane<'_>; 3] = std::array::from_fn(|i| self.colour[i].plane());
-        let colour = ColourImage::new(format, width, height, &planes[..format.planes()])?;
+        let colour = ColourImage::new(format, size, &planes[..format.planes()])?;
         let depth = match d.depth {
-            Some((format, (height, width))) => {
-                let depth = DepthImage::new(format, width, height, self.depth.plane())?;
+            Some((format, size)) => {
+                let depth = DepthImage::new(format, size, self.depth.plane())?;
                 Some(match d.confidence {
-                    Some(format) => depth.with_confidence(format, width, height, self.confidence.plane())?,
+                    Some(format) => depth.with_confidence(format, size, self.confidence.plane())?,
                     None => depth,
                 })
             }

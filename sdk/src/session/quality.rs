@@ -1,6 +1,7 @@
 //! Quality levels and the rules for changing between them.
 
 use super::SessionOptions;
+use phasefront_core::Size;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::method::Method;
 use phasefront_core::runtime::error::{Error, Result};
@@ -12,10 +13,8 @@ use std::time::Duration;
 pub struct QualityLevel {
     /// The method that computes the midpoint hologram.
     pub method: Method,
-    /// The height of the hologram in pixels.
-    pub height: usize,
-    /// The width of the hologram in pixels.
-    pub width: usize,
+    /// The size of the hologram.
+    pub size: Size,
     /// The backend; `None` for the session's backend.
     pub backend: Option<Backend>,
     /// The conversion of the field to levels; `None` for the session's encoder. For example, a lower quality level can
@@ -245,7 +244,7 @@ impl LevelControl {
 /// # Errors
 /// Returns an error if there are no quality levels or too many, if a fixed one is not among them, or if one has no
 /// pixels or is larger than the modulator.
-pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator: (usize, usize)) -> Result<()> {
+pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator: Size) -> Result<()> {
     if quality_levels.is_empty() {
         return Err(Error::Setting(
             "there are no quality levels; at least one is needed".into(),
@@ -260,11 +259,11 @@ pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator
     }
     quality.check(quality_levels.len())?;
     for (i, quality_level) in quality_levels.iter().enumerate() {
-        let (height, width) = (quality_level.height, quality_level.width);
-        if height == 0 || width == 0 || height > modulator.0 || width > modulator.1 {
+        let size = quality_level.size;
+        let fits = (1..=modulator.width).contains(&size.width) && (1..=modulator.height).contains(&size.height);
+        if !fits {
             return Err(Error::Setting(format!(
-                "quality level {i} is {width}×{height}; each side must be at least 1 and at most the modulator's {}×{}",
-                modulator.1, modulator.0
+                "quality level {i} is {size}; each side must be at least 1 and at most the modulator's {modulator}"
             )));
         }
     }

@@ -12,6 +12,7 @@ use super::live::guarded;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::BackendReport;
 use super::threads::{Threads, block_on};
+use phasefront_core::Size;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::{DepthReport, DepthStream};
 use phasefront_core::display::levels::LevelsMut;
@@ -49,10 +50,10 @@ impl LevelPlan {
         times: &mut FrameTimes,
     ) -> Result<DepthReport> {
         let stage = stage!("colour");
-        let (height, width) = self.frame.shape();
+        let size = self.frame.size();
         let fits = |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
         if self.colour.as_mut().filter(fits).is_none() {
-            let colour = ColourPlan::new(&frame.colour, frame.orientation, height, width)?;
+            let colour = ColourPlan::new(&frame.colour, frame.orientation, size)?;
             let scratch = colour.scratch();
             self.colour = Some((colour, scratch));
         }
@@ -77,7 +78,7 @@ impl LevelPlan {
         let stage = stage!("depth");
         let report = match estimates {
             Some(estimates) if frame.depth.is_none() => {
-                let estimate = estimates.estimate(rgb, (height, width), elapsed.is_none(), cancel)?;
+                let estimate = estimates.estimate(rgb, size, elapsed.is_none(), cancel)?;
                 self.depth.read_estimate(&estimate, elapsed, rgb)?
             }
             _ => self.depth.read(frame, elapsed, rgb)?,
@@ -105,28 +106,32 @@ impl LevelPlan {
         (&mut self.engine, input)
     }
 
-    /// Returns the depth of the frame that was taken in as d·65535, and its shape: that of the hologram, or of the
+    /// Returns the depth of the frame that was taken in as d·65535, and its size: that of the hologram, or of the
     /// readings where the depth of pixels is undecided.
-    fn depth_map(&self, pool: &Pool<u16>) -> (Pooled<u16>, (usize, usize)) {
+    fn depth_map(&self, pool: &Pool<u16>) -> (Pooled<u16>, Size) {
         let to_word = |d: f32| (d * 65535.0 + 0.5) as u16;
-        let (height, width) = self.frame.shape();
+        let size = self.frame.size();
         if !self.engine.takes_readings() {
-            let mut map = pool.take(height * width);
+            let mut map = pool.take(size.pixels());
             for (to, d) in map.values.iter_mut().zip(self.frame.depth()) {
                 *to = to_word(*d);
             }
-            return (map, (height, width));
+            return (map, size);
         }
         let readings = self.depth.readings();
-        let (rows, columns) = readings.shape();
-        let (rows, columns) = (rows.min(height), columns.min(width));
-        let mut map = pool.take(rows * columns);
-        for (i, to) in map.values.iter_mut().enumerate() {
+        let given = readings.size();
+        let to = Size {
+            width: given.width.min(size.width),
+            height: given.height.min(size.height),
+        };
+        let mut map = pool.take(to.pixels());
+        for (i, word) in map.values.iter_mut().enumerate() {
             let pixel = |i: usize, n: usize, pixels: usize| (2 * i + 1) * pixels / (2 * n);
-            let (y, x) = (pixel(i / columns, rows, height), pixel(i % columns, columns, width));
-            *to = to_word(readings.depth_near(y, x));
+            let (row, column) = (i / to.width, i % to.width);
+            let (y, x) = (pixel(row, to.height, size.height), pixel(column, to.width, size.width));
+            *word = to_word(readings.depth_near(y, x));
         }
-        (map, (rows, columns))
+        (map, to)
     }
 }
 
@@ -203,8 +208,8 @@ impl Stages {
             ..
         } = self;
         let quality_level = &options.quality_levels[level_control.quality_level()];
-        let shape = (quality_level.height, quality_level.width);
-        let depth = DepthStream::new(options.depth, shape)?;
+        let size = quality_level.size;
+        let depth = DepthStream::new(options.depth, size)?;
         let colours = options.target.display.colours();
         let mut context = LevelContext {
             options,
@@ -214,11 +219,11 @@ impl Stages {
         };
         Ok(LevelPlan {
             engine: pool.run(async || Engine::new(&mut context).await).await?,
-            frame: RgbdFrame::black(colours, shape),
+            frame: RgbdFrame::black(colours, size),
             depth,
             colour: None,
             picture: match colours {
-                1 => vec![0.0; 3 * shape.0 * shape.1],
+                1 => vec![0.0; 3 * size.height * size.width],
                 _ => Vec::new(),
             },
         })
@@ -270,7 +275,7 @@ impl Stages {
         } = self;
         cancel.clear();
         let quality_level = &options.quality_levels[level_control.quality_level()];
-        let mut levels = levels.take(options.target.display.colours() * quality_level.height * quality_level.width);
+        let mut levels = levels.take(options.target.display.colours() * quality_level.size.pixels());
         let mut brightness = BrightnessTracker::default();
         plan.frame.planes_mut().0.fill(0.0);
         let work = async || {
@@ -409,9 +414,9 @@ impl Stages {
             ..
         } = self;
         let quality_level = &options.quality_levels[level_control.quality_level()];
-        let shape = (quality_level.height, quality_level.width);
+        let size = quality_level.size;
         let display = &options.target.display;
-        let values = display.colours() * shape.0 * shape.1;
+        let values = display.colours() * size.height * size.width;
         let mut levels = levels.take(values);
         let mut words = (display.bits() > 8).then(|| words.take(values));
         let mut times = FrameTimes::default();
@@ -441,14 +446,14 @@ impl Stages {
             }
             Ok((report, depth_map, encoded))
         };
-        let (report, (depth, depth_shape), encoded) = pool.run(work).await?;
+        let (report, (depth, depth_size), encoded) = pool.run(work).await?;
         Ok(Hologram {
             timestamp_ns: frame.timestamp_ns,
-            shape,
+            size,
             levels,
             words,
             depth,
-            depth_shape,
+            depth_size,
             scale: encoded.scale,
             times: FrameTimes {
                 colour: times.colour,
@@ -490,7 +495,7 @@ mod tests {
 
     #[test]
     fn a_step_that_fails_loses_no_frame_and_is_told() {
-        let display = Display::default().with_size(12, 16).unwrap();
+        let display = Display::default().with_size(Size { width: 16, height: 12 }).unwrap();
         let sweep = Sweep::for_display(&display);
         let mut options = SessionOptions::new(display, Method::Sweep(sweep));
         let best = options.quality_levels[0].clone();
@@ -504,9 +509,9 @@ mod tests {
         };
         let bytes = [100; 4 * 12 * 16];
         let plane = Plane::new(&bytes, 4 * 16, 4);
-        let colour = ColourImage::new(ColourFormat::Rgba, 16, 12, &[plane]).unwrap();
+        let colour = ColourImage::new(ColourFormat::Rgba, Size { width: 16, height: 12 }, &[plane]).unwrap();
         let plane = Plane::new(&bytes, 16, 1);
-        let depth = DepthImage::new(DepthFormat::NormalizedU8, 16, 12, plane).unwrap();
+        let depth = DepthImage::new(DepthFormat::NormalizedU8, Size { width: 16, height: 12 }, plane).unwrap();
         let mut process = |time| {
             let frame = CameraFrame::new(time, colour, depth);
             block_on(stages.process(&frame, false, Thermal::Nominal, Quality::Fixed(1)))

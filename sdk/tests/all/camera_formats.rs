@@ -1,6 +1,7 @@
 //! Compares the fast conversion of each colour format with a naive one: random strides, odd sizes, every orientation,
 //! crops in both directions.
 use crate::camera;
+use phasefront::Size;
 
 use camera::{Noise, colour_formats};
 use phasefront::input::{Orientation, Rotation};
@@ -24,26 +25,30 @@ fn every_format_converts_as_the_definition_says() {
     for format in colour_formats() {
         for orientation in orientations() {
             for round in 0..6 {
-                let shape = (random.random_range(1..24), random.random_range(1..24));
-                let out = match round {
-                    0 => orientation.upright_shape(shape.0, shape.1),
-                    _ => (random.random_range(1..24), random.random_range(1..24)),
+                let mut any_size = || Size {
+                    height: random.random_range(1..24),
+                    width: random.random_range(1..24),
                 };
-                let noise = Noise::new(round, format, shape, random.random_range(0..4));
+                let size = any_size();
+                let out = match round {
+                    0 => orientation.upright_size(size),
+                    _ => any_size(),
+                };
+                let noise = Noise::new(round, format, size, random.random_range(0..4));
                 let image = noise.image().unwrap();
-                let naive = reference::convert(&image, orientation, out.0, out.1);
+                let naive = reference::convert(&image, orientation, out);
                 for threads in [1, 3] {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                     let fast = pool.install(|| {
-                        let plan = ColourPlan::new(&image, orientation, out.0, out.1).unwrap();
-                        let mut rgb = vec![9.0; 3 * out.0 * out.1];
+                        let plan = ColourPlan::new(&image, orientation, out).unwrap();
+                        let mut rgb = vec![9.0; 3 * out.height * out.width];
                         plan.convert(&image, &mut rgb, &mut plan.scratch()).unwrap();
                         rgb
                     });
                     let worst = (naive.iter().zip(&fast))
                         .map(|(a, b)| (a - b).abs())
                         .fold(0.0, f32::max);
-                    assert!(worst < 1e-5, "{format:?} {orientation:?} {shape:?} to {out:?}: {worst}");
+                    assert!(worst < 1e-5, "{format:?} {orientation:?} {size} to {out}: {worst}");
                 }
             }
         }
@@ -53,12 +58,12 @@ fn every_format_converts_as_the_definition_says() {
 #[test]
 fn a_plan_refuses_an_image_of_another_size_or_format() {
     let formats = colour_formats();
-    let noise = Noise::new(0, formats[0], (8, 10), 0);
+    let noise = Noise::new(0, formats[0], Size { width: 10, height: 8 }, 0);
     let image = noise.image().unwrap();
-    let plan = ColourPlan::new(&image, Orientation::default(), 4, 5).unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), Size { width: 5, height: 4 }).unwrap();
     let mut rgb = vec![0.0; 60];
     for (format, shape) in [(formats[0], (8, 9)), (formats[1], (8, 10)), (formats[3], (8, 10))] {
-        let other = Noise::new(0, format, shape, 0);
+        let other = Noise::new(0, format, Size::from_shape(shape), 0);
         let refused = plan.convert(&other.image().unwrap(), &mut rgb, &mut plan.scratch());
         assert!(
             refused
@@ -68,10 +73,10 @@ fn a_plan_refuses_an_image_of_another_size_or_format() {
         );
     }
     // The plan does not depend on the strides.
-    let wide = Noise::new(0, formats[0], (8, 10), 5);
+    let wide = Noise::new(0, formats[0], Size { width: 10, height: 8 }, 5);
     assert!(
         plan.convert(&wide.image().unwrap(), &mut rgb, &mut plan.scratch())
             .is_ok()
     );
-    assert!(ColourPlan::new(&image, Orientation::default(), 0, 5).is_err());
+    assert!(ColourPlan::new(&image, Orientation::default(), Size { width: 5, height: 0 }).is_err());
 }

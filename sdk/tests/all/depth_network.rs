@@ -1,5 +1,6 @@
 //! Tests frames without depth: their depth comes from a network, or from the app's own network as relative depth.
 use crate::{camera, depth_models};
+use phasefront::Size;
 
 use camera::{Scene, depth, options};
 use depth_models::{WEIGHTS, network};
@@ -12,12 +13,13 @@ use std::sync::{Arc, mpsc};
 const W: usize = 64;
 const H: usize = 48;
 
-/// Returns options with a network for pictures of (`height`, `width`).
-fn with_network(height: usize, width: usize) -> SessionOptions {
+/// Returns options with a network for pictures of `size`.
+fn with_network(size: Size) -> SessionOptions {
+    let Size { width, height } = size;
     let file = network(Some((height as i64, width as i64)), false);
     let mut network = DepthNetwork::from_onnx(&file).unwrap();
     network.colours = ColourScale::Unit;
-    let mut options = options(W, H);
+    let mut options = options(Size { width: W, height: H });
     options.depth_network = Some(Arc::new(network));
     options
 }
@@ -31,12 +33,16 @@ fn relative(scene: &Scene) -> Vec<u8> {
 
 #[test]
 fn a_network_in_the_session_equals_its_depth_handed_in() {
-    let session = ImageSession::new(with_network(H, W)).unwrap();
-    let scene = Scene::new(H, W, 10);
+    let session = ImageSession::new(with_network(Size { width: W, height: H })).unwrap();
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let estimated = session.process(&CameraFrame::without_depth(1, scene.colour())).unwrap();
     assert_eq!((estimated.range_m(), estimated.valid_depth()), (None, 1.0));
     let bytes = relative(&scene);
-    let handed = CameraFrame::new(2, scene.colour(), depth(&bytes, DepthFormat::RelativeF32, W, H));
+    let handed = CameraFrame::new(
+        2,
+        scene.colour(),
+        depth(&bytes, DepthFormat::RelativeF32, Size { width: W, height: H }),
+    );
     let handed = session.process(&handed).unwrap();
     let largest = (estimated.levels().iter().zip(handed.levels()))
         .map(|(a, b)| a.abs_diff(*b).min(b.wrapping_sub(*a)).min(a.wrapping_sub(*b)))
@@ -50,15 +56,15 @@ fn a_network_in_the_session_equals_its_depth_handed_in() {
 
 #[test]
 fn frames_without_depth_need_a_network_that_runs() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let frame = CameraFrame::without_depth(1, scene.colour());
-    let why = ImageSession::new(options(W, H))
+    let why = ImageSession::new(options(Size { width: W, height: H }))
         .unwrap()
         .process(&frame)
         .unwrap_err()
         .to_string();
     assert!(why.contains("no depth") && why.contains("a depth network"), "{why}");
-    let mut numbers = with_network(H, W);
+    let mut numbers = with_network(Size { width: W, height: H });
     // Not a number for any colour.
     let mut file = network(Some((H as i64, W as i64)), false);
     let at = file
@@ -83,12 +89,15 @@ fn frames_without_depth_need_a_network_that_runs() {
 #[test]
 fn a_live_session_runs_the_network_at_its_own_rate() {
     let (sender, events) = mpsc::channel();
-    let session = LiveSession::new(with_network(H, W), move |event| {
+    let session = LiveSession::new(with_network(Size { width: W, height: H }), move |event| {
         let _ = sender.send(event);
     })
     .unwrap();
-    let image = ImageSession::new(with_network(H, W)).unwrap();
-    let scenes: Vec<Scene> = [10, 30].iter().map(|at| Scene::new(H, W, *at)).collect();
+    let image = ImageSession::new(with_network(Size { width: W, height: H })).unwrap();
+    let scenes: Vec<Scene> = [10, 30]
+        .iter()
+        .map(|at| Scene::new(Size { width: W, height: H }, *at))
+        .collect();
     let next = || match events.recv().unwrap() {
         Event::Processed(hologram) => hologram,
         other => panic!("{other:?}"),

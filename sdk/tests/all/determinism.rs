@@ -2,6 +2,7 @@
 //! encoding.
 use crate::camera;
 use crate::network_models;
+use phasefront::Size;
 
 use camera::{Scene, frame};
 use network_models::Model;
@@ -19,7 +20,11 @@ fn network(model: &Model) -> Arc<Network> {
 }
 
 fn display() -> Display {
-    Display::default().with_size(H, W).unwrap().with_offset_m(2e-3).unwrap()
+    Display::default()
+        .with_size(Size { width: W, height: H })
+        .unwrap()
+        .with_offset_m(2e-3)
+        .unwrap()
 }
 
 /// Returns the levels of three frames of a video with a moving object.
@@ -27,7 +32,7 @@ fn video(options: SessionOptions) -> Vec<u8> {
     let session = VideoSession::new(options).unwrap();
     let mut levels = Vec::new();
     for time in 0..3 {
-        let scene = Scene::new(H, W, 40 + 9 * time);
+        let scene = Scene::new(Size { width: W, height: H }, 40 + 9 * time);
         let metres = scene.depth_bytes(DepthFormat::MetresF32);
         let hologram = session
             .process(&frame(1 + 33_000_000 * time as u64, &scene, &metres))

@@ -1,6 +1,7 @@
 //! Checks holograms of complex fields that come from elsewhere.
 
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::{Display, EncoderOptions, Error, Hologram, Target};
 use phasefront_core::display::levels::LevelsMut;
@@ -29,14 +30,17 @@ fn smooth(colours: usize) -> Vec<Complex32> {
 fn a_field_is_propagated_and_encoded() {
     for (more, colours) in [("", 3), ("wavelengths_nm = [532]\nbits = 6", 1)] {
         let (target, field, options) = (target(more), smooth(colours), EncoderOptions::default());
-        let hologram = Hologram::of_field(&field, (H, W), 1e-3, &target, &options).unwrap();
-        let plan = DisplayPlan::from_z((H, W), 1e-3, &target, &options).unwrap();
+        let hologram = Hologram::of_field(&field, Size { width: W, height: H }, 1e-3, &target, &options).unwrap();
+        let plan = DisplayPlan::from_z(Size { width: W, height: H }, 1e-3, &target, &options).unwrap();
         let (mut scratch, mut values, mut levels) = (plan.scratch(), field.clone(), vec![0; field.len()]);
         plan.propagate(&mut values, &mut scratch);
         let modulation = plan.modulate(None, &mut values, LevelsMut::Bytes(&mut levels), &mut scratch);
         assert_eq!(hologram.levels(), levels);
         assert_eq!((hologram.scale(), hologram.words()), (modulation.scale, None));
-        assert_eq!((hologram.shape(), hologram.colours()), ((H, W), colours));
+        assert_eq!(
+            (hologram.size(), hologram.colours()),
+            (Size { width: W, height: H }, colours)
+        );
         assert_eq!(hologram.z_at(0.5, 0.5), 0.0);
     }
 }
@@ -45,7 +49,14 @@ fn a_field_is_propagated_and_encoded() {
 #[test]
 fn what_is_displayed_is_the_field() {
     let (target, field) = (target(""), smooth(3));
-    let hologram = Hologram::of_field(&field, (H, W), 1e-3, &target, &EncoderOptions::default()).unwrap();
+    let hologram = Hologram::of_field(
+        &field,
+        Size { width: W, height: H },
+        1e-3,
+        &target,
+        &EncoderOptions::default(),
+    )
+    .unwrap();
     let seen = hologram.field(1e-3).unwrap();
     let (mut apart, mut all) = (0.0, 0.0);
     for (i, (seen, wanted)) in seen.iter().zip(&field).enumerate() {
@@ -61,7 +72,14 @@ fn what_is_displayed_is_the_field() {
 #[test]
 fn ten_bits_have_words_and_go_to_the_modulator() {
     let target = target("wavelengths_nm = [532]\nbits = 10");
-    let hologram = Hologram::of_field(&smooth(1), (H, W), 0.0, &target, &EncoderOptions::default()).unwrap();
+    let hologram = Hologram::of_field(
+        &smooth(1),
+        Size { width: W, height: H },
+        0.0,
+        &target,
+        &EncoderOptions::default(),
+    )
+    .unwrap();
     let words = hologram.words().unwrap();
     assert!(
         words
@@ -69,7 +87,12 @@ fn ten_bits_have_words_and_go_to_the_modulator() {
             .zip(hologram.levels())
             .all(|(word, level)| word >> 2 == u16::from(*level))
     );
-    let plan = Output::new(&target, (H, W), Placement::centred(Layout::Grey16)).unwrap();
+    let plan = Output::new(
+        &target,
+        Size { width: W, height: H },
+        Placement::centred(Layout::Grey16),
+    )
+    .unwrap();
     let mut frame = vec![0; plan.image_bytes()];
     plan.write(hologram.output_levels(), 0, &mut frame, plan.row_bytes())
         .unwrap();
@@ -86,8 +109,22 @@ fn fields_that_cannot_be_are_refused() {
         Ok(_) => panic!("made"),
     };
     let field = smooth(3);
-    assert!(matches!(refused(&field[1..], (H, W), 0.0), Error::Frame(_)));
-    assert!(matches!(refused(&field, (W, H), 0.0), Error::Frame(_)));
-    assert!(refused(&field, (H, W), 1e3).to_string().contains("distance"));
-    assert!(refused(&field, (H, W), f64::NAN).to_string().contains("NaN"));
+    assert!(matches!(
+        refused(&field[1..], Size { width: W, height: H }, 0.0),
+        Error::Frame(_)
+    ));
+    assert!(matches!(
+        refused(&field, Size { width: H, height: W }, 0.0),
+        Error::Frame(_)
+    ));
+    assert!(
+        refused(&field, Size { width: W, height: H }, 1e3)
+            .to_string()
+            .contains("distance")
+    );
+    assert!(
+        refused(&field, Size { width: W, height: H }, f64::NAN)
+            .to_string()
+            .contains("NaN")
+    );
 }

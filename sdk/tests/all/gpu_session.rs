@@ -2,6 +2,7 @@
 //! to the CPU, and sessions survive lost devices. Any device will do, including Mesa's software driver.
 use crate::camera;
 use crate::on_gpu;
+use phasefront::Size;
 
 use camera::{Scene, colour_formats, depth, frame, options};
 use on_gpu::on_gpu;
@@ -38,9 +39,9 @@ fn differing(levels: &[u8], expected: &[u8], far: f64) -> f64 {
 
 #[test]
 fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
-    let plain = options(W, H);
+    let plain = options(Size { width: W, height: H });
     let gpu = on_gpu(plain.clone());
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     for brightness in [Brightness::Smoothed, Brightness::Fixed(0.9), Brightness::FrameMax] {
         let (mut plain, mut gpu) = (plain.clone(), gpu.clone());
@@ -64,9 +65,10 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
         assert_eq!(made.z_at(0.3, 0.4), expected.z_at(0.3, 0.4));
         let z_m = made.z_at(0.3, 0.4);
         let (mut a, mut b) = (vec![0; 4 * 24 * 32], vec![0; 4 * 24 * 32]);
-        made.write_preview(z_m, (24, 32), Layout::Rgba, &mut a, 128).unwrap();
+        made.write_preview(z_m, Size { width: 32, height: 24 }, Layout::Rgba, &mut a, 128)
+            .unwrap();
         expected
-            .write_preview(z_m, (24, 32), Layout::Rgba, &mut b, 128)
+            .write_preview(z_m, Size { width: 32, height: 24 }, Layout::Rgba, &mut b, 128)
             .unwrap();
         assert!(a.iter().zip(&b).all(|(a, b)| a.abs_diff(*b) <= 2));
         let (there, here) = (gpu.statistics(), cpu.statistics());
@@ -83,11 +85,11 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
 /// f32 networks give nearly the CPU's levels in 32 bits, and similar levels in 16 bits.
 #[test]
 fn images_of_an_f32_network_are_near_the_cpus() {
-    let mut plain = options(W, H);
+    let mut plain = options(Size { width: W, height: H });
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
     plain.quality_levels[0].method = Method::Network(Arc::new(network));
     let gpu = on_gpu(plain.clone());
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = frame(7, &scene, &metres);
     let cpu = ImageSession::new(plain).unwrap();
@@ -109,7 +111,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
 /// Runs the plane sweep, alone and under a network, at separate quality levels, on camera frames.
 #[test]
 fn sweeps_are_those_of_the_cpu() {
-    let mut plain = options(W, H);
+    let mut plain = options(Size { width: W, height: H });
     let seeded = Network::from_onnx(include_bytes!("../../../models/seeded-8-80.onnx")).unwrap();
     let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
     for (method, word) in [(sweep, "the sweep"), (Method::Seeded(Arc::new(seeded)), "Layers")] {
@@ -195,7 +197,7 @@ fn the_automatic_choice_is_that_of_the_cpu() {
 /// Runs each colour format, rotated and not, as frames of one session, which plans only its input again.
 #[test]
 fn cameras_may_change_their_format() {
-    let plain = options(W, H);
+    let plain = options(Size { width: W, height: H });
     let gpu = on_gpu(plain.clone());
     let cpu = ImageSession::new(plain).unwrap();
     let gpu = ImageSession::new(gpu).unwrap();
@@ -203,17 +205,20 @@ fn cameras_may_change_their_format() {
         rotation: Rotation::Half,
         mirrored: true,
     };
-    let metres = Scene::new(24, 32, 9).depth_bytes(DepthFormat::MetresF32);
+    let metres = Scene::new(Size { width: 32, height: 24 }, 9).depth_bytes(DepthFormat::MetresF32);
     for (seed, format) in colour_formats().into_iter().enumerate() {
-        for (shape, orientation) in [((H, W), Orientation::default()), ((75, 101), turned)] {
-            let noise = camera::Noise::new(seed as u64, format, shape, 3);
-            let depth = depth(&metres, DepthFormat::MetresF32, 32, 24);
+        for (size, orientation) in [
+            (Size { width: W, height: H }, Orientation::default()),
+            (Size { width: 101, height: 75 }, turned),
+        ] {
+            let noise = camera::Noise::new(seed as u64, format, size, 3);
+            let depth = depth(&metres, DepthFormat::MetresF32, Size { width: 32, height: 24 });
             let mut frame = CameraFrame::new(1, noise.image().unwrap(), depth);
             frame.orientation = orientation;
             let expected = cpu.process(&frame).unwrap();
             let made = gpu.process(&frame).unwrap();
             let share = differing(made.levels(), expected.levels(), 0.02);
-            assert!(share < 0.05, "{format:?} {shape:?}: {share}");
+            assert!(share < 0.05, "{format:?} {size}: {share}");
         }
     }
     assert!(gpu.statistics().backend.name.contains('('));
@@ -221,13 +226,13 @@ fn cameras_may_change_their_format() {
 
 #[test]
 fn video_is_as_smooth_as_on_the_cpu() {
-    let plain = options(W, H);
+    let plain = options(Size { width: W, height: H });
     let gpu = on_gpu(plain.clone());
     let cpu = VideoSession::new(plain).unwrap();
     let gpu = VideoSession::new(gpu).unwrap();
     let mut scales = Vec::new();
     for i in 0..8u64 {
-        let mut scene = Scene::new(H, W, 4 + 3 * i as usize);
+        let mut scene = Scene::new(Size { width: W, height: H }, 4 + 3 * i as usize);
         // The scene darkens abruptly.
         if i > 3 {
             scene.rgba.iter_mut().for_each(|v| *v /= 2);
@@ -259,14 +264,20 @@ fn video_is_as_smooth_as_on_the_cpu() {
 /// The levels of coarse and of full-size depth, in a video in which something moves. A frame that is replayed counts.
 #[test]
 fn depth_is_conditioned_on_the_gpu_as_on_the_cpu() {
-    for (height, width) in [(H / 4, W / 4), (H, W)] {
-        let mut plain = options(W, H);
+    for size @ Size { width, height } in [
+        Size {
+            width: W / 4,
+            height: H / 4,
+        },
+        Size { width: W, height: H },
+    ] {
+        let mut plain = options(Size { width: W, height: H });
         plain.quality_levels[0].method = Method::Sweep(Sweep::for_display(&plain.target.display));
         let cpu = VideoSession::new(plain.clone()).unwrap();
         let [gpu, resumed] = [(); 2].map(|()| VideoSession::new(on_gpu(plain.clone())).unwrap());
         for time in 0..4 {
-            let scene = Scene::new(H, W, 8 + 4 * time);
-            let mut sensor = Scene::new(height, width, (8 + 4 * time) * width / W);
+            let scene = Scene::new(Size { width: W, height: H }, 8 + 4 * time);
+            let mut sensor = Scene::new(size, (8 + 4 * time) * width / W);
             // A hole and noise.
             sensor.metres[width / 2] = 0.0;
             let noise = |i: usize| 0.01 * ((i * 7 + time) % 5) as f32;
@@ -276,7 +287,7 @@ fn depth_is_conditioned_on_the_gpu_as_on_the_cpu() {
                 .enumerate()
                 .for_each(|(i, m)| *m += noise(i) * *m);
             let metres = sensor.depth_bytes(DepthFormat::MetresF32);
-            let depth = depth(&metres, DepthFormat::MetresF32, width, height);
+            let depth = depth(&metres, DepthFormat::MetresF32, Size { width, height });
             let frame = CameraFrame::new(33_000_000 * (time as u64 + 1), scene.colour(), depth);
             let expected = cpu.process(&frame).unwrap();
             let made = gpu.process(&frame).unwrap();
@@ -299,12 +310,12 @@ fn depth_is_conditioned_on_the_gpu_as_on_the_cpu() {
 #[test]
 fn depth_that_the_gpu_refuses_is_conditioned_on_the_cpu() {
     let height = 65_536;
-    let plain = options(W, H);
+    let plain = options(Size { width: W, height: H });
     let cpu = ImageSession::new(plain.clone()).unwrap();
     let gpu = ImageSession::new(on_gpu(plain)).unwrap();
     gpu.process(&frame_at(1)).unwrap();
     assert_ne!(gpu.statistics().backend.name, cpu.statistics().backend.name);
-    let high = Scene::new(height, 1, 0);
+    let high = Scene::new(Size { width: 1, height }, 0);
     let metres = high.depth_bytes(DepthFormat::MetresF32);
     let frame = frame(2, &high, &metres);
     let (made, expected) = (gpu.process(&frame).unwrap(), cpu.process(&frame).unwrap());
@@ -319,7 +330,7 @@ fn depth_that_the_gpu_refuses_is_conditioned_on_the_cpu() {
 fn frame_at(timestamp_ns: u64) -> CameraFrame<'static> {
     static SCENE: std::sync::OnceLock<(Scene, Vec<u8>)> = std::sync::OnceLock::new();
     let (scene, metres) = SCENE.get_or_init(|| {
-        let scene = Scene::new(H, W, 10);
+        let scene = Scene::new(Size { width: W, height: H }, 10);
         let metres = scene.depth_bytes(DepthFormat::MetresF32);
         (scene, metres)
     });
@@ -329,7 +340,7 @@ fn frame_at(timestamp_ns: u64) -> CameraFrame<'static> {
 /// Destroys the device repeatedly in mid-stream: frames on it fail as lost, and all others are answered.
 #[test]
 fn a_live_session_outlives_its_device() {
-    let options = on_gpu(options(W, H));
+    let options = on_gpu(options(Size { width: W, height: H }));
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
     let session = LiveSession::new(options, listener).unwrap();
@@ -381,11 +392,11 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         let session = ImageSession::new(options).unwrap();
         session.process(&frame_at(1)).unwrap().levels().to_vec()
     };
-    let mut missing = options(W, H);
+    let mut missing = options(Size { width: W, height: H });
     missing.backend = Backend::Gpu;
     missing.gpu.device.name = Some("no such card".into());
     let mut cases = vec![(missing, "no GPU")];
-    let gpu = on_gpu(options(W, H));
+    let gpu = on_gpu(options(Size { width: W, height: H }));
     let mut sweep = gpu.clone();
     sweep.quality_levels[0].method = Method::Sweep(Sweep {
         taps: 31,
@@ -404,7 +415,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut long = gpu.clone();
     let text = "width = 9000\nheight = 4\noffset_mm = 2";
     long.target.display = Display::from_toml(text).unwrap();
-    (long.quality_levels[0].height, long.quality_levels[0].width) = (4, 9000);
+    long.quality_levels[0].size = Size { width: 9000, height: 4 };
     cases.push((long, "workgroup"));
     let mut half = gpu.clone();
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
@@ -424,7 +435,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         assert!(session.gpu().is_none() || word != "no GPU");
     }
     // Options that the CPU refuses too are an error.
-    let mut wrong = options(W, H);
+    let mut wrong = options(Size { width: W, height: H });
     wrong.backend = Backend::Gpu;
     wrong.gpu.device.name = Some("no such card".into());
     wrong.target.display = Display::from_toml("width = 64\nheight = 48\npitch_um = 4").unwrap();
@@ -434,10 +445,13 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
 /// Runs quality levels on the GPU and on the CPU in one session.
 #[test]
 fn quality_levels_say_where_they_are_computed() {
-    let mut options = on_gpu(options(W, H));
+    let mut options = on_gpu(options(Size { width: W, height: H }));
     let mut low = options.quality_levels[0].clone();
     low.backend = Some(Backend::Cpu);
-    (low.height, low.width) = (H / 2, W / 2);
+    low.size = Size {
+        width: W / 2,
+        height: H / 2,
+    };
     let mut middle = low.clone();
     middle.backend = None;
     options.quality_levels.extend([middle, low]);
@@ -461,7 +475,7 @@ fn quality_levels_say_where_they_are_computed() {
 
 #[test]
 fn sessions_close_at_any_moment() {
-    let options = on_gpu(options(W, H));
+    let options = on_gpu(options(Size { width: W, height: H }));
     for round in 0..6 {
         let closed = Arc::new(AtomicBool::new(false));
         let (sender, events) = mpsc::channel();

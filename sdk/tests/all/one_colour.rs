@@ -2,6 +2,7 @@
 //! bit if that laser has the longest wavelength of the three, for which the shared parts are planned.
 use crate::camera;
 use crate::network_models;
+use phasefront::Size;
 
 use camera::{Scene, frame};
 use ndarray::{Array2, Array3, s};
@@ -57,14 +58,18 @@ fn depth() -> Array2<f32> {
 fn calibrated(wavelengths_nm: &str, offset_mm: f64) -> Target {
     let display = display(wavelengths_nm, offset_mm);
     let colours = display.colours();
-    let (rows, columns) = per_pixel::nodes(H, W, 8);
+    let (rows, columns) = per_pixel::nodes(Size { width: W, height: H }, 8);
     let nodes = colours * rows * columns;
     let table: Vec<f32> = (0..9 * nodes)
         .map(|i| (i / 9 % 7) as f32 + (i % 9) as f32 * 31.0)
         .collect();
-    let table = PerPixel::new(H, W, 8, 8, &table, &vec![6.1; nodes]).unwrap();
+    let table = PerPixel::new(Size { width: W, height: H }, 8, 8, &table, &vec![6.1; nodes]).unwrap();
     let light = Array3::from_shape_fn((3, 4, 5), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 20.0));
-    let flatness = Flatness::new((H, W), (0..SIZE).map(|i| (31 * i) as u16).collect()).unwrap();
+    let flatness = Flatness::new(
+        Size { width: W, height: H },
+        (0..SIZE).map(|i| (31 * i) as u16).collect(),
+    )
+    .unwrap();
     Target {
         response: Response::PerPixel(table.into()),
         illumination: Some(Illumination::new(light.slice(s![..colours, .., ..])).unwrap()),
@@ -93,7 +98,7 @@ fn options(encoding: Encoding, midpoint_steps: usize) -> EncoderOptions {
 
 /// Returns the field at the modulator, and the levels.
 fn made(frame: &RgbdFrame, method: Method, target: &Target, options: &EncoderOptions) -> (Vec<Complex32>, Vec<u8>) {
-    let pipeline = Pipeline::new((H, W), method, target, options).unwrap();
+    let pipeline = Pipeline::new(Size { width: W, height: H }, method, target, options).unwrap();
     assert_eq!(pipeline.colours(), frame.colours());
     let values = pipeline.colours() * SIZE;
     let (mut field, mut levels) = (vec![Complex32::ZERO; values], vec![0; values]);
@@ -214,7 +219,13 @@ fn a_network_serves_a_laser_within_the_depths_that_it_was_trained_for() {
     assert!(why.contains("1.22 times the range"), "{why}");
     // A frame with another number of colours is refused.
     let target = Target::from(display(ONE, 0.0));
-    let plan = Pipeline::new((H, W), Method::Network(network), &target, &Encoding::ANTI_ALIAS.into()).unwrap();
+    let plan = Pipeline::new(
+        Size { width: W, height: H },
+        Method::Network(network),
+        &target,
+        &Encoding::ANTI_ALIAS.into(),
+    )
+    .unwrap();
     let mut field = vec![Complex32::ZERO; SIZE];
     let refused = plan.field(&rgbd(3), &mut field, &mut plan.scratch());
     assert!(refused.unwrap_err().to_string().contains("for_display"));
@@ -235,7 +246,7 @@ fn a_pre_filter_sees_the_field_as_all_colours() {
         let encoding = Encoding::Deep(network(&model));
         let phases = |wavelengths_nm: &str| {
             let target = Target::from(display(wavelengths_nm, 2.0));
-            let encoder = Encoder::new((H, W), &target, &encoding.clone().into()).unwrap();
+            let encoder = Encoder::new(Size { width: W, height: H }, &target, &encoding.clone().into()).unwrap();
             let mut field = wave.repeat(target.display.colours());
             let mut phases = vec![0.0; field.len()];
             encoder.encode(&mut field, Some(1.0), &mut phases, &mut encoder.scratch());
@@ -263,14 +274,20 @@ fn views_and_images_of_one_laser_are_those_of_its_colour() {
         let views = |target: &Target, levels: &[u8]| {
             let mut field = vec![Complex32::ZERO; levels.len()];
             phase_only_field(levels, &target.response, 1.1, &mut field);
-            let plan = Refocus::new(H, W, &target.display, &z_m, None).unwrap();
+            let plan = Refocus::new(Size { width: W, height: H }, &target.display, &z_m, None).unwrap();
             plan.focal_stack(&field, &z_m).unwrap()
         };
         for (view, among) in views(&one, &levels).iter().zip(views(&three, &among)) {
             assert!(*view == among[..SIZE], "{offset_mm}");
         }
         let preview = |target: &Target, levels: &[u8]| {
-            let plan = Preview::new((H, W), target, 1e-3, (20, 30)).unwrap();
+            let plan = Preview::new(
+                Size { width: W, height: H },
+                target,
+                1e-3,
+                Size { width: 30, height: 20 },
+            )
+            .unwrap();
             let mut rgba = vec![0; 4 * 20 * 30];
             let image = (Layout::Rgba, &mut rgba[..], 120);
             plan.look(levels, 1.1, image, &mut plan.scratch()).unwrap();
@@ -287,11 +304,12 @@ fn views_and_images_of_one_laser_are_those_of_its_colour() {
 
 /// Checks the output images of holograms smaller than the modulator, which are surrounded by black.
 fn images(one: &Target, three: &Target) {
-    let shape @ (h, w) = (H - 6, W - 9);
+    let (h, w) = (H - 6, W - 9);
+    let size = Size { width: w, height: h };
     let levels: Vec<u8> = (0..3 * h * w).map(|i| (i * 7 % 251) as u8).collect();
     for layout in [Layout::Rgb, Layout::Bgra, Layout::Rgb10, Layout::Grey, Layout::Grey16] {
         let image = |target: &Target, levels: &[u8]| {
-            let plan = Output::new(target, shape, Placement::centred(layout)).unwrap();
+            let plan = Output::new(target, size, Placement::centred(layout)).unwrap();
             let mut bytes = vec![0; plan.image_bytes()];
             plan.write(Levels::Bytes(levels), 0, &mut bytes, plan.row_bytes())
                 .unwrap();
@@ -302,11 +320,11 @@ fn images(one: &Target, three: &Target) {
         let (bytes, read) = image(one, &levels[..h * w]);
         assert!(read.iter().zip(&levels).all(|(read, level)| *read == u16::from(*level)));
         // The image equals that of three equal colours, unless each colour has its own table.
-        if one.response.shape().is_none() || layout.images(3) == 3 {
+        if one.response.size().is_none() || layout.images(3) == 3 {
             assert!(bytes == image(three, &levels[..h * w].repeat(3)).0, "{layout:?}");
         }
         assert_eq!(layout.images(1), 1);
-        let plan = Output::new(one, shape, Placement::centred(layout)).unwrap();
+        let plan = Output::new(one, size, Placement::centred(layout)).unwrap();
         let refused = plan.write(Levels::Bytes(&levels[..h * w]), 1, &mut bytes.clone(), plan.row_bytes());
         assert!(refused.unwrap_err().to_string().contains("no image 1"));
     }
@@ -324,7 +342,7 @@ fn a_session_shows_a_pictures_luminance() {
     let (one, three) = (session(ONE), session(THREE));
     one.warm_up().unwrap();
     for time in 0..2u64 {
-        let mut scene = Scene::new(H, W, 10 + 5 * time as usize);
+        let mut scene = Scene::new(Size { width: W, height: H }, 10 + 5 * time as usize);
         // The scene is grey, so that the luminance equals each colour.
         for pixel in scene.rgba.chunks_exact_mut(4) {
             let green = pixel[1];
@@ -345,7 +363,7 @@ fn a_session_shows_a_pictures_luminance() {
         assert!(other * 100 < SIZE, "{other} of {SIZE}");
         let mut rgba = vec![0; 4 * 20 * 30];
         alone
-            .write_preview(1e-3, (20, 30), Layout::Rgba, &mut rgba, 120)
+            .write_preview(1e-3, Size { width: 30, height: 20 }, Layout::Rgba, &mut rgba, 120)
             .unwrap();
         let is_grey = |p: &[u8]| p[0] == p[1] && p[1] == p[2] && p[3] == 255;
         assert!(rgba.chunks_exact(4).all(is_grey) && rgba.iter().any(|value| (30..200).contains(value)));
@@ -359,7 +377,7 @@ fn levels_of_ten_bits_are_made_for_one_laser() {
         let display = Display::from_toml(&text(nm)).unwrap();
         let method = Method::Sweep(Sweep::for_display(&display));
         let (colours, options) = (display.colours(), options(Encoding::ANTI_ALIAS, 0));
-        let plan = Pipeline::new((H, W), method, &display.into(), &options).unwrap();
+        let plan = Pipeline::new(Size { width: W, height: H }, method, &display.into(), &options).unwrap();
         let mut scratch = plan.scratch();
         let mut words = vec![0; colours * SIZE];
         let out = LevelsMut::Words(&mut words);

@@ -1,5 +1,6 @@
 //! Tests sessions end to end with the bundled network: formats, modes, invalid frames and reports.
 use crate::camera;
+use phasefront::Size;
 
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
 use num_complex::Complex32;
@@ -21,19 +22,19 @@ const W: usize = 64;
 const H: usize = 48;
 
 fn image_session() -> ImageSession {
-    ImageSession::new(options(W, H)).unwrap()
+    ImageSession::new(options(Size { width: W, height: H })).unwrap()
 }
 
 #[test]
 fn an_image_becomes_a_hologram_that_shows_it() {
     let session = image_session();
     session.warm_up().unwrap();
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let hologram = session.process(&frame(5, &scene, &metres)).unwrap();
     assert_eq!(
-        (hologram.timestamp_ns(), hologram.shape(), hologram.quality_level()),
-        (5, (H, W), 0)
+        (hologram.timestamp_ns(), hologram.size(), hologram.quality_level()),
+        (5, Size { width: W, height: H }, 0)
     );
     assert_eq!(hologram.levels().len(), 3 * H * W);
     assert_eq!(hologram.plane(2).unwrap(), &hologram.levels()[2 * H * W..]);
@@ -49,7 +50,13 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     // The square is bright and yellow in the preview; the wall is not.
     let mut rgba = vec![0; 4 * 24 * 32];
     hologram
-        .write_preview(hologram.z_at(0.3, 0.4), (24, 32), Layout::Rgba, &mut rgba, 128)
+        .write_preview(
+            hologram.z_at(0.3, 0.4),
+            Size { width: 32, height: 24 },
+            Layout::Rgba,
+            &mut rgba,
+            128,
+        )
         .unwrap();
     let pixel = |x: usize, y: usize| &rgba[4 * (y * 32 + x)..][..4];
     let (square, wall) = (pixel(9, 9), pixel(25, 20));
@@ -62,7 +69,13 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     ] {
         assert!(
             hologram
-                .write_preview(0.0, (24, 32), layout, &mut rgba[..len], row_stride)
+                .write_preview(
+                    0.0,
+                    Size { width: 32, height: 24 },
+                    layout,
+                    &mut rgba[..len],
+                    row_stride
+                )
                 .is_err()
         );
     }
@@ -75,12 +88,12 @@ fn an_image_becomes_a_hologram_that_shows_it() {
 #[test]
 fn every_depth_format_gives_the_same_hologram() {
     let session = image_session();
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let taps = [(0.3, 0.4), (0.1, 0.9), (0.5, 0.9), (0.9, 0.1)];
     let mut first: Option<Vec<f64>> = None;
     for format in DEPTH_FORMATS {
         let bytes = scene.depth_bytes(format);
-        let frame = CameraFrame::new(1, scene.colour(), depth(&bytes, format, W, H));
+        let frame = CameraFrame::new(1, scene.colour(), depth(&bytes, format, Size { width: W, height: H }));
         let hologram = session.process(&frame).unwrap();
         assert_eq!(hologram.range_m().is_some(), format.is_metric());
         let z: Vec<f64> = taps.map(|(x, y)| hologram.z_at(x, y)).to_vec();
@@ -94,7 +107,7 @@ fn every_depth_format_gives_the_same_hologram() {
 #[test]
 fn frames_are_turned_upright_colour_and_depth_together() {
     let session = image_session();
-    let scene = Scene::new(H, W, 4);
+    let scene = Scene::new(Size { width: W, height: H }, 4);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let upright = session.process(&frame(1, &scene, &metres)).unwrap();
     let turned = |values: &[u8], n: usize| -> Vec<u8> {
@@ -102,8 +115,13 @@ fn frames_are_turned_upright_colour_and_depth_together() {
         values.chunks_exact(n).rev().flatten().copied().collect()
     };
     let (rgba, depth_bytes) = (turned(&scene.rgba, 4), turned(&metres, 4));
-    let colour = ColourImage::new(ColourFormat::Rgba, W, H, &[Plane::new(&rgba, 4 * W, 4)]).unwrap();
-    let depth = depth(&depth_bytes, DepthFormat::MetresF32, W, H);
+    let colour = ColourImage::new(
+        ColourFormat::Rgba,
+        Size { width: W, height: H },
+        &[Plane::new(&rgba, 4 * W, 4)],
+    )
+    .unwrap();
+    let depth = depth(&depth_bytes, DepthFormat::MetresF32, Size { width: W, height: H });
     let mut half = CameraFrame::new(2, colour, depth);
     half.orientation = Orientation {
         rotation: Rotation::Half,
@@ -115,7 +133,7 @@ fn frames_are_turned_upright_colour_and_depth_together() {
 #[test]
 fn cameras_apart_are_aligned() {
     let session = image_session();
-    let scene = Scene::new(H, W, 20);
+    let scene = Scene::new(Size { width: W, height: H }, 20);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let camera = Intrinsics {
         fx: 60.0,
@@ -137,12 +155,12 @@ fn cameras_apart_are_aligned() {
 
 #[test]
 fn a_display_of_ten_bits_gets_words() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let eight = image_session().process(&frame(1, &scene, &metres)).unwrap();
     let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 2\nbits = 10").unwrap();
     let target = Target::from(display);
-    let method = options(W, H).quality_levels[0].method.clone();
+    let method = options(Size { width: W, height: H }).quality_levels[0].method.clone();
     let mut options = SessionOptions::new(target.clone(), method);
     let session = ImageSession::new(options.clone()).unwrap();
     let ten = session.process(&frame(1, &scene, &metres)).unwrap();
@@ -154,7 +172,11 @@ fn a_display_of_ten_bits_gets_words() {
         let apart = (i32::from(*word) - 4 * i32::from(*level)).rem_euclid(1024);
         assert!(apart <= 3 || apart >= 1021, "{word} {level}");
     }
-    let output = Output::new(&target, (H, W), Placement::centred(Layout::Grey16));
+    let output = Output::new(
+        &target,
+        Size { width: W, height: H },
+        Placement::centred(Layout::Grey16),
+    );
     let mut bytes = vec![0; 2 * W * H];
     output
         .unwrap()
@@ -176,7 +198,7 @@ struct Trial<'a> {
 impl<'a> Trial<'a> {
     fn new(scene: &'a Scene, metres: &'a [u8]) -> Self {
         let mut trial = Trial {
-            session: VideoSession::new(options(W, H)).unwrap(),
+            session: VideoSession::new(options(Size { width: W, height: H })).unwrap(),
             scene,
             metres,
             timestamp: 0,
@@ -209,10 +231,10 @@ impl<'a> Trial<'a> {
 
 #[test]
 fn bad_colour_is_named_and_harms_nothing() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let mut trial = Trial::new(&scene, &metres);
-    let depth = depth(&metres, DepthFormat::MetresF32, W, H);
+    let depth = depth(&metres, DepthFormat::MetresF32, Size { width: W, height: H });
     let short = "12288 bytes are too few";
     for (name, (w, h), (row, pixel), word) in [
         ("a row too few", (W, H + 1), (4 * W, 4), short),
@@ -222,7 +244,7 @@ fn bad_colour_is_named_and_harms_nothing() {
         ("8K", (7680, 4320), (4 * W, 4), "too large"),
     ] {
         let plane = Plane::new(&scene.rgba, row, pixel);
-        let colour = ColourImage::new(ColourFormat::Rgba, w, h, &[plane]);
+        let colour = ColourImage::new(ColourFormat::Rgba, Size { width: w, height: h }, &[plane]);
         let at = trial.next();
         trial.refuses(name, word, colour.map(|c| CameraFrame::new(at, c, depth)));
     }
@@ -230,11 +252,11 @@ fn bad_colour_is_named_and_harms_nothing() {
 
 #[test]
 fn bad_depth_is_named_and_harms_nothing() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let mut trial = Trial::new(&scene, &metres);
-    let whole = depth(&metres, DepthFormat::MetresF32, W, H);
-    let metres_of = |bytes, h| Ok(depth(bytes, DepthFormat::MetresF32, W, h));
+    let whole = depth(&metres, DepthFormat::MetresF32, Size { width: W, height: H });
+    let metres_of = |bytes, h| Ok(depth(bytes, DepthFormat::MetresF32, Size { width: W, height: h }));
     let nan: Vec<u8> = f32::NAN.to_le_bytes().repeat(W * H);
     let zero = vec![0; 4 * W * H];
     let unsure = vec![10; W * H];
@@ -244,12 +266,19 @@ fn bad_depth_is_named_and_harms_nothing() {
         ("half", metres_of(&zero, H / 2), "aspect ratios differ"),
         (
             "none sure",
-            with_confidence(whole, &unsure, W, H),
+            with_confidence(whole, &unsure, Size { width: W, height: H }),
             "confidence 0.25 or more",
         ),
         (
             "confidence of another size",
-            with_confidence(whole, &unsure, W / 2, H),
+            with_confidence(
+                whole,
+                &unsure,
+                Size {
+                    width: W / 2,
+                    height: H,
+                },
+            ),
             "confidence is 32×48",
         ),
     ] {
@@ -262,14 +291,14 @@ fn bad_depth_is_named_and_harms_nothing() {
 /// Depth that says little of the scene gives a hologram all the same.
 #[test]
 fn unusual_depth_gives_a_hologram() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let black = Scene {
         rgba: [0, 0, 0, 255].repeat(W * H),
-        ..Scene::new(H, W, 10)
+        ..Scene::new(Size { width: W, height: H }, 10)
     };
     let process = |colour: &Scene, metres: &[f32], (width, height): (usize, usize)| {
         let bytes: Vec<u8> = metres.iter().flat_map(|m| m.to_le_bytes()).collect();
-        let depth = depth(&bytes, DepthFormat::MetresF32, width, height);
+        let depth = depth(&bytes, DepthFormat::MetresF32, Size { width, height });
         let frame = CameraFrame::new(1, colour.colour(), depth);
         image_session().process(&frame).unwrap()
     };
@@ -293,28 +322,35 @@ fn unusual_depth_gives_a_hologram() {
     assert_eq!(holes.levels(), bad.levels());
     assert!((bad.valid_depth() - 2.0 / 3.0).abs() < 1e-3 && lies_near(&bad, 0.3));
     // Twice the colour's size.
-    let large = Scene::new(2 * H, 2 * W, 20);
+    let large = Scene::new(
+        Size {
+            width: 2 * W,
+            height: 2 * H,
+        },
+        20,
+    );
     let large = process(&scene, &large.metres, (2 * W, 2 * H));
     assert!(lies_near(&large, 0.3) && !lies_near(&large, 0.6));
     // No colour to find edges in, and none to show.
     let dark = process(&black, &scene.metres, (W, H));
     assert!(lies_near(&dark, 0.3) && !lies_near(&dark, 0.6));
     let mut rgba = vec![255; 4 * W * H];
-    dark.write_preview(0.0, (H, W), Layout::Rgba, &mut rgba, 4 * W).unwrap();
+    dark.write_preview(0.0, Size { width: W, height: H }, Layout::Rgba, &mut rgba, 4 * W)
+        .unwrap();
     assert!(rgba.chunks_exact(4).all(|pixel| pixel[..3].iter().all(|v| *v < 8)));
     // A shift of 24 pixels, where 6 are searched, is not undone.
-    let apart = process(&scene, &Scene::new(H, W, 34).metres, (W, H));
+    let apart = process(&scene, &Scene::new(Size { width: W, height: H }, 34).metres, (W, H));
     assert!(!lies_near(&apart, 0.2) && lies_near(&apart, 0.62));
 }
 
 #[test]
 fn bad_alignment_is_named_and_harms_nothing() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let mut trial = Trial::new(&scene, &metres);
     let flat = vec![0; W * H];
-    let flat = depth(&flat, DepthFormat::NormalizedU8, W, H);
-    let whole = depth(&metres, DepthFormat::MetresF32, W, H);
+    let flat = depth(&flat, DepthFormat::NormalizedU8, Size { width: W, height: H });
+    let whole = depth(&metres, DepthFormat::MetresF32, Size { width: W, height: H });
     for (name, fx, depth, word) in [
         ("no focal length", f64::NAN, whole, "intrinsics of colour"),
         ("depth without metres", 60.0, flat, "has no metres"),
@@ -333,7 +369,7 @@ fn bad_alignment_is_named_and_harms_nothing() {
 
 #[test]
 fn late_frames_are_named_and_counted() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let mut trial = Trial::new(&scene, &metres);
     let late = "timestamps must rise";
@@ -355,7 +391,7 @@ fn late_frames_are_named_and_counted() {
 
 /// Returns the last accepted timestamp, from the refusal of an old one.
 fn timestamp_of(session: &VideoSession) -> u64 {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     match session.process(&frame(0, &scene, &metres)) {
         Err(Error::Timestamp { last_ns, .. }) => last_ns,
@@ -367,9 +403,9 @@ fn timestamp_of(session: &VideoSession) -> u64 {
 #[test]
 fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
     let (height, width) = (480, 640);
-    let scene = Scene::new(height, width, 10);
+    let scene = Scene::new(Size { width, height }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    let session = VideoSession::new(options(width, height)).unwrap();
+    let session = VideoSession::new(options(Size { width, height })).unwrap();
     let first = session.process(&frame(1, &scene, &metres)).unwrap();
     // Repeats until the call hits a frame that is being computed.
     let met = |end: &(dyn Fn() + Sync)| {
@@ -402,7 +438,7 @@ fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
 
 #[test]
 fn pause_and_close_are_kept_to() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = |t| frame(t, &scene, &metres);
     let image = image_session();
@@ -416,7 +452,7 @@ fn pause_and_close_are_kept_to() {
     image.close();
     assert!(image.process(&frame(1)).unwrap_err().to_string().contains("closed"));
     assert_eq!(a.levels().len(), 3 * W * H);
-    let live = LiveSession::new(options(W, H), |_| {}).unwrap();
+    let live = LiveSession::new(options(Size { width: W, height: H }), |_| {}).unwrap();
     live.close();
     assert!(live.submit(&frame(1)).unwrap_err().to_string().contains("closed"));
     live.close();
@@ -425,16 +461,22 @@ fn pause_and_close_are_kept_to() {
 /// A reset discards the past even if the first frame after it fails.
 #[test]
 fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let far = Scene {
         metres: scene.metres.iter().map(|m| 0.5 * m + 6.0).collect(),
-        ..Scene::new(H, W, 10)
+        ..Scene::new(Size { width: W, height: H }, 10)
     };
     let far_metres = far.depth_bytes(DepthFormat::MetresF32);
     // Colour and depth do not match.
-    let odd = |t| CameraFrame::new(t, scene.colour(), depth(&metres, DepthFormat::MetresF32, H, W));
-    let new = || VideoSession::new(options(W, H)).unwrap();
+    let odd = |t| {
+        CameraFrame::new(
+            t,
+            scene.colour(),
+            depth(&metres, DepthFormat::MetresF32, Size { width: H, height: W }),
+        )
+    };
+    let new = || VideoSession::new(options(Size { width: W, height: H })).unwrap();
     let alone = new().process(&frame(30, &far, &far_metres)).unwrap();
     let session = new();
     session.process(&frame(10, &scene, &metres)).unwrap();
@@ -448,9 +490,9 @@ fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
 /// A replayed frame passes the same checks as a processed one.
 #[test]
 fn a_replay_is_refused_where_a_frame_is() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    let session = VideoSession::new(options(W, H)).unwrap();
+    let session = VideoSession::new(options(Size { width: W, height: H })).unwrap();
     for scale in [f32::NAN, f32::INFINITY, 0.0, -1.0] {
         let refused = session.replay(&frame(1, &scene, &metres), scale);
         let message = refused.unwrap_err().to_string();
@@ -464,8 +506,18 @@ fn a_replay_is_refused_where_a_frame_is() {
     let s = session.statistics();
     assert_eq!((s.submitted, s.processed, s.dropped.paused), (2, 1, 1));
     // A reset cancels it, as it cancels a frame.
-    let session = VideoSession::new(options(640, 480)).unwrap();
-    let large = Scene::new(480, 640, 10);
+    let session = VideoSession::new(options(Size {
+        width: 640,
+        height: 480,
+    }))
+    .unwrap();
+    let large = Scene::new(
+        Size {
+            width: 640,
+            height: 480,
+        },
+        10,
+    );
     let metres = large.depth_bytes(DepthFormat::MetresF32);
     let replaying = std::sync::atomic::AtomicBool::new(true);
     let why = std::thread::scope(|scope| {
@@ -512,12 +564,12 @@ fn burst(events: &mpsc::Receiver<Event>, last: u64) -> (u64, u64, u64) {
 
 #[test]
 fn a_live_session_answers_or_drops_every_frame() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let nan: Vec<u8> = f32::NAN.to_le_bytes().repeat(W * H);
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
-    let session = LiveSession::new(options(W, H), listener).unwrap();
+    let session = LiveSession::new(options(Size { width: W, height: H }), listener).unwrap();
     // If submitted one at a time, every frame is answered.
     for timestamp in 1..=5 {
         assert_eq!(session.submit(&frame(timestamp, &scene, &metres)).unwrap(), None);
@@ -527,7 +579,11 @@ fn a_live_session_answers_or_drops_every_frame() {
         }
     }
     // A frame without depth fails, and the next one works.
-    let blind = CameraFrame::new(6, scene.colour(), depth(&nan, DepthFormat::MetresF32, W, H));
+    let blind = CameraFrame::new(
+        6,
+        scene.colour(),
+        depth(&nan, DepthFormat::MetresF32, Size { width: W, height: H }),
+    );
     session.submit(&blind).unwrap();
     match events.recv().unwrap() {
         Event::Failed { timestamp_ns: 6, error } => assert!(error.to_string().contains("no usable")),
@@ -577,7 +633,7 @@ fn a_live_session_answers_or_drops_every_frame() {
 
 #[test]
 fn a_listener_may_panic_and_may_close() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let (sender, events) = mpsc::channel();
     let session = std::sync::Arc::new(std::sync::OnceLock::<LiveSession>::new());
@@ -595,7 +651,7 @@ fn a_listener_may_panic_and_may_close() {
             }
         }
     };
-    let live = LiveSession::new(options(W, H), listener).unwrap();
+    let live = LiveSession::new(options(Size { width: W, height: H }), listener).unwrap();
     let live = session.get_or_init(|| live);
     live.submit(&frame(1, &scene, &metres)).unwrap();
     assert_eq!(events.recv().unwrap(), 1);
@@ -617,7 +673,7 @@ impl Drop for Bomb {
 
 #[test]
 fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let (sender, events) = mpsc::channel();
     let listener = move |event| {
@@ -625,7 +681,7 @@ fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
         // This avoids the hook's message on stderr.
         std::panic::resume_unwind(Box::new(Bomb));
     };
-    let session = LiveSession::new(options(W, H), listener).unwrap();
+    let session = LiveSession::new(options(Size { width: W, height: H }), listener).unwrap();
     for timestamp in 1..=3 {
         session.submit(&frame(timestamp, &scene, &metres)).unwrap();
         let told = events.recv_timeout(std::time::Duration::from_secs(60)).unwrap();
@@ -639,7 +695,7 @@ fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
 /// Closing on the listener's thread does not wait, and the end is still reported after every drop.
 #[test]
 fn a_listener_that_closes_its_session_hears_the_end_last() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let (sender, events) = mpsc::channel();
     let session = std::sync::Arc::new(std::sync::OnceLock::<LiveSession>::new());
@@ -654,7 +710,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
             sender.send(event).unwrap();
         }
     };
-    let live = LiveSession::new(options(W, H), listener).unwrap();
+    let live = LiveSession::new(options(Size { width: W, height: H }), listener).unwrap();
     let live = session.get_or_init(|| live);
     live.submit(&frame(1, &scene, &metres)).unwrap();
     // Wait until the first frame is a hologram; only then can the others be dropped.
@@ -676,7 +732,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
 
 #[test]
 fn closing_while_a_frame_is_processed_leaves_none_pending() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     for _ in 0..20 {
         let session = image_session();
@@ -702,12 +758,21 @@ fn closing_while_a_frame_is_processed_leaves_none_pending() {
 
 #[test]
 fn a_preview_beyond_any_screen_is_refused_before_it_is_planned() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let hologram = image_session().process(&frame(1, &scene, &metres)).unwrap();
     let mut rgba = vec![0; 4 << 15];
     let refused = hologram
-        .write_preview(0.0, (1, 1 << 15), Layout::Rgba, &mut rgba, 1 << 17)
+        .write_preview(
+            0.0,
+            Size {
+                width: 1 << 15,
+                height: 1,
+            },
+            Layout::Rgba,
+            &mut rgba,
+            1 << 17,
+        )
         .unwrap_err()
         .to_string();
     assert!(refused.contains("16384 pixels a side"), "{refused}");
@@ -715,7 +780,7 @@ fn a_preview_beyond_any_screen_is_refused_before_it_is_planned() {
 
 #[test]
 fn a_whole_view_is_what_the_levels_become_behind_the_aperture() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     for (offset_mm, bits) in [(0, 8), (3, 5), (1, 10)] {
         let text = format!("width = {W}\nheight = {H}\noffset_mm = {offset_mm}\nbits = {bits}");
@@ -731,7 +796,7 @@ fn a_whole_view_is_what_the_levels_become_behind_the_aperture() {
         };
         let opening = Opening::centred(display.aperture_radius());
         for z_m in [0.0, 1.5e-3, -2e-3] {
-            let plan = Refocus::new(H, W, &display, &[z_m], Some(opening)).unwrap();
+            let plan = Refocus::new(Size { width: W, height: H }, &display, &[z_m], Some(opening)).unwrap();
             let wanted = plan.focal_stack(&shown, &[z_m]).unwrap().remove(0);
             let (seen, field) = (hologram.refocus(z_m).unwrap(), hologram.field(z_m).unwrap());
             assert_eq!((seen.len(), field.len()), (3 * H * W, 3 * H * W));
@@ -748,13 +813,16 @@ fn a_whole_view_is_what_the_levels_become_behind_the_aperture() {
 
 #[test]
 fn a_whole_view_passes_the_optics_that_are_corrected() {
-    let scene = Scene::new(H, W, 10);
+    let scene = Scene::new(Size { width: W, height: H }, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let correction = Aberration::new([[0.6, 0.2, -0.1, 0.1, 0.05]; 3]).unwrap();
     let [plain, corrected] = [None, Some(correction)].map(|correction| {
         let target = Target {
             correction,
-            ..Display::default().with_size(H, W).unwrap().into()
+            ..Display::default()
+                .with_size(Size { width: W, height: H })
+                .unwrap()
+                .into()
         };
         let method = Method::Sweep(Sweep::for_display(&target.display));
         let session = ImageSession::new(SessionOptions::new(target, method)).unwrap();
@@ -770,7 +838,7 @@ fn a_whole_view_passes_the_optics_that_are_corrected() {
 #[test]
 fn options_that_cannot_be_meant_are_named() {
     let refuse = |change: &dyn Fn(&mut SessionOptions), word: &str| {
-        let mut options = options(W, H);
+        let mut options = options(Size { width: W, height: H });
         change(&mut options);
         let refused = ImageSession::new(options).map(|_| ());
         let message = refused.unwrap_err().to_string();
@@ -782,7 +850,7 @@ fn options_that_cannot_be_meant_are_named() {
     };
     refuse(&many, "17 quality levels are too many; 1 to 16 are right");
     refuse(&|o| o.quality = Quality::Fixed(1), "no quality level 1");
-    refuse(&|o| o.quality_levels[0].width = W + 1, "quality level 0 is 65×48");
+    refuse(&|o| o.quality_levels[0].size.width = W + 1, "quality level 0 is 65×48");
     refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");
     refuse(
         &|o| o.threads = std::num::NonZeroUsize::new(70_000),

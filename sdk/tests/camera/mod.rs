@@ -1,6 +1,7 @@
 //! A camera for tests, with frames of a synthetic scene in every format, with strides and gaps.
 #![allow(dead_code)]
 
+use phasefront::Size;
 use phasefront::input::{
     CameraFrame, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Plane, YuvEncoding, YuvMatrix,
 };
@@ -43,9 +44,9 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Fills a plane with random bytes: (`height`, `width`) pixels of `pixel` bytes, `gap` bytes between pixels and
+    /// Fills a plane with random bytes: an image of that size, pixels of `pixel` bytes, `gap` bytes between pixels and
     /// after rows, and no byte after the last pixel.
-    pub(crate) fn random(random: &mut ChaCha8Rng, (height, width): (usize, usize), pixel: usize, gap: usize) -> Self {
+    pub(crate) fn random(random: &mut ChaCha8Rng, Size { width, height }: Size, pixel: usize, gap: usize) -> Self {
         let pixel_stride = pixel + gap;
         let row_stride = width * pixel_stride + gap;
         let length = (height - 1) * row_stride + (width - 1) * pixel_stride + pixel;
@@ -64,32 +65,35 @@ impl Memory {
 /// An image of noise.
 pub(crate) struct Noise {
     pub(crate) format: ColourFormat,
-    pub(crate) shape: (usize, usize),
+    pub(crate) size: Size,
     pub(crate) planes: Vec<Memory>,
 }
 
 impl Noise {
-    pub(crate) fn new(seed: u64, format: ColourFormat, (height, width): (usize, usize), gap: usize) -> Self {
+    pub(crate) fn new(seed: u64, format: ColourFormat, size: Size, gap: usize) -> Self {
         let random = &mut ChaCha8Rng::seed_from_u64(seed);
-        let half = (height.div_ceil(2), width.div_ceil(2));
-        let planes: &[((usize, usize), usize)] = match format {
-            ColourFormat::Rgb => &[((height, width), 3)],
-            ColourFormat::Nv12(_) => &[((height, width), 1), (half, 2)],
-            ColourFormat::Yuv420(_) => &[((height, width), 1), (half, 1), (half, 1)],
-            _ => &[((height, width), 4)],
+        let half = Size {
+            width: size.width.div_ceil(2),
+            height: size.height.div_ceil(2),
+        };
+        let planes: &[(Size, usize)] = match format {
+            ColourFormat::Rgb => &[(size, 3)],
+            ColourFormat::Nv12(_) => &[(size, 1), (half, 2)],
+            ColourFormat::Yuv420(_) => &[(size, 1), (half, 1), (half, 1)],
+            _ => &[(size, 4)],
         };
         Noise {
             format,
-            shape: (height, width),
+            size,
             planes: (planes.iter())
-                .map(|(shape, pixel)| Memory::random(random, *shape, *pixel, gap))
+                .map(|(size, pixel)| Memory::random(random, *size, *pixel, gap))
                 .collect(),
         }
     }
 
     pub(crate) fn image(&self) -> Result<ColourImage<'_>> {
         let planes: Vec<_> = self.planes.iter().map(Memory::plane).collect();
-        ColourImage::new(self.format, self.shape.1, self.shape.0, &planes)
+        ColourImage::new(self.format, self.size, &planes)
     }
 }
 
@@ -103,7 +107,8 @@ pub(crate) struct Scene {
 
 impl Scene {
     /// Creates the scene with the square starting `at` pixels from the left.
-    pub(crate) fn new(height: usize, width: usize, at: usize) -> Self {
+    pub(crate) fn new(size: Size, at: usize) -> Self {
+        let Size { width, height } = size;
         let square = |x: usize, y: usize| (at..at + width / 4).contains(&x) && (height / 4..height / 2).contains(&y);
         let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         Scene {
@@ -132,7 +137,15 @@ impl Scene {
 
     pub(crate) fn colour(&self) -> ColourImage<'_> {
         let plane = Plane::new(&self.rgba, 4 * self.width, 4);
-        ColourImage::new(ColourFormat::Rgba, self.width, self.height, &[plane]).expect("a whole image")
+        ColourImage::new(
+            ColourFormat::Rgba,
+            Size {
+                width: self.width,
+                height: self.height,
+            },
+            &[plane],
+        )
+        .expect("a whole image")
     }
 
     /// Returns the bytes of the depth in `format`.
@@ -156,29 +169,34 @@ impl Scene {
 }
 
 /// Returns a depth image over `bytes`, tightly packed.
-pub(crate) fn depth(bytes: &[u8], format: DepthFormat, width: usize, height: usize) -> DepthImage<'_> {
+pub(crate) fn depth(bytes: &[u8], format: DepthFormat, size: Size) -> DepthImage<'_> {
+    let width = size.width;
     let pixel = format.pixel_bytes();
-    DepthImage::new(format, width, height, Plane::new(bytes, width * pixel, pixel)).expect("a whole image")
+    DepthImage::new(format, size, Plane::new(bytes, width * pixel, pixel)).expect("a whole image")
 }
 
 /// Returns a frame of `scene`, whose depth is in metres in the bytes `metres`.
 pub(crate) fn frame<'a>(timestamp_ns: u64, scene: &'a Scene, metres: &'a [u8]) -> CameraFrame<'a> {
-    let depth = depth(metres, DepthFormat::MetresF32, scene.width, scene.height);
+    let depth = depth(
+        metres,
+        DepthFormat::MetresF32,
+        Size {
+            width: scene.width,
+            height: scene.height,
+        },
+    );
     CameraFrame::new(timestamp_ns, scene.colour(), depth)
 }
 
 /// Returns `depth` with a confidence map of the same or another size.
-pub(crate) fn with_confidence<'a>(
-    depth: DepthImage<'a>,
-    map: &'a [u8],
-    width: usize,
-    height: usize,
-) -> Result<DepthImage<'a>> {
-    depth.with_confidence(ConfidenceFormat::U8, width, height, Plane::new(map, width, 1))
+pub(crate) fn with_confidence<'a>(depth: DepthImage<'a>, map: &'a [u8], size: Size) -> Result<DepthImage<'a>> {
+    let width = size.width;
+    depth.with_confidence(ConfidenceFormat::U8, size, Plane::new(map, width, 1))
 }
 
 /// Returns options for a small display and the bundled network.
-pub(crate) fn options(width: usize, height: usize) -> SessionOptions {
+pub(crate) fn options(size: Size) -> SessionOptions {
+    let Size { width, height } = size;
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
     let method = Method::Network(Arc::new(network.expect("a hologram network")));
     let display = Display::from_toml(&format!("width = {width}\nheight = {height}\noffset_mm = 2"));

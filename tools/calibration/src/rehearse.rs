@@ -16,6 +16,7 @@ use crate::optics::spot::{self, MIDDLE, Search, TRIALS};
 use crate::simulated_display::SimulatedDisplay;
 use ndarray::{Array2, Array3, Axis, s, stack};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::target::{Aberration, Response};
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use phasefront_core::display::levels::LevelsMut;
@@ -99,9 +100,9 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
         rehearsal,
         folder,
         pattern: match rehearsal.learn[..] {
-            [] => Pattern::new(display.height(), display.width())?,
+            [] => Pattern::new(display.size())?,
             // Crosstalk brightens the marks, and takes more phase to make them dark.
-            _ => Pattern::new(display.height(), display.width())?.with_dark(FAULTY_DARK),
+            _ => Pattern::new(display.size())?.with_dark(FAULTY_DARK),
         },
         simulated: match rehearsal.learn[..] {
             [] => SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
@@ -192,7 +193,7 @@ impl Stage<'_> {
     /// Returns the number of photographs and rows before the search for aberrations, and in total.
     fn work(&self) -> [usize; 2] {
         let colours = self.colours().len();
-        let before = colours * (PATTERNS + self.rehearsal.display.height());
+        let before = colours * (PATTERNS + self.rehearsal.display.size().height);
         [before, before + colours * spot::ROUNDS * TRIALS]
     }
 
@@ -233,7 +234,7 @@ impl Stage<'_> {
     /// Measures the laser's amplitude from one photograph of a diffuser per colour.
     fn laser_map(&self) -> Result<Array3<f32>> {
         let display = &self.rehearsal.display;
-        let shape = (display.height(), display.width());
+        let size = display.size();
         let frame = self.pattern.frame(0);
         let mut maps = Vec::new();
         for colour in 0..self.colours().len() {
@@ -243,7 +244,7 @@ impl Stage<'_> {
             if let Some(captures) = self.captures(colour) {
                 photo.write(&captures.join("diffuser.png"))?;
             }
-            maps.push(laser::mixture(&laser::map(&photo, &registration, shape)?, 1)?.0);
+            maps.push(laser::mixture(&laser::map(&photo, &registration, size)?, 1)?.0);
         }
         let views: Vec<_> = maps.iter().map(|map| map.view()).collect();
         let map = stack(Axis(0), &views).map_err(|e| Error::Input(e.to_string()))?;
@@ -425,7 +426,7 @@ fn write_display(path: &Path, display: &Display, more: &str) -> Result<()> {
 
 /// Computes the RMS phase error of `response` over all reachable phases, according to the true curves.
 pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> f64 {
-    let (h, w) = (simulated.display().height(), simulated.display().width());
+    let Size { width: w, height: h } = simulated.display().size();
     let (mut square, mut count) = (0.0, 0.0);
     for y in 0..h {
         for x in 0..w {
@@ -447,7 +448,7 @@ pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: us
 
 /// Returns the levels, (H, W), of a double phase of `half` and −`half`.
 fn checkerboard(simulated: &SimulatedDisplay, response: &Response, colour: usize, half: f32) -> Array2<u8> {
-    let (h, w) = (simulated.display().height(), simulated.display().width());
+    let Size { width: w, height: h } = simulated.display().size();
     Array2::from_shape_fn((h, w), |(y, x)| {
         let phase = if (x + y) % 2 == 0 {
             half
@@ -500,13 +501,13 @@ fn black_pictures(
 /// Returns the variation of the light of a flat half grey over the frame, away from the border: its standard deviation
 /// divided by its mean.
 fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Result<f64> {
-    let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
+    let size @ Size { width: w, height: h } = simulated.display().size();
     // Where the laser is weakest, the modulator must be able to compensate.
     let options = EncoderOptions {
         brightness: Brightness::Fixed(1.0),
         ..Encoding::DoublePhase.into()
     };
-    let plan = DisplayPlan::new(shape, target, &options)?;
+    let plan = DisplayPlan::new(size, target, &options)?;
     let colours = target.display.colours();
     let mut field = Array3::from_elem((colours, h, w), Complex32::new(0.4, 0.0));
     let mut levels = Array3::zeros((colours, h, w));
@@ -527,7 +528,7 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
 fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) -> Result<()> {
     let (_, rows, columns) = map.dim();
     let names = colours(simulated.display());
-    let (h, w) = (simulated.display().height(), simulated.display().width());
+    let Size { width: w, height: h } = simulated.display().size();
     let maps: Vec<Map> = (0..names.len())
         .flat_map(|colour| {
             let found = map.index_axis(Axis(0), colour).to_owned();

@@ -15,6 +15,7 @@ use faults::{Faults, PARTS};
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront::target::{Aberration, Response};
 use phasefront_core::display::response::per_pixel;
 use phasefront_core::display::response::per_pixel::PerPixel;
@@ -43,8 +44,8 @@ pub struct Curves {
 /// A camera and its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// The size of a photograph, (H, W).
-    pub shape: (usize, usize),
+    /// The size of a photograph.
+    pub size: Size,
     /// The positions of the modulator's corners in the photograph, in pixels: top left, top right, bottom left, bottom
     /// right.
     pub corners: [[f64; 2]; 4],
@@ -95,7 +96,7 @@ impl SimulatedDisplay {
                 ]
             })
             .collect();
-        let (w, h) = (display.width() as f64 * zoom, display.height() as f64 * zoom);
+        let (w, h) = (display.size().width as f64 * zoom, display.size().height as f64 * zoom);
         let border = 0.07 * w;
         let size = |n: f64| (n + 2.0 * border).round();
         if !(zoom >= 1.0 && size(w) * size(h) < f64::from(1u32 << 30)) {
@@ -112,7 +113,10 @@ impl SimulatedDisplay {
         };
         let camera = Camera {
             corners: [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)],
-            shape: (size(h) as usize, size(w) as usize),
+            size: Size {
+                width: size(w) as usize,
+                height: size(h) as usize,
+            },
             exposure: 0.55,
             full_well: 20_000.0,
             read_noise: 12.0,
@@ -184,8 +188,8 @@ impl SimulatedDisplay {
 
     /// Returns the true phase of level `level` at pixel (`x`, `y`) relative to level 0, in radians.
     pub fn phase(&self, colour: usize, y: usize, x: usize, level: f64) -> f64 {
-        let u = (x as f64 + 0.5) / self.display.width() as f64;
-        let v = (y as f64 + 0.5) / self.display.height() as f64;
+        let u = (x as f64 + 0.5) / self.display.size().width as f64;
+        let v = (y as f64 + 0.5) / self.display.size().height as f64;
         let (mut uneven, mut bent) = (0.0, 0.0);
         for [fx, fy, start, height, other] in &self.waves {
             let wave = (TAU * (fx * u + fy * v) + start).sin();
@@ -205,10 +209,10 @@ impl SimulatedDisplay {
     /// # Errors
     /// Never returns an error for a display made by [`Self::new`].
     pub fn response(&self) -> Result<Response> {
-        let (height, width) = (self.display.height(), self.display.width());
+        let Size { width, height } = self.display.size();
         let spacing = height.max(width).div_ceil(120);
         let intervals = per_pixel::MAX_INTERVALS;
-        let (rows, columns) = per_pixel::nodes(height, width, spacing);
+        let (rows, columns) = per_pixel::nodes(self.display.size(), spacing);
         let (mut levels, mut turns) = (Vec::new(), Vec::new());
         for node in 0..self.display.colours() * rows * columns {
             let (colour, i, j) = (node / (rows * columns), node / columns % rows, node % columns);
@@ -222,18 +226,18 @@ impl SimulatedDisplay {
                 end
             });
         }
-        let table = PerPixel::new(height, width, spacing, intervals, &levels, &turns)?;
+        let table = PerPixel::new(self.display.size(), spacing, intervals, &levels, &turns)?;
         Ok(Response::PerPixel(table.into()))
     }
 
     /// Returns the laser's amplitude at pixel (`x`, `y`), which is 1 at its brightest.
     pub fn laser(&self, colour: usize, y: f64, x: f64) -> f64 {
-        let w = self.display.width() as f64;
+        let w = self.display.size().width as f64;
         let [cx, cy, radius] = self.beam;
         // Three beams are never perfectly coaxial.
         let cx = cx + 0.03 * (colour as f64 - (self.display.colours() / 2) as f64);
         let dx = (x + 0.5) / w - cx;
-        let dy = (y + 0.5 - cy * self.display.height() as f64) / w;
+        let dy = (y + 0.5 - cy * self.display.size().height as f64) / w;
         (-(dx * dx + dy * dy) / (radius * radius)).exp()
     }
 
@@ -244,7 +248,7 @@ impl SimulatedDisplay {
     /// # Errors
     /// Returns an error if the levels have another shape or if z is too far to propagate to.
     pub fn intensity(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64) -> Result<Array2<f32>> {
-        let (height, width) = (self.display.height(), self.display.width());
+        let Size { width, height } = self.display.size();
         if levels.dim() != (height, width) {
             return Err(Error::Input(format!(
                 "levels of {}×{}; the display has {width}×{height}",
@@ -255,8 +259,12 @@ impl SimulatedDisplay {
         let (pitch, wavelength) = (self.display.pitch_m(), self.display.wavelengths_m()[colour]);
         let distance = z_m - self.display.offset_m();
         let more = (self.aberration.reach_m(pitch) / pitch).ceil() as usize + 8;
-        let padded = asm::padded_shape(height + more, width + more, pitch, wavelength, distance, Padding::Reach)?;
-        let (ph, pw) = padded;
+        let wider = Size {
+            width: width + more,
+            height: height + more,
+        };
+        let padded = asm::padded_size(wider, pitch, wavelength, distance, Padding::Reach)?;
+        let Size { width: pw, height: ph } = padded;
         let transfer = Transfer::corrected(padded, pitch, wavelength, distance, |mu, nu| {
             -self.aberration.phase(colour, mu, nu, pitch)
         });
@@ -281,7 +289,16 @@ impl SimulatedDisplay {
                 to[wide(ky, ph)] = *value;
             }
         }
-        let fine = Fft2::new(2 * height, 2 * width, 2 * ph, 2 * pw);
+        let fine = Fft2::new(
+            Size {
+                width: 2 * width,
+                height: 2 * height,
+            },
+            Size {
+                width: 2 * pw,
+                height: 2 * ph,
+            },
+        );
         let mut scratch = fine.scratch();
         fine.columns_inverse(&mut columns, |_, _| {}, &mut scratch.work);
         fine.rows_inverse(&columns, &mut scratch.rows, &mut scratch.work);
@@ -296,7 +313,7 @@ impl SimulatedDisplay {
         &self,
         levels: ArrayView2<'_, u8>,
         colour: usize,
-        (ph, pw): (usize, usize),
+        Size { width: pw, height: ph }: Size,
         filter: impl Fn(usize, &mut [Complex32]) + Sync,
     ) -> Vec<Complex32> {
         let (height, width) = levels.dim();
@@ -309,15 +326,24 @@ impl SimulatedDisplay {
                     *value = Complex32::from_polar(light(y, x) as f32, phase(y, x) as f32);
                 }
             });
-            let fft = Fft2::new(height, width, ph, pw);
+            let fft = Fft2::new(Size { width, height }, Size { width: pw, height: ph });
             let mut scratch = fft.scratch();
             fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
             let then = |kx: usize, column: &mut [Complex32], _: &mut [Complex32]| filter(kx, column);
             fft.spectrum(&scratch.rows, &mut scratch.columns, then, &mut scratch.work);
             return scratch.columns;
         };
-        let plane = faults.field((height, width), phase, light);
-        let fft = Fft2::new(height * PARTS, width * PARTS, ph * PARTS, pw * PARTS);
+        let plane = faults.field(Size { width, height }, phase, light);
+        let fft = Fft2::new(
+            Size {
+                width: width * PARTS,
+                height: height * PARTS,
+            },
+            Size {
+                width: pw * PARTS,
+                height: ph * PARTS,
+            },
+        );
         let mut scratch = fft.scratch();
         fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
         fft.spectrum(&scratch.rows, &mut scratch.columns, |_, _, _| (), &mut scratch.work);
@@ -366,7 +392,7 @@ impl SimulatedDisplay {
     /// # Errors
     /// Never returns an error for a display made by [`Self::new`].
     pub fn photograph_diffuser(&self, colour: usize, shot: u64) -> Result<Photograph> {
-        let (height, width) = (self.display.height(), self.display.width());
+        let Size { width, height } = self.display.size();
         let mut dice = Dice::new(self.seed ^ 0x4455_5354);
         let specks: Vec<_> = (0..40)
             .map(|_| (dice.range(0.0, width as f64), dice.range(0.0, height as f64)))
@@ -384,8 +410,8 @@ impl SimulatedDisplay {
     /// Converts an intensity over the modulator, `light`(x, y), in pixels from its top left corner, to a photograph.
     fn expose(&self, colour: usize, shot: u64, light: impl Fn(f64, f64) -> f64 + Sync) -> Result<Photograph> {
         let camera = &self.camera;
-        let (height, width) = camera.shape;
-        let (w, h) = (self.display.width() as f64, self.display.height() as f64);
+        let Size { width, height } = camera.size;
+        let (w, h) = (self.display.size().width as f64, self.display.size().height as f64);
         let panel = [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]];
         let back = Homography::through(camera.corners, panel)?;
         let end = f64::from((1u32 << camera.bits) - 1);
@@ -473,7 +499,7 @@ mod tests {
                 Complex32::from_polar(display.laser(1, y as f64, x as f64) as f32, phase as f32)
             })
             .collect();
-        let plan = Aperture::new(40, 48, Opening::centred(1.0)).unwrap();
+        let plan = Aperture::new(Size { width: 48, height: 40 }, Opening::centred(1.0)).unwrap();
         plan.filter(&mut plane, &mut plan.scratch());
         for y in 12..28 {
             for x in 12..36 {

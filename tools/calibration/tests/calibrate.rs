@@ -4,6 +4,7 @@
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::target::{Aberration, Response};
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use phasefront_calibration::camera::pattern::Pattern;
@@ -24,10 +25,10 @@ use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use std::f64::consts::TAU;
 
-const SIZE: (usize, usize) = (80, 144);
+const SIZE: Size = Size { width: 144, height: 80 };
 
 fn display() -> Display {
-    Display::from_toml(&format!("width = {}\nheight = {}", SIZE.1, SIZE.0)).unwrap()
+    Display::from_toml(&format!("width = {}\nheight = {}", SIZE.width, SIZE.height)).unwrap()
 }
 
 fn simulated() -> SimulatedDisplay {
@@ -35,7 +36,7 @@ fn simulated() -> SimulatedDisplay {
 }
 
 fn measured(simulated: &SimulatedDisplay, colour: usize) -> Curves {
-    measured_by(simulated, colour, Pattern::new(SIZE.0, SIZE.1).unwrap())
+    measured_by(simulated, colour, Pattern::new(SIZE).unwrap())
 }
 
 fn measured_by(simulated: &SimulatedDisplay, colour: usize, pattern: Pattern) -> Curves {
@@ -95,7 +96,7 @@ fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
             ..simulated.curves().clone()
         };
         let simulated = simulated.with_curves(short);
-        let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap().with_dark(dark);
+        let pattern = Pattern::new(SIZE).unwrap().with_dark(dark);
         let curves = measured_by(&simulated, 1, pattern);
         let ranges = curves.ranges();
         let median = f64::from(ranges[ranges.len() / 2]);
@@ -106,7 +107,7 @@ fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
         let error = phase_error(&simulated, &table, 1);
         assert!(error < 0.06, "{range}: {error}");
         // Phases out of reach get the nearer end.
-        let at = (SIZE.0 + 40) * SIZE.1 + 70;
+        let at = (SIZE.height + 40) * SIZE.width + 70;
         let turn = (1.0 + simulated.phase(1, 40, 70, 255.0) / TAU) / 2.0 * TAU;
         assert_eq!(table.level((turn - 0.1) as f32, at), 255);
         assert_eq!(table.level((turn + 0.1) as f32, at), 0);
@@ -116,7 +117,7 @@ fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
 /// Returns the problems that [`lut::measure`] reports for photographs that `change` spoils.
 fn told(change: impl Fn(usize, Photograph) -> Result<Photograph, What>) -> Vec<Problem> {
     let simulated = simulated();
-    let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
+    let pattern = Pattern::new(SIZE).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let shoot = |k: usize| {
         let levels = pattern.frame(k as u8);
@@ -131,7 +132,7 @@ fn told(change: impl Fn(usize, Photograph) -> Result<Photograph, What>) -> Vec<P
 #[test]
 fn bad_captures_are_told_one_by_one() {
     let simulated = simulated();
-    let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
+    let pattern = Pattern::new(SIZE).unwrap();
     let of = |k: u8| simulated.photograph(pattern.frame(k).view(), 1, 0.0, k.into()).unwrap();
     let problems = told(|k, photo| match k {
         3 => Err(What::Missing),
@@ -189,7 +190,7 @@ fn bad_captures_are_told_one_by_one() {
 #[ignore = "slow: 13 seconds of a core"]
 fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     let simulated = simulated();
-    let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
+    let pattern = Pattern::new(SIZE).unwrap();
     let dir = tempfile::tempdir().unwrap();
     // A speck of dust on the optics is dark in every photograph.
     let shoot = |k: usize| {
@@ -206,7 +207,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     let curves = lut::measure(&pattern, "green", &shoot, dir.path(), &|_, _| {}).unwrap();
     assert!((1..=16).contains(&curves.silent.len()), "{:?}", curves.silent);
     for (y, x) in &curves.silent {
-        assert!(y.abs_diff(SIZE.0 / 2) < 8 && x.abs_diff(SIZE.1 / 2) < 8);
+        assert!(y.abs_diff(SIZE.height / 2) < 8 && x.abs_diff(SIZE.width / 2) < 8);
     }
     let table = lut::compact(&[curves.clone(), curves.clone(), curves]).unwrap();
     let error = phase_error(&simulated, &Response::PerPixel(table.into()), 1);
@@ -246,7 +247,7 @@ fn cylinder() -> Aberration {
 
 /// Creates three boards one behind the other with soft upright, horizontal and slanted bars, six to nine pixels wide. A
 /// double phase displays them well and a cylinder blurs them, as in the test pattern of the paper's figure.
-fn boards((h, w): (usize, usize), planes: usize, in_focus: [usize; 3]) -> Ldi {
+fn boards(Size { width: w, height: h }: Size, planes: usize, in_focus: [usize; 3]) -> Ldi {
     let board = |x: usize| 3 * x / w;
     let depth = |k: usize| (k as f32 + 0.5) / planes as f32;
     let rgb = Array3::from_shape_fn((3, h, w), |(c, y, x)| {
@@ -267,9 +268,14 @@ fn boards((h, w): (usize, usize), planes: usize, in_focus: [usize; 3]) -> Ldi {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "two chains beside each other")]
 fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let display = Display::default();
-    let size @ (h, w) = (128, 192);
+    let size = Size {
+        width: 192,
+        height: 128,
+    };
+    let (h, w) = size.shape();
     const PLANES: usize = 24;
     let in_focus = [4, 12, 20];
     let ldi = boards(size, PLANES, in_focus);

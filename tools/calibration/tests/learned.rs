@@ -1,6 +1,7 @@
 //! Learns a model of a simulated display whose faults it does not know in form.
 #![allow(clippy::unwrap_used)]
 
+use phasefront::Size;
 use phasefront::{Display, Target};
 use phasefront_calibration::camera::pattern::Pattern;
 use phasefront_calibration::camera::photograph::Photograph;
@@ -45,7 +46,7 @@ fn a_learned_model_improves_what_is_displayed() {
 #[test]
 fn bad_photographs_of_holograms_are_named() {
     let (simulated, target) = faulty();
-    let pattern = Pattern::new(72, 144).unwrap();
+    let pattern = Pattern::new(Size { width: 144, height: 72 }).unwrap();
     let marks = scenes::marks(&target, 0, &pattern, 0.0).unwrap();
     let seen = simulated.photograph(marks.levels.view(), 0, 0.0, 0).unwrap();
     let mut album = Album::new(&target, 0, &seen).unwrap();

@@ -6,6 +6,7 @@ pub mod random;
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::method::network::Precision;
@@ -26,7 +27,7 @@ pub struct Case<'a> {
     /// The method that makes the hologram.
     pub method: &'a Method,
     /// The width and height in pixels.
-    pub size: (usize, usize),
+    pub size: Size,
     /// The number of threads in the pool.
     pub threads: usize,
     /// The encoding of the field into levels, at one brightness.
@@ -123,12 +124,12 @@ fn named(method: &Method) -> (&'static str, Option<&Arc<Network>>) {
 }
 
 fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row> {
-    let (width, height) = case.size;
+    let Size { width, height } = case.size;
     let (name, network) = named(case.method);
     forget_peak_memory();
     let plain = Target::from(&target.display);
     let options = full_light(case.encoder);
-    let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
+    let pipeline = Pipeline::new(case.size, case.method.clone(), &plain, &options)?;
     let Times {
         stages,
         mut totals,
@@ -191,14 +192,14 @@ struct Times {
 
 /// Times frames until `budget` is spent, at least five, after one warm-up frame.
 fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Duration) -> Result<Times> {
-    let (width, height) = case.size;
+    let Size { width, height } = case.size;
     let (name, _) = named(case.method);
     let options = full_light(case.encoder);
-    let by_table = (target.response.shape())
-        .map(|_| DisplayPlan::new((height, width), target, &options))
+    let by_table = (target.response.size())
+        .map(|_| DisplayPlan::new(case.size, target, &options))
         .transpose()?;
     let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
-    let frame = test_frame(height, width)?.for_display(&target.display);
+    let frame = test_frame(case.size)?.for_display(&target.display);
     let mut scratch = pipeline.scratch();
     let values = pipeline.colours() * height * width;
     let mut field = vec![Complex32::ZERO; values];
@@ -227,7 +228,8 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
 
 /// Makes a frame with colour everywhere and the depths of a typical scene: ground up to a wall, and balls in front. The
 /// content does not change the cost of a network. A sweep costs more the closer together the depths are.
-fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
+fn test_frame(size: Size) -> Result<RgbdFrame> {
+    let Size { width, height } = size;
     let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
     let depth = |y: usize, x: usize| {
         let (v, u) = (y as f32 / height as f32, x as f32 / height as f32);

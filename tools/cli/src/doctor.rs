@@ -3,6 +3,7 @@
 
 use ndarray::{Array2, Array3};
 use num_complex::{Complex32, Complex64};
+use phasefront::Size;
 use phasefront::{Display, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Sweep, Target};
 use phasefront_core::method::network::{Isa, reference};
 use phasefront_core::method::sweep;
@@ -137,7 +138,7 @@ impl Check {
 }
 
 /// (H, W) of the test frames: odd, and larger than a strip of any kernel.
-const SIZE: (usize, usize) = (45, 67);
+const SIZE: Size = Size { width: 67, height: 45 };
 
 /// Tests the CPU's results.
 ///
@@ -190,15 +191,15 @@ fn coming_along(precision: Precision) -> phasefront::Result<Arc<Network>> {
 
 /// Runs the network on one instruction set.
 fn run_on(network: &Network, isa: Isa, input: &[f32]) -> Result<Vec<f32>> {
-    let plan = network.plan_on(isa, SIZE.0, SIZE.1)?;
-    let mut output = vec![0.0; 6 * SIZE.0 * SIZE.1];
+    let plan = network.plan_on(isa, SIZE)?;
+    let mut output = vec![0.0; 6 * SIZE.pixels()];
     plan.run(input, &mut output, &mut plan.scratch())?;
     Ok(output)
 }
 
 /// Makes waves of several lengths around 0, as networks expect.
 fn waves() -> Vec<f32> {
-    let (height, width) = SIZE;
+    let Size { width, height } = SIZE;
     (0..4 * height * width)
         .map(|i| {
             let (plane, y, x) = (i / (height * width), i / width % height, i % width);
@@ -226,7 +227,7 @@ fn int8() -> Result<Check> {
 
 fn f32() -> Result<Check> {
     let (network, input) = (coming_along(Precision::Float32)?, waves());
-    let naive = reference::run(network.chain(), &input, SIZE.0, SIZE.1);
+    let naive = reference::run(network.chain(), &input, SIZE);
     let mut worst = 0.0f32;
     for isa in Isa::f32() {
         let output = run_on(&network, isa, &input)?;
@@ -247,7 +248,7 @@ fn apart(name: &'static str, worst: f32, most: f32) -> Check {
 }
 
 fn picture() -> Result<RgbdFrame> {
-    let (height, width) = SIZE;
+    let Size { width, height } = SIZE;
     let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
         0.5 + 0.4 * ((c + 1) as f32 * 0.11 * x as f32 + 0.17 * y as f32).sin()
     });
@@ -259,8 +260,8 @@ fn picture() -> Result<RgbdFrame> {
 fn sweep() -> Result<Check> {
     let (frame, display) = (picture()?, Display::default());
     let sweep = Sweep::of_planes(&display, 8);
-    let plan = SweepPlan::new(SIZE.0, SIZE.1, &display, sweep, 0.0)?;
-    let mut field = vec![Complex32::ZERO; 3 * SIZE.0 * SIZE.1];
+    let plan = SweepPlan::new(SIZE, &display, sweep, 0.0)?;
+    let mut field = vec![Complex32::ZERO; 3 * SIZE.pixels()];
     plan.field(&frame, &mut field, &mut plan.scratch())?;
     let naive = sweep::reference::field(&frame, &display, sweep, 0.0)?;
     let worst = field.iter().zip(&naive).map(|(a, b)| (a - b).norm()).fold(0.0, worse);
@@ -268,17 +269,17 @@ fn sweep() -> Result<Check> {
 }
 
 fn propagation() -> Result<Check> {
-    let ((height, width), display) = (SIZE, Display::default());
+    let (Size { width, height }, display) = (SIZE, Display::default());
     let (pitch, z_m, lambdas) = (display.pitch_m(), 2e-3, display.wavelengths_m());
     let frame = picture()?;
-    let plans = Propagator::for_colours(height, width, pitch, lambdas, z_m, Padding::Reach)?;
+    let plans = Propagator::for_colours(Size { width, height }, pitch, lambdas, z_m, Padding::Reach)?;
     let mut worst = 0.0f32;
     for (colour, plan) in plans.iter().enumerate() {
         let light = frame.rgb().index_axis_move(ndarray::Axis(0), colour).to_owned();
         let mut plane: Vec<Complex32> = light.iter().map(|&value| value.into()).collect();
         plan.propagate(&mut plane, &mut plan.scratch());
         let wide = light.mapv(|value| Complex64::from(f64::from(value)));
-        let naive = propagate(&wide, pitch, lambdas[colour], z_m, plan.padded_shape());
+        let naive = propagate(&wide, pitch, lambdas[colour], z_m, plan.padded_size());
         let carrier = asm::carrier(z_m, lambdas[colour]);
         let apart = plane.iter().zip(&naive).map(|(fast, naive)| {
             let naive = Complex32::new(naive.re as f32, naive.im as f32);
@@ -295,9 +296,9 @@ const SHOWN_DB: f64 = 20.0;
 /// Makes a hologram of a picture at one depth with the default pipeline, and compares the displayed image with the
 /// picture.
 fn frame() -> Result<Check> {
-    let ((height, width), target) = (SIZE, Target::from(Display::default()));
+    let (Size { width, height }, target) = (SIZE, Target::from(Display::default()));
     let rgb = picture()?.rgb().to_owned();
-    let frame = RgbdFrame::new(rgb.clone(), Array2::from_elem(SIZE, 0.5))?;
+    let frame = RgbdFrame::new(rgb.clone(), Array2::from_elem(SIZE.shape(), 0.5))?;
     let method = Method::Network(coming_along(Precision::Int8)?);
     let pipeline = Pipeline::new(SIZE, method, &target, &EncoderOptions::default())?;
     let mut levels = Array3::zeros((3, height, width));

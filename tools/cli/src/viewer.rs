@@ -115,20 +115,20 @@ impl Depth {
     /// Makes the map from the views in `frames`. At each place, it takes the sharpest view, in which colours differ
     /// most from their neighbours'.
     pub fn from_focus(frames: &[Vec<RgbImage>]) -> Self {
-        let mut size = (0, 0);
+        let mut shape = (0, 0);
         let mut slices = Vec::new();
         for views in frames {
             let sharp: Vec<Array2<f32>> = views.par_iter().map(sharpness).collect();
             let Some(first) = sharp.first() else { continue };
-            size = first.dim();
-            for place in ndarray::indices(size) {
+            shape = first.dim();
+            for place in ndarray::indices(shape) {
                 let best = (0..sharp.len()).max_by(|a, b| sharp[*a][place].total_cmp(&sharp[*b][place]));
                 slices.push(best.unwrap_or(0) as u8);
             }
         }
         Depth {
-            width: size.1,
-            height: size.0,
+            width: shape.1,
+            height: shape.0,
             slices: STANDARD.encode(slices),
             known: false,
         }
@@ -308,9 +308,10 @@ impl Scene {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use phasefront::Size;
 
-    fn noise(width: u32, height: u32) -> RgbImage {
-        RgbImage::from_fn(width, height, |x, y| {
+    fn noise(size: Size) -> RgbImage {
+        RgbImage::from_fn(size.width as u32, size.height as u32, |x, y| {
             let n = (x * 7919 + y * 104_729) ^ (x * y * 31);
             image::Rgb([n as u8, (n >> 3) as u8, (n >> 7) as u8])
         })
@@ -323,7 +324,11 @@ mod tests {
             height: 3,
             z_mm: vec![1.0, -1.0],
             frames: 1,
-            shown: pack(&[noise(4, 3), noise(4, 3)], 10_000).unwrap(),
+            shown: pack(
+                &[noise(Size { width: 4, height: 3 }), noise(Size { width: 4, height: 3 })],
+                10_000,
+            )
+            .unwrap(),
             field: Vec::new(),
             phase: None,
             depth: Depth::known(&Array2::zeros((3, 4)), |_| 1),
@@ -345,7 +350,16 @@ mod tests {
 
     #[test]
     fn pictures_keep_their_budget() {
-        let views = [noise(600, 400), noise(600, 400)];
+        let views = [
+            noise(Size {
+                width: 600,
+                height: 400,
+            }),
+            noise(Size {
+                width: 600,
+                height: 400,
+            }),
+        ];
         let large = pack(&views, 3_000_000).unwrap();
         let small = pack(&views, 60_000).unwrap();
         let size = |urls: &[String]| urls.iter().map(String::len).sum::<usize>();

@@ -3,6 +3,7 @@
 use crate::networks::Precision;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
+use phasefront::Size;
 use phasefront::{Display, Encoding, Network, Sweep};
 use phasefront_io::display::{self, DisplayFile};
 use phasefront_io::output::Holding;
@@ -212,12 +213,20 @@ impl OverwriteFlag {
 const MOST_PIXELS: usize = 1 << 26;
 
 /// Parses a width and height such as 1920x1080.
-pub fn parse_size(text: &str) -> std::result::Result<(usize, usize), String> {
-    let parsed = text
-        .split_once(['x', '×'])
-        .and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+pub fn parse_size(text: &str) -> std::result::Result<Size, String> {
+    let parsed = text.split_once(['x', '×']).and_then(|(width, height)| {
+        Some(Size {
+            width: width.parse().ok()?,
+            height: height.parse().ok()?,
+        })
+    });
     match parsed {
-        Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) && w * h <= MOST_PIXELS => Ok((w, h)),
+        Some(size)
+            if [size.width, size.height].iter().all(|side| (1..=16384).contains(side))
+                && size.pixels() <= MOST_PIXELS =>
+        {
+            Ok(size)
+        }
         _ => Err(format!(
             "a size is written WxH, as 1920x1080, each up to 16384 and {MOST_PIXELS} pixels in all"
         )),

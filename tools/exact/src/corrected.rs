@@ -18,6 +18,7 @@ use crate::sm_lbm::{Planes, Point, check_planes, crop, cross, place, plane_z_m};
 use ndarray::{Array3, Axis};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::optics::asm::{self, Padding, Transfer};
 use phasefront_core::optics::fft::{Fft2, Scratch};
 use phasefront_core::optics::zernike::Aberrations;
@@ -47,7 +48,7 @@ impl Correction {
     /// the viewer). A kernel has a factor for each frequency of the padded plane in the order of the discrete Fourier
     /// transform, zero first. A factor of 1 leaves the frequency unchanged.
     ///
-    /// The padded plane of a scene must be at least [`padded_shape`]. A kernel that moves light by more pixels than the
+    /// The padded plane of a scene must be at least [`padded_size`]. A kernel that moves light by more pixels than the
     /// light spreads over the volume needs as many pixels more.
     ///
     /// # Errors
@@ -88,13 +89,13 @@ impl Correction {
     }
 
     /// Makes a correction from a function of z, the wavelength and the frequencies µ and ν (cycles per metre, along x
-    /// and y). The function is sampled for a padded plane of `shape`, (H', W').
+    /// and y). The function is sampled for a padded plane of `size`.
     ///
     /// # Errors
     /// Returns an error if [`Self::new`] does.
     pub fn sampled(
         z_m: Vec<f64>,
-        shape: (usize, usize),
+        size: Size,
         display: &Display,
         kernel: impl Fn(f64, f64, f64, f64) -> Complex64,
     ) -> Result<Self> {
@@ -104,9 +105,9 @@ impl Correction {
         };
         let kernels = (z_m.iter())
             .map(|&z| {
-                Array3::from_shape_fn((display.colours(), shape.0, shape.1), |(c, ky, kx)| {
+                Array3::from_shape_fn((display.colours(), size.height, size.width), |(c, ky, kx)| {
                     let lambda = display.wavelengths_m()[c];
-                    let v = kernel(z, lambda, frequency(kx, shape.1), frequency(ky, shape.0));
+                    let v = kernel(z, lambda, frequency(kx, size.width), frequency(ky, size.height));
                     Complex32::new(v.re as f32, v.im as f32)
                 })
             })
@@ -114,7 +115,7 @@ impl Correction {
         Self::new(z_m, kernels)
     }
 
-    /// Makes the kernels Φ = exp(i·terms) of `aberrations` for frames of (`height`, `width`) with `planes` planes.
+    /// Makes the kernels Φ = exp(i·terms) of `aberrations` for frames of `size` with `planes` planes.
     /// Coefficients are piecewise linear over z, but the kernels are interpolated linearly between neighbours. Where
     /// coefficients change, further distances are therefore inserted between the calibrated ones until neighbours
     /// differ by at most [`BLEND`] rad, which costs at most 1 % of the light.
@@ -122,12 +123,7 @@ impl Correction {
     /// # Errors
     /// Returns an error if there are no planes or too many, or if the reach of the volume, or the distance by which the
     /// correction moves light, is too large to pad.
-    pub fn of_aberrations(
-        aberrations: &Aberrations,
-        (height, width): (usize, usize),
-        planes: usize,
-        display: &Display,
-    ) -> Result<Self> {
+    pub fn of_aberrations(aberrations: &Aberrations, size: Size, planes: usize, display: &Display) -> Result<Self> {
         check_planes(planes)?;
         let pitch_m = display.pitch_m();
         let (near, far) = (display.z_of_depth(0.0), display.z_of_depth(1.0));
@@ -153,7 +149,7 @@ impl Correction {
         let reach_m = (aberrations.calibrated().iter())
             .map(|(_, a)| a.reach_m(pitch_m))
             .fold(0.0, f64::max);
-        let shape = padded_shape_with(height, width, display, reach_m)?;
+        let padded = padded_size_with(size, display, reach_m)?;
         let frequency = |k: usize, n: usize| {
             let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
             k / (n as f64 * pitch_m)
@@ -161,8 +157,8 @@ impl Correction {
         let kernels = (z_m.iter())
             .map(|z| {
                 let aberration = aberrations.at(*z);
-                Array3::from_shape_fn((display.colours(), shape.0, shape.1), |(c, ky, kx)| {
-                    let (mu, nu) = (frequency(kx, shape.1), frequency(ky, shape.0));
+                Array3::from_shape_fn((display.colours(), padded.height, padded.width), |(c, ky, kx)| {
+                    let (mu, nu) = (frequency(kx, padded.width), frequency(ky, padded.height));
                     let phase = aberration.phase(c, mu, nu, pitch_m);
                     Complex32::new(phase.cos() as f32, phase.sin() as f32)
                 })
@@ -171,10 +167,10 @@ impl Correction {
         Self::new(z_m, kernels)
     }
 
-    /// Returns the shape of the padded plane, (H', W').
-    pub fn shape(&self) -> (usize, usize) {
+    /// Returns the size of the padded plane.
+    pub fn size(&self) -> Size {
         let (_, width, height) = self.kernels[0].dim();
-        (height, width)
+        Size { width, height }
     }
 
     /// Returns the weight of the kernel of distance `i` in Φ(z).
@@ -191,20 +187,22 @@ impl Correction {
     }
 }
 
-/// Returns the smallest padded plane, (H', W'), for scenes of (`height`, `width`), which is that of plain SM-LBM.
+/// Returns the size of the smallest padded plane for scenes of `size`, which is that of plain SM-LBM.
 ///
 /// # Errors
 /// Returns an error if the reach of the volume cannot be padded.
-pub fn padded_shape(height: usize, width: usize, display: &Display) -> Result<(usize, usize)> {
-    padded_shape_with(height, width, display, 0.0)
+pub fn padded_size(size: Size, display: &Display) -> Result<Size> {
+    padded_size_with(size, display, 0.0)
 }
 
-/// Returns [`padded_shape`] with extra pixels for light that a correction moves by up to `reach_m`.
-fn padded_shape_with(height: usize, width: usize, display: &Display, reach_m: f64) -> Result<(usize, usize)> {
+/// Returns [`padded_size`] with extra pixels for light that a correction moves by up to `reach_m`.
+fn padded_size_with(size: Size, display: &Display, reach_m: f64) -> Result<Size> {
     let more = (reach_m / display.pitch_m()).ceil() as usize;
-    Ok(asm::padded_shape(
-        height.saturating_add(more),
-        width.saturating_add(more),
+    Ok(asm::padded_size(
+        Size {
+            width: size.width.saturating_add(more),
+            height: size.height.saturating_add(more),
+        },
         display.pitch_m(),
         display.longest_wavelength_m(),
         display.volume_depth_m(),
@@ -228,8 +226,11 @@ pub fn hologram(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
     check_planes(planes)?;
-    let (height, width) = ldi.shape();
-    let shape @ (padded_height, padded_width) = correction.shape();
+    let Size { width, height } = ldi.size();
+    let size @ Size {
+        width: padded_width,
+        height: padded_height,
+    } = correction.size();
     let of = correction.kernels[0].dim().0;
     if of != display.colours() {
         return Err(Error::Input(format!(
@@ -237,10 +238,11 @@ pub fn hologram(
             display.colours()
         )));
     }
-    let (least_height, least_width) = padded_shape(height, width, display)?;
-    if padded_height < least_height || padded_width < least_width {
+    let least = padded_size(ldi.size(), display)?;
+    if padded_height < least.height || padded_width < least.width {
         return Err(Error::Input(format!(
-            "correction: kernels of {padded_width}×{padded_height}; a scene of {width}×{height} needs at least {least_width}×{least_height}"
+            "correction: kernels of {size}; a scene of {} needs at least {least}",
+            ldi.size()
         )));
     }
     let colours = display.colours();
@@ -264,14 +266,14 @@ pub fn hologram(
             correction.z_m.len()
         )));
     }
-    let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
+    let fft = Fft2::new(size, size);
     let mut scratch = fft.scratch();
     let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
     let mut sum = vec![Complex32::ZERO; padded_height * padded_width];
     let mut hologram = Array3::zeros((colours, height, width));
     let done = Cell::new(0);
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
-        let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
+        let transfer = |distance_m| Transfer::new(size, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
         let step_m = display.volume_depth_m() / planes as f64;
         let wave = Wave {
             fft: &fft,
@@ -341,7 +343,7 @@ impl Wave<'_> {
         let fft = self.fft;
         let (back, points) = &swept[0];
         let points = &self.points[points.clone()];
-        let width = fft.padded_shape().1;
+        let width = fft.padded_size().width;
         place(points, plane, width, |point| content(*back, &point.rgb));
         fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         let mut at = *back;

@@ -33,6 +33,7 @@ use crate::sm_lbm;
 use ndarray::{Array2, Array3, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::optics::asm;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
@@ -167,7 +168,7 @@ struct Points {
 
 impl Points {
     fn of(ldi: &Ldi, planes: usize, occlusion: Occlusion) -> Self {
-        let (height, width) = ldi.shape();
+        let Size { width, height } = ldi.size();
         let layers = match occlusion {
             Occlusion::Input => &ldi.layers[..1],
             _ => &ldi.layers[..],

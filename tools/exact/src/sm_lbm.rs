@@ -14,6 +14,7 @@
 use ndarray::{Array3, ArrayView1, ArrayViewMut2, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::optics::asm::{self, Padding, Transfer};
 use phasefront_core::optics::fft::{Fft2, Scratch};
 use phasefront_io::Result;
@@ -89,7 +90,7 @@ impl Planes {
             rgb: [0.0; 3],
         };
         let mut points = vec![nowhere; total];
-        let (height, width) = ldi.shape();
+        let Size { width, height } = ldi.size();
         for y in 0..height {
             for layer in ldi.layers.iter().rev() {
                 for x in 0..width {
@@ -177,25 +178,24 @@ pub fn hologram(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
     check_planes(planes)?;
-    let (height, width) = ldi.shape();
+    let Size { width, height } = ldi.size();
     let scene = Planes::of(&ldi.for_display(display), planes);
     let longest = display.longest_wavelength_m();
-    let shape = asm::padded_shape(
-        height,
-        width,
+    let padded = asm::padded_size(
+        ldi.size(),
         display.pitch_m(),
         longest,
         display.volume_depth_m(),
         Padding::Reach,
     )?;
-    let (padded_height, padded_width) = shape;
-    let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
+    let padded_width = padded.width;
+    let fft = Fft2::new(padded, padded);
     let mut scratch = fft.scratch();
     let mut hologram = Array3::zeros((display.colours(), height, width));
     let total = display.colours() * scene.occupied.len();
     let step_m = display.volume_depth_m() / planes as f64;
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
-        let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
+        let transfer = |distance_m| Transfer::new(padded, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
         let neighbour = transfer(step_m);
         let Some((back, points)) = scene.occupied.first() else {
             break;

@@ -2,6 +2,7 @@
 //! surfaces of a layered depth image, or those that the sweep finds behind an RGB-D frame.
 
 use ndarray::{Array2, Array3};
+use phasefront::Size;
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::method::sweep::hidden::{Hidden, NOTHING};
 use phasefront_core::method::sweep::hidden_reach;
@@ -40,10 +41,10 @@ pub fn visible_frame(ldi: &Ldi, display: &Display) -> Result<RgbdFrame> {
 /// # Errors
 /// Never returns an error, because all layers have the same shape.
 pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
-    let (height, width) = frame.shape();
+    let Size { width, height } = frame.size();
     let size = height * width;
     let front = LdiLayer::from(frame);
-    let hidden = Hidden::new(height, width, hidden_reach(display));
+    let hidden = Hidden::new(frame.size(), hidden_reach(display));
     let mut sources = vec![0; 2 * size];
     let values = front.depth.as_slice().expect("standard layout");
     hidden.find(values, &mut sources, &mut hidden.scratch());

@@ -62,7 +62,7 @@ impl DisplayFile {
     /// Returns the parts of the calibration that a hologram file does not store, by their keys in the display file.
     pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
         let keys = [
-            ("per_pixel", phase_only && self.target.response.shape().is_some()),
+            ("per_pixel", phase_only && self.target.response.size().is_some()),
             ("laser", phase_only && self.target.illumination.is_some()),
             ("aberration", self.aberration.is_some()),
             ("model", phase_only && self.target.model.is_some()),
@@ -206,14 +206,13 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
         None => None,
         Some(path) => {
             let table = calibration::read_per_pixel(&path)?;
-            let (height, width) = table.shape();
-            if (height, width) != (display.height(), display.width()) {
+            if table.size() != display.size() {
                 return Err(Error::file(
                     path,
                     format!(
-                        "is for {width}×{height} pixels, the display has {}×{}; calibrate this display",
-                        display.width(),
-                        display.height()
+                        "is for {} pixels, the display has {}; calibrate this display",
+                        table.size(),
+                        display.size()
                     ),
                 ));
             }

@@ -7,6 +7,7 @@ pub mod video;
 
 use crate::{Error, Result, output};
 use light::Light;
+use phasefront::Size;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
@@ -187,7 +188,7 @@ pub struct Film {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// The height and width, (H, W).
-    pub shape: (usize, usize),
+    pub size: Size,
     /// The pixels row by row, in the requested format.
     pub bytes: Vec<u8>,
 }
@@ -258,11 +259,11 @@ impl Film {
     /// # Errors
     /// Returns an error if ffmpeg cannot read the film.
     pub fn read(&mut self) -> Result<Option<Picture>> {
-        let Some((shape, bytes)) = self.header()? else {
+        let Some((size, bytes)) = self.header()? else {
             return self.end().map(|()| None);
         };
         let mut picture = Picture {
-            shape,
+            size,
             bytes: vec![0; bytes],
         };
         match self.pictures.read_exact(&mut picture.bytes) {
@@ -271,9 +272,9 @@ impl Film {
         }
     }
 
-    /// Parses the header of a portable anymap, such as "P6\n640 480\n255\n". Returns the shape and the number of bytes
+    /// Parses the header of a portable anymap, such as "P6\n640 480\n255\n". Returns the size and the number of bytes
     /// that follow.
-    fn header(&mut self) -> Result<Option<((usize, usize), usize)>> {
+    fn header(&mut self) -> Result<Option<(Size, usize)>> {
         let mut lines = [const { String::new() }; 3];
         for line in &mut lines {
             let read = self.pictures.read_line(line);
@@ -283,17 +284,20 @@ impl Film {
         if kind.is_empty() {
             return Ok(None);
         }
-        let shape = size
-            .split_once(' ')
-            .and_then(|(w, h)| Some((h.parse().ok()?, w.parse().ok()?)));
+        let size = size.split_once(' ').and_then(|(width, height)| {
+            Some(Size {
+                width: width.parse().ok()?,
+                height: height.parse().ok()?,
+            })
+        });
         let pixel = match (kind, most) {
             ("P6", "255") => 3,
             ("P6", "65535") => 6,
             ("P5", "65535") => 2,
             _ => 0,
         };
-        match shape {
-            Some((height, width)) if pixel > 0 => Ok(Some(((height, width), pixel * height * width))),
+        match size {
+            Some(size) if pixel > 0 => Ok(Some((size, pixel * size.pixels()))),
             _ => Err(Error::file(
                 &self.path,
                 "ffmpeg gives pictures of an unknown kind for it",

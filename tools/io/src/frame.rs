@@ -11,6 +11,7 @@ use image::DynamicImage;
 use image::metadata::Orientation;
 use ndarray::{Array2, Array3, ArrayView2};
 use phasefront::RgbdFrame;
+use phasefront::Size;
 use phasefront_core::depth;
 use phasefront_core::depth::DepthUnit;
 use phasefront_core::depth::condition::Conditioner;
@@ -83,10 +84,13 @@ pub(crate) fn stored(
     told: &mut dyn FnMut(Doubt),
 ) -> Result<Stored> {
     let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
-    let (height, width) = (image.height() as usize, image.width() as usize);
+    let colour_size = Size {
+        width: image.width() as usize,
+        height: image.height() as usize,
+    };
     let normalized = options.unit == DepthUnit::Normalized;
     let file = depth_map::read(depth_path, normalized)?;
-    if is_turned_alone(depth_path, &file, orientation, (height, width))? {
+    if is_turned_alone(depth_path, &file, orientation, colour_size)? {
         told(Doubt::Turned(orientation));
     }
     let readings = file.depth;
@@ -96,7 +100,7 @@ pub(crate) fn stored(
             told(doubt);
         }
     }
-    check_aspect(readings.dim(), (height, width)).map_err(|why| Error::file(depth_path, why))?;
+    check_aspect(Size::from_shape(readings.dim()), colour_size).map_err(|why| Error::file(depth_path, why))?;
     Ok(Stored { image, readings })
 }
 
@@ -192,49 +196,45 @@ fn crowd(depth: &Array2<f32>, shown: ShownDepth) -> Option<String> {
     ))
 }
 
-/// Checks that colour and depth, (H, W), have the same aspect ratio.
+/// Checks that colour and depth have the same aspect ratio.
 ///
 /// # Errors
 /// Returns the two sizes if they do not.
-pub fn check_aspect(depth: (usize, usize), colour: (usize, usize)) -> std::result::Result<(), String> {
+pub fn check_aspect(depth: Size, colour: Size) -> std::result::Result<(), String> {
     if has_aspect(depth, colour) {
         return Ok(());
     }
-    let ((depth_height, depth_width), (height, width)) = (depth, colour);
     Err(format!(
-        "depth is {depth_width}×{depth_height}, colour {width}×{height}: their aspect ratios differ; they must show the same field of view"
+        "depth is {depth}, colour {colour}: their aspect ratios differ; they must show the same field of view"
     ))
 }
 
 /// Checks whether two shapes, (H, W), have the same aspect ratio.
-fn has_aspect((h, w): (usize, usize), (height, width): (usize, usize)) -> bool {
+fn has_aspect(Size { width: w, height: h }: Size, Size { width, height }: Size) -> bool {
     let cross = |a: usize, b: usize| a as f64 * b as f64;
     let ratio = cross(width, h) / cross(height, w);
     (ratio - 1.0).abs() <= ASPECT_TOLERANCE
 }
 
-/// Checks whether Exif data turned the colour image, (H, W) = `shape`, but not its depth, while both shapes still
-/// match.
+/// Checks whether Exif data turned the colour image, of `size`, but not its depth, while both shapes still match.
 ///
 /// # Errors
 /// Returns an error if the depth matches the colour only as it is stored.
-pub(crate) fn is_turned_alone(
-    depth_path: &Path,
-    depth: &DepthFile,
-    colour: Orientation,
-    (height, width): (usize, usize),
-) -> Result<bool> {
+pub(crate) fn is_turned_alone(depth_path: &Path, depth: &DepthFile, colour: Orientation, size: Size) -> Result<bool> {
     if colour == Orientation::NoTransforms || depth.orientation != Orientation::NoTransforms {
         return Ok(false);
     }
-    let shape = depth.depth.dim();
-    let fits = has_aspect(shape, (height, width));
-    if !fits && decode::swaps_sides(colour) && has_aspect(shape, (width, height)) {
+    let found = Size::from_shape(depth.depth.dim());
+    let fits = has_aspect(found, size);
+    let stored = Size {
+        width: size.height,
+        height: size.width,
+    };
+    if !fits && decode::swaps_sides(colour) && has_aspect(found, stored) {
         return Err(Error::file(
             depth_path,
             format!(
-                "depth is {}×{}, as the colour is stored, but the colour's Exif data turn it to {width}×{height}; turn the depth alike, or remove the colour's orientation (exiftool -Orientation= -overwrite_original)",
-                shape.1, shape.0
+                "depth is {found}, as the colour is stored, but the colour's Exif data turn it to {size}; turn the depth alike, or remove the colour's orientation (exiftool -Orientation= -overwrite_original)"
             ),
         ));
     }
@@ -337,12 +337,12 @@ pub fn relative(depth: ArrayView2<'_, f32>, near: Option<f32>, far: Option<f32>)
 /// Returns an error if a shape is empty or too large.
 pub fn conditioned(rgb: &Array3<f32>, depth: &Array2<f32>, placement: &Placement) -> Result<RgbdFrame> {
     let (_, height, width) = rgb.dim();
-    let crop = placement.depth_crop(depth.dim(), (height, width));
+    let crop = placement.depth_crop(Size::from_shape(depth.dim()), Size { width, height });
     let colour = placement.colour(rgb.view());
     let colour = colour.as_standard_layout().into_owned();
     let depth = depth.as_standard_layout();
-    let conditioner = Conditioner::new(depth.dim(), crop, placement.inner(), false)?;
-    let mut to = Array2::zeros(placement.inner());
+    let conditioner = Conditioner::new(Size::from_shape(depth.dim()), crop, placement.inner(), false)?;
+    let mut to = Array2::zeros(placement.inner().shape());
     conditioner.condition(
         depth.as_slice().expect("standard layout"),
         colour.as_slice().expect("standard layout"),

@@ -3,6 +3,8 @@
 pub mod packed;
 mod views;
 
+use phasefront::Size;
+pub use views::AberratedOptics;
 pub use views::{AberratedOptics, check_z};
 
 use crate::display::{DisplayFile, lut_of};
@@ -154,7 +156,7 @@ pub enum Levels {
 
 impl Levels {
     /// Returns levels 0 for a hologram of (H, W) pixels on `display`.
-    pub fn zeros(display: &Display, (height, width): (usize, usize)) -> Self {
+    pub fn zeros(display: &Display, Size { width, height }: Size) -> Self {
         let shape = (display.colours(), height, width);
         if display.bits() <= 8 {
             Levels::Bytes(Array3::zeros(shape))
@@ -210,7 +212,7 @@ impl Levels {
     /// Writes the levels as a PNG with `texts`: RGB or, for one laser, grey, with 8 or 16 bits.
     fn write(&self, path: &Path, texts: &[(&str, String)]) -> Result<()> {
         let (colours, height, width) = self.dim();
-        let shape = PngShape::of_levels(colours, height, width);
+        let shape = PngShape::of_levels(colours, Size { width, height });
         match self {
             Levels::Bytes(levels) => write_png_of(path, shape, &interleaved(levels.view(), |v| v), texts),
             Levels::Words(levels) => {

@@ -7,6 +7,7 @@ use crate::{Error, Result};
 use image::codecs::png::PngEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use ndarray::{Array2, Array3};
+use phasefront::Size;
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::frame::luminance;
 use phasefront_core::method::network::Source;
@@ -33,7 +34,7 @@ pub struct LdiLayer {
 impl From<&RgbdFrame> for LdiLayer {
     /// Converts a frame to one layer. The single amplitude of one laser is used for all three colours.
     fn from(frame: &RgbdFrame) -> Self {
-        let (height, width) = frame.shape();
+        let Size { width, height } = frame.size();
         let rgb = frame.rgb();
         let rgb = rgb.broadcast((3, height, width)).expect("three colours or one");
         LdiLayer {
@@ -105,9 +106,9 @@ impl Ldi {
         })
     }
 
-    /// Returns the height and width in pixels.
-    pub fn shape(&self) -> (usize, usize) {
-        self.layers[0].depth.dim()
+    /// Returns the size.
+    pub fn size(&self) -> Size {
+        Size::from_shape(self.layers[0].depth.dim())
     }
 
     /// Rounds every value to the precision of the PNGs of [`write`](Self::write): colours to 8 bits, depths to 16,
@@ -116,7 +117,7 @@ impl Ldi {
         let layers = self.layers.iter().map(|layer| {
             let (rgba, depth) = to_codes(layer);
             let depths: Vec<f32> = depth.iter().map(|&code| depth_of_code(code)).collect();
-            from_codes(layer.depth.dim(), &rgba, &depths)
+            from_codes(Size::from_shape(layer.depth.dim()), &rgba, &depths)
         });
         Self {
             layers: layers.collect(),
@@ -252,7 +253,7 @@ pub fn depth_of_code(code: u16) -> f32 {
 }
 
 /// Inverts [`to_codes`], with the depths already decoded.
-fn from_codes((height, width): (usize, usize), rgba: &[u8], depths: &[f32]) -> LdiLayer {
+fn from_codes(Size { width, height }: Size, rgba: &[u8], depths: &[f32]) -> LdiLayer {
     let hit = |pixel: usize| rgba[4 * pixel + 3] > 0;
     LdiLayer {
         rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| {
@@ -315,7 +316,7 @@ fn count_layers(dir: &Path) -> Result<usize> {
 fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
     let colour = open_image(&dir.join(layer_name(index)))?.to_rgba8();
     let depth_path = dir.join(depth_name(index));
-    let (depth_shape, depths): (_, Vec<f32>) = match open_image(&depth_path)? {
+    let (depth_size, depths): (_, Vec<f32>) = match open_image(&depth_path)? {
         DynamicImage::ImageLuma16(image) => (image.dimensions(), image.iter().map(|&v| depth_of_code(v)).collect()),
         DynamicImage::ImageLuma8(image) => (
             image.dimensions(),
@@ -329,14 +330,18 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
         }
     };
     let (width, height) = colour.dimensions();
-    if depth_shape != (width, height) {
-        let (w, h) = depth_shape;
+    if depth_size != (width, height) {
+        let (w, h) = depth_size;
         return Err(Error::file(
             depth_path,
             format!("{w}x{h} pixels, but its layer has {width}x{height}"),
         ));
     }
-    Ok(from_codes((height as usize, width as usize), colour.as_raw(), &depths))
+    let size = Size {
+        width: width as usize,
+        height: height as usize,
+    };
+    Ok(from_codes(size, colour.as_raw(), &depths))
 }
 
 /// Writes the layer's two files, without putting them in place yet.

@@ -10,6 +10,7 @@ use crate::input::decode::{self, Reading};
 use crate::output::Pending;
 use image::{DynamicImage, RgbImage};
 use ndarray::{Array3, ArrayView3};
+use phasefront::Size;
 use std::path::Path;
 
 /// Opens the picture at `path` and turns it upright.
@@ -48,16 +49,19 @@ pub fn amplitudes(image: DynamicImage) -> Array3<f32> {
     }
 }
 
-/// Reads the (H, W) of an image, upright, and its pixels as rows of RGB bytes. Grey images give three equal colours.
+/// Reads the size of an image, upright, and its pixels as rows of RGB bytes. Grey images give three equal colours.
 /// Alpha is ignored.
 ///
 /// # Errors
 /// Returns an error if the file is missing, truncated, or not one of
 /// [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
-pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
+pub fn read_rgb_bytes(path: &Path) -> Result<(Size, Vec<u8>)> {
     let image = open_image(path)?.into_rgb8();
-    let shape = (image.height() as usize, image.width() as usize);
-    Ok((shape, image.into_raw()))
+    let size = Size {
+        width: image.width() as usize,
+        height: image.height() as usize,
+    };
+    Ok((size, image.into_raw()))
 }
 
 /// Writes amplitudes, (C, H, W), as an 8-bit RGB PNG. Values above 1 are clipped, and one laser's are grey.
@@ -67,7 +71,7 @@ pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
 pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     let bytes = amplitude_bytes(amplitude);
     let (_, height, width) = amplitude.dim();
-    write_png_of(path, PngShape::of_levels(3, height, width), &bytes, &[])
+    write_png_of(path, PngShape::of_levels(3, Size { width, height }), &bytes, &[])
 }
 
 /// Converts amplitudes, (C, H, W), to rows of RGB bytes. One laser's are grey.
@@ -92,7 +96,13 @@ pub(crate) fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) ->
 /// Returns an error if the file cannot be written.
 pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
     let (width, height) = picture.dimensions();
-    let shape = PngShape::of_levels(3, height as usize, width as usize);
+    let shape = PngShape::of_levels(
+        3,
+        Size {
+            width: width as usize,
+            height: height as usize,
+        },
+    );
     write_png_of(path, shape, picture.as_raw(), &[])
 }
 
@@ -100,7 +110,8 @@ pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.
-pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Result<()> {
+pub fn write_rgba(path: &Path, size: Size, rgba: &[u8]) -> Result<()> {
+    let Size { width, height } = size;
     let shape = PngShape {
         width,
         height,
@@ -120,8 +131,9 @@ pub(crate) struct PngShape {
 }
 
 impl PngShape {
-    /// Creates the shape of (`colours`, `height`, `width`) bytes.
-    pub(crate) fn of_levels(colours: usize, height: usize, width: usize) -> Self {
+    /// Creates the shape of bytes of `colours` and `size`.
+    pub(crate) fn of_levels(colours: usize, size: Size) -> Self {
+        let Size { width, height } = size;
         PngShape {
             width,
             height,

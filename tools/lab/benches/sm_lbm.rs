@@ -9,6 +9,7 @@
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront_core::Size;
 use phasefront_core::optics::asm::{self, Padding};
 use phasefront_exact::sm_lbm;
 use phasefront_io::Result;
@@ -25,7 +26,7 @@ const ROUNDS: usize = 5;
 struct Bare {
     row: [Arc<dyn Fft<f32>>; 2],
     column: [Arc<dyn Fft<f32>>; 2],
-    shape: (usize, usize),
+    size: Size,
     plane: Vec<Complex32>,
     transposed: Vec<Complex32>,
     scratch: Vec<Complex32>,
@@ -33,7 +34,7 @@ struct Bare {
 }
 
 impl Bare {
-    fn new((height, width): (usize, usize)) -> Self {
+    fn new(Size { width, height }: Size) -> Self {
         let mut planner = FftPlanner::new();
         let mut both = |n| [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)];
         let (row, column) = (both(width), both(height));
@@ -47,7 +48,7 @@ impl Bare {
         Bare {
             row,
             column,
-            shape: (height, width),
+            size: Size { width, height },
             plane: vec![Complex32::ZERO; height * width],
             transposed: vec![Complex32::ZERO; height * width],
             scratch: vec![Complex32::ZERO; longest.unwrap_or(0).max(1) * parts],
@@ -67,7 +68,7 @@ impl Bare {
 
     /// Transforms forward and back `planes` times: rows, columns; columns, rows.
     fn run(&mut self, planes: usize, transpose: bool) {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         let Bare {
             row,
             column,
@@ -109,7 +110,7 @@ fn main() -> Result<()> {
         }])?;
         let red = display.wavelengths_m()[0];
         let volume_m = display.volume_depth_m();
-        let padded = asm::padded_shape(height, width, display.pitch_m(), red, volume_m, Padding::Reach)?;
+        let padded = asm::padded_size(Size { width, height }, display.pitch_m(), red, volume_m, Padding::Reach)?;
         let mut bare = Bare::new(padded);
         let [mut lines_ms, mut bare_ms, mut ours_ms] = [f64::INFINITY; 3];
         let a_plane = |start: Instant| start.elapsed().as_secs_f64() * 1e3 / (3 * planes) as f64;
@@ -127,11 +128,11 @@ fn main() -> Result<()> {
         println!(
             "{:>9}  {:>9}  {planes:6}  {lines_ms:7.2}  {bare_ms:6.2}  {ours_ms:6.2}  {:7.2}  {:9.2}  {:8.1}  {:10.1}  {:9.1}",
             format!("{width}×{height}"),
-            format!("{}×{}", padded.1, padded.0),
+            format!("{}×{}", padded.width, padded.height),
             ours_ms / lines_ms,
             ours_ms / bare_ms,
             1e3 / ours_ms,
-            (2 * padded.0 * padded.1 * size_of::<Complex32>()) as f64 / 1e6,
+            (2 * padded.height * padded.width * size_of::<Complex32>()) as f64 / 1e6,
             (20 * height * width) as f64 / 1e6,
         );
     }

@@ -8,6 +8,7 @@
 use ndarray::Array2;
 use num_complex::Complex32;
 use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront_core::Size;
 use phasefront_core::depth::DepthUnit;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_io::Result;
@@ -33,7 +34,7 @@ fn main() -> Result<()> {
     };
     let Captured { rgb, depth, .. } = frame::read(Path::new(rgb), Path::new(depth), options)?;
     let frame = RgbdFrame::new(rgb, depth)?;
-    let (height, width) = frame.shape();
+    let Size { width, height } = frame.size();
     let display = Display::default();
     let default = Sweep::for_display(&display);
     let cases = sweeps(&display, &numbers);
@@ -69,7 +70,7 @@ fn main() -> Result<()> {
     pool.install(|| -> Result<()> {
         for (name, frame, sweep, merged) in cases {
             let start = Instant::now();
-            let mut plan = SweepPlan::new(height, width, &display, sweep, 0.0)?;
+            let mut plan = SweepPlan::new(frame.size(), &display, sweep, 0.0)?;
             if !merged {
                 plan = plan.unmerged();
             }

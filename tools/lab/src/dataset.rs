@@ -19,6 +19,7 @@ use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::NpzWriter;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::runtime::file;
 use phasefront_exact::corrected::{self, Correction, spatial};
 use phasefront_exact::sm_lbm;
@@ -122,11 +123,43 @@ impl Look {
     /// Makes the scene of `seed` for a frame of `size` x `size` pixels.
     fn scene(&self, seed: u64, size: usize, textures: &[Texture]) -> Scene {
         match self {
-            Self::Objects => scene::random_scene(seed, size, size),
-            Self::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
-            Self::Varied { .. } => scene::varied_scene(seed, size, size, textures),
-            Self::Hard => scene::hard_scene(seed, size, size),
-            Self::Interiors => scene::interior_scene(seed, size, size),
+            Self::Objects => scene::random_scene(
+                seed,
+                Size {
+                    width: size,
+                    height: size,
+                },
+            ),
+            Self::Photographs { .. } => scene::natural_scene(
+                seed,
+                Size {
+                    width: size,
+                    height: size,
+                },
+                textures,
+            ),
+            Self::Varied { .. } => scene::varied_scene(
+                seed,
+                Size {
+                    width: size,
+                    height: size,
+                },
+                textures,
+            ),
+            Self::Hard => scene::hard_scene(
+                seed,
+                Size {
+                    width: size,
+                    height: size,
+                },
+            ),
+            Self::Interiors => scene::interior_scene(
+                seed,
+                Size {
+                    width: size,
+                    height: size,
+                },
+            ),
         }
     }
 }
@@ -293,8 +326,11 @@ pub fn make(
         false => match calibration::aberrations(&manifest.aberration)? {
             AberrationFile::Spatial(all) => GroundTruth::Spatial(all),
             AberrationFile::Uniform(all) => {
-                let shape = (manifest.size, manifest.size);
-                let correction = Correction::of_aberrations(&all, shape, planes, display)?;
+                let size = Size {
+                    width: manifest.size,
+                    height: manifest.size,
+                };
+                let correction = Correction::of_aberrations(&all, size, planes, display)?;
                 GroundTruth::Corrected(correction)
             }
         },
@@ -307,7 +343,15 @@ pub fn make(
         if !is_whole(&path) {
             let (seed, size) = (manifest.scene_seed(index), manifest.size);
             let scene = manifest.look.scene(seed, size, textures);
-            let ldi = scene::render_ldi_reference(&scene, size, size, manifest.ldi_layers)?.quantized();
+            let ldi = scene::render_ldi_reference(
+                &scene,
+                Size {
+                    width: size,
+                    height: size,
+                },
+                manifest.ldi_layers,
+            )?
+            .quantized();
             let quiet = |_: usize, _: usize| {};
             let hologram = match &ground_truth {
                 GroundTruth::Plain => sm_lbm::hologram(&ldi, display, planes, &quiet)?,
@@ -336,7 +380,7 @@ fn sensed(ldi: &Ldi, sensors: &[Sensor], seed: u64) -> Array3<u16> {
 
 /// Writes one pair with the depth `sensed` by sensors, if there are any.
 fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>, sensed: &Array3<u16>) -> Result<()> {
-    let (height, width) = ldi.shape();
+    let Size { width, height } = ldi.size();
     let layers = ldi.layers.len();
     let rgb = Array4::from_shape_fn((layers, height, width, 4), |(l, y, x, c)| {
         let layer = &ldi.layers[l];
@@ -478,8 +522,8 @@ mod tests {
         make(&ours, std::slice::from_ref(&texture), dir.path(), (1, 4), &|| {}).unwrap();
         assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
         let pair = read_pair(&ours, dir.path(), 1).unwrap();
-        let scene = scene::natural_scene(ours.scene_seed(1), 24, 24, &[texture]);
-        let ldi = scene::render_ldi_reference(&scene, 24, 24, 2).unwrap();
+        let scene = scene::natural_scene(ours.scene_seed(1), Size { width: 24, height: 24 }, &[texture]);
+        let ldi = scene::render_ldi_reference(&scene, Size { width: 24, height: 24 }, 2).unwrap();
         assert!(pair.ldi == ldi.quantized());
         let other = manifest(Look::photographs(&[]));
         let refused = make(&other, &[], dir.path(), (1, 4), &|| {}).unwrap_err();
@@ -493,8 +537,13 @@ mod tests {
         make(&ours, &[], dir.path(), (1, 4), &|| {}).unwrap();
         assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
         let pair = read_pair(&ours, dir.path(), 1).unwrap();
-        let scene = scene::varied_scene(ours.scene_seed(1), 24, 24, &[]);
-        assert!(pair.ldi == scene::render_ldi_reference(&scene, 24, 24, 2).unwrap().quantized());
+        let scene = scene::varied_scene(ours.scene_seed(1), Size { width: 24, height: 24 }, &[]);
+        assert!(
+            pair.ldi
+                == scene::render_ldi_reference(&scene, Size { width: 24, height: 24 }, 2)
+                    .unwrap()
+                    .quantized()
+        );
         let refused = make(&manifest(Look::photographs(&[])), &[], dir.path(), (1, 4), &|| {}).unwrap_err();
         assert!(refused.to_string().contains("other parameters"), "{refused}");
     }

@@ -13,6 +13,7 @@ use crate::evaluate::ceiling::Ceiling;
 use crate::sensor::Sensor;
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::method::MethodPlan;
@@ -113,7 +114,18 @@ impl<'a> Method<'a> {
     /// # Errors
     /// Returns an error if the sweep cannot be planned.
     pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
-        let (plan, display) = (SweepPlan::new(size, size, display, sweep, 0.0)?, display.clone());
+        let (plan, display) = (
+            SweepPlan::new(
+                Size {
+                    width: size,
+                    height: size,
+                },
+                display,
+                sweep,
+                0.0,
+            )?,
+            display.clone(),
+        );
         Ok(Self::new("sweep", move |ldi| {
             let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
@@ -128,7 +140,17 @@ impl<'a> Method<'a> {
     /// Returns an error if one of the methods cannot be planned.
     pub fn auto(size: usize, display: &Display, sweep: Sweep, network: Arc<Network>) -> Result<Self> {
         let method = phasefront::Method::Auto(sweep, network);
-        let (plan, display) = (MethodPlan::new(size, size, method, display)?, display.clone());
+        let (plan, display) = (
+            MethodPlan::new(
+                Size {
+                    width: size,
+                    height: size,
+                },
+                method,
+                display,
+            )?,
+            display.clone(),
+        );
         Ok(Self::new("auto", move |ldi| {
             let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
@@ -138,7 +160,17 @@ impl<'a> Method<'a> {
     }
 
     fn seeded(name: String, network: &Network, size: usize, display: &Display) -> Result<Self> {
-        let (plan, display) = (SeededPlan::new(size, size, network, display)?, display.clone());
+        let (plan, display) = (
+            SeededPlan::new(
+                Size {
+                    width: size,
+                    height: size,
+                },
+                network,
+                display,
+            )?,
+            display.clone(),
+        );
         Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
@@ -164,7 +196,16 @@ impl<'a> Method<'a> {
             ))
             .into());
         }
-        let (plan, display) = (network.plan_for(size, size, display)?, display.clone());
+        let (plan, display) = (
+            network.plan_for(
+                Size {
+                    width: size,
+                    height: size,
+                },
+                display,
+            )?,
+            display.clone(),
+        );
         Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
@@ -430,12 +471,23 @@ impl Viewer {
                 AberrationFile::Spatial(_) => None,
             },
         };
-        let shape = (manifest.size, manifest.size);
+        let size = Size {
+            width: manifest.size,
+            height: manifest.size,
+        };
         Ok(Viewer {
             optics: correction
-                .map(|correction| AberratedOptics::new(shape, display, &correction))
+                .map(|correction| AberratedOptics::new(size, display, &correction))
                 .transpose()?,
-            complex: Refocus::new(manifest.size, manifest.size, display, &ends_m, None)?,
+            complex: Refocus::new(
+                Size {
+                    width: manifest.size,
+                    height: manifest.size,
+                },
+                display,
+                &ends_m,
+                None,
+            )?,
             size: manifest.size,
             ends_m,
         })
@@ -454,7 +506,14 @@ impl Viewer {
         let refocus = match &shown.levels {
             None => &self.complex,
             Some((target, options)) => {
-                let modulator = DisplayPlan::new((size, size), target, options)?;
+                let modulator = DisplayPlan::new(
+                    Size {
+                        width: size,
+                        height: size,
+                    },
+                    target,
+                    options,
+                )?;
                 let mut scratch = modulator.scratch();
                 if !modulator.keeps_phase() {
                     remove_mean_phase(&mut values, field.dim().0);
@@ -468,7 +527,15 @@ impl Viewer {
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
                 let opening = (shown.through).unwrap_or(Opening::centred(target.display.aperture_radius()));
                 light = self.light(&values, opening)?;
-                of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(opening))?;
+                of_levels = Refocus::new(
+                    Size {
+                        width: size,
+                        height: size,
+                    },
+                    &target.display,
+                    &self.ends_m,
+                    Some(opening),
+                )?;
                 &of_levels
             }
         };
@@ -507,7 +574,13 @@ impl Viewer {
     /// Returns the share of the light of `shown`, (C, H, W) at the modulator, that passes `opening`.
     fn light(&self, shown: &[Complex32], opening: Opening) -> Result<f64> {
         let energy = |values: &[Complex32]| values.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>();
-        let aperture = Aperture::new(self.size, self.size, opening)?;
+        let aperture = Aperture::new(
+            Size {
+                width: self.size,
+                height: self.size,
+            },
+            opening,
+        )?;
         let mut scratch = aperture.scratch();
         let mut passed = shown.to_vec();
         for plane in passed.chunks_exact_mut(self.size * self.size) {

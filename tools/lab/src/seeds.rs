@@ -12,6 +12,7 @@ use crate::sensor::coarse::{Coarse, Sampling};
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, Ix3, concatenate, s};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{RgbdFrame, Sweep};
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::runtime::file;
@@ -65,7 +66,15 @@ pub fn make(
             output::write_atomically(&place, |file| writeln!(file, "{description}"))?;
         }
     }
-    let plan = SweepPlan::new(manifest.size, manifest.size, &manifest.display, sweep, 0.0)?;
+    let plan = SweepPlan::new(
+        Size {
+            width: manifest.size,
+            height: manifest.size,
+        },
+        &manifest.display,
+        sweep,
+        0.0,
+    )?;
     (0..manifest.scenes).into_par_iter().try_for_each(|index| {
         let file_of = |what: &str| -> PathBuf { dir.join(format!("{what}_{index:06}.npy")) };
         let (depths, seeds) = (file_of("depth"), file_of("seed"));

@@ -36,6 +36,7 @@ pub mod stereo;
 
 use coarse::{Coarse, Sampling};
 use ndarray::{Array2, Array3, ArrayView2};
+use phasefront::Size;
 use phasefront::input::{
     CameraFrame, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, DepthRange, Plane,
 };
@@ -140,7 +141,7 @@ impl Reading {
     pub fn images(&self, near_m: f32, far_m: f32) -> Images {
         let metres = |d: &f32| near_m + d * (far_m - near_m);
         Images {
-            shape: self.depth.dim(),
+            size: Size::from_shape(self.depth.dim()),
             depth: self.depth.iter().flat_map(|d| metres(d).to_le_bytes()).collect(),
             confidence: self.confidence.as_ref().map(|map| map.iter().copied().collect()),
         }
@@ -161,9 +162,13 @@ impl Reading {
         };
         let images = self.images(NEAR_M, FAR_M);
         let colours = colour_bytes(rgb);
-        let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[Plane::new(&colours, 3 * width, 3)])?;
+        let colour = ColourImage::new(
+            ColourFormat::Rgb,
+            Size { width, height },
+            &[Plane::new(&colours, 3 * width, 3)],
+        )?;
         let mut depth = Array2::zeros((height, width));
-        DepthStream::new(options, (height, width))?.next(
+        DepthStream::new(options, Size { width, height })?.next(
             &CameraFrame::new(0, colour, images.depth()?),
             None,
             rgb.as_slice().expect("standard layout"),
@@ -175,7 +180,7 @@ impl Reading {
 
 /// The bytes of a reading's images.
 pub struct Images {
-    shape: (usize, usize),
+    size: Size,
     /// Metres in 32 bits.
     depth: Vec<u8>,
     confidence: Option<Vec<u8>>,
@@ -187,10 +192,10 @@ impl Images {
     /// # Errors
     /// Returns an error if the reading has no pixels.
     pub fn depth(&self) -> Result<DepthImage<'_>> {
-        let (h, w) = self.shape;
-        let image = DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&self.depth, 4 * w, 4))?;
+        let w = self.size.width;
+        let image = DepthImage::new(DepthFormat::MetresF32, self.size, Plane::new(&self.depth, 4 * w, 4))?;
         Ok(match &self.confidence {
-            Some(map) => image.with_confidence(ConfidenceFormat::LowMediumHigh, w, h, Plane::new(map, w, 1))?,
+            Some(map) => image.with_confidence(ConfidenceFormat::LowMediumHigh, self.size, Plane::new(map, w, 1))?,
             None => image,
         })
     }

@@ -11,6 +11,7 @@ use crate::scene;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::optics::metrics;
 use phasefront_exact::sm_lbm;
 use phasefront_io::ldi::Ldi;
@@ -118,8 +119,22 @@ fn against_finest(
         .into_par_iter()
         .map(|i| {
             let size = scenes.size;
-            let scene = scene::random_scene(scenes.seed + i as u64, size, size);
-            let ldi = scene::render_ldi_reference(&scene, size, size, ldi_layers)?.quantized();
+            let scene = scene::random_scene(
+                scenes.seed + i as u64,
+                Size {
+                    width: size,
+                    height: size,
+                },
+            );
+            let ldi = scene::render_ldi_reference(
+                &scene,
+                Size {
+                    width: size,
+                    height: size,
+                },
+                ldi_layers,
+            )?
+            .quantized();
             let amplitude = |value| Ok::<_, Error>(hologram(&ldi, value)?.mapv(|v| v.norm()));
             let truth = amplitude(finest)?;
             (values.iter())

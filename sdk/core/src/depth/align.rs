@@ -1,5 +1,6 @@
 //! Alignment of depth with another camera: each reading is projected to its position in the other camera's image.
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 
 /// The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
@@ -66,7 +67,7 @@ impl Cameras {
     /// Projects `metres` and `confidence` of the depth camera, (h, w) with NaN for no reading, to the colour camera and
     /// writes them to `to` and `to_confidence`, (h, w).
     ///
-    /// The output covers the whole colour image of (H, W) = `colour_shape` at the resolution of the depth image. If
+    /// The output covers the whole colour image of `colour_size` at the resolution of the depth image. If
     /// several readings meet at a pixel, the nearest one is kept; a pixel without a reading is NaN. Returns the number
     /// of pixels with a reading. Does not allocate.
     ///
@@ -75,16 +76,16 @@ impl Cameras {
     #[doc(hidden)]
     pub fn reproject(
         &self,
-        (height, width): (usize, usize),
-        colour_shape: (usize, usize),
+        Size { width, height }: Size,
+        colour_size: Size,
         (metres, confidence): (&[f32], &[f32]),
         (to, to_confidence): (&mut [f32], &mut [f32]),
     ) -> usize {
         assert!([metres.len(), confidence.len(), to.len(), to_confidence.len()] == [height * width; 4]);
         to.fill(f32::NAN);
         to_confidence.fill(0.0);
-        let scale_x = width as f64 / colour_shape.1 as f64;
-        let scale_y = height as f64 / colour_shape.0 as f64;
+        let scale_x = width as f64 / colour_size.width as f64;
+        let scale_y = height as f64 / colour_size.height as f64;
         let mut seen = 0;
         for (i, (&z, &sure)) in metres.iter().zip(confidence).enumerate() {
             if z.is_nan() {
@@ -162,9 +163,15 @@ mod tests {
             cx: 63.5,
             cy: 47.5,
         };
-        for (colour, shape) in [(CAMERA, (48, 64)), (colour, (96, 128))] {
+        let sizes = [Size { width: 64, height: 48 }, Size { width: 128, height: 96 }];
+        for (colour, size) in [CAMERA, colour].into_iter().zip(sizes) {
             let cameras = Cameras::concentric(colour, CAMERA);
-            cameras.reproject((48, 64), shape, (&metres, &sure), (&mut to, &mut to_sure));
+            cameras.reproject(
+                Size { width: 64, height: 48 },
+                size,
+                (&metres, &sure),
+                (&mut to, &mut to_sure),
+            );
             let kept = (metres.iter().zip(&to))
                 .filter(|(a, b)| (**a - **b).abs() < 1e-5)
                 .count();
@@ -187,7 +194,12 @@ mod tests {
             translation_m: [-0.1, 0.0, 0.0],
             ..Cameras::concentric(CAMERA, CAMERA)
         };
-        let seen = cameras.reproject((48, 64), (48, 64), (&metres, &sure), (&mut to, &mut to_sure));
+        let seen = cameras.reproject(
+            Size { width: 64, height: 48 },
+            Size { width: 64, height: 48 },
+            (&metres, &sure),
+            (&mut to, &mut to_sure),
+        );
         let row = &to[24 * 64..25 * 64];
         assert!(row[20..34].iter().all(|z| (*z - 1.0).abs() < 1e-6), "{row:?}");
         assert!(row[36..37].iter().all(|z| z.is_nan()), "{row:?}");

@@ -62,16 +62,16 @@ impl<'a> CameraFrame<'a> {
         let Some(depth) = &self.depth else {
             return Ok(());
         };
-        let ((height, width), (depth_height, depth_width)) = (self.colour.shape(), depth.shape());
+        let (colour, size) = (self.colour.size(), depth.size());
         match self.alignment {
             Alignment::Aligned => {
-                let ratio = (width * depth_height) as f64 / (height * depth_width) as f64;
+                let ratio = (colour.width * size.height) as f64 / (colour.height * size.width) as f64;
                 // A rounding difference of one pixel in a small image does not change the field of view.
-                let rounding = 1.0 / depth_height.min(depth_width) as f64;
+                let rounding = 1.0 / size.height.min(size.width) as f64;
                 match (ratio - 1.0).abs() <= ASPECT_TOLERANCE.max(rounding) {
                     true => Ok(()),
                     false => Err(Error::Frame(format!(
-                        "depth is {depth_width}×{depth_height}, colour {width}×{height}: their aspect ratios differ, so they do not show the same field of view; give the intrinsics of both cameras"
+                        "depth is {size}, colour {colour}: their aspect ratios differ, so they do not show the same field of view; give the intrinsics of both cameras"
                     ))),
                 }
             }

@@ -33,6 +33,7 @@ mod register;
 mod smooth;
 mod surfaces;
 
+use crate::Size;
 use crate::depth::{no_reading, sharpness};
 use crate::frame::Crop;
 use crate::runtime::error::{Error, Result};
@@ -50,8 +51,8 @@ use smooth::SmoothScratch;
 /// A plan for one shape of depth and of colour. It is immutable and can be shared between threads.
 #[derive(Debug, Clone)]
 pub struct Conditioner {
-    depth: (usize, usize),
-    out: (usize, usize),
+    depth: Size,
+    out: Size,
     crop: Crop,
     registers: bool,
 }
@@ -90,17 +91,17 @@ impl ConditionScratch {
 }
 
 impl Conditioner {
-    /// Plans the conditioning of the part `crop` of (h, w) = `depth` readings for (H, W) = `out`. If `aligned`, the
+    /// Plans the conditioning of the part `crop` of `depth` readings for the size `out`. If `aligned`, the
     /// edges of depth and colour already coincide, and no shift is searched.
     ///
     /// # Errors
     /// Returns an error if a side lies outside 1..=65536.
-    pub fn new(depth: (usize, usize), crop: Crop, out: (usize, usize), aligned: bool) -> Result<Self> {
-        let sides = [depth.0, depth.1, out.0, out.1];
+    pub fn new(depth: Size, crop: Crop, out: Size, aligned: bool) -> Result<Self> {
+        let sides = [depth.height, depth.width, out.height, out.width];
         if sides.contains(&0) || sides.iter().any(|n| *n > 1 << 16) {
             return Err(Error::Setting(format!(
                 "depth of {}×{} for a frame of {}×{}: each side must lie in 1..=65536",
-                depth.1, depth.0, out.1, out.0
+                depth.width, depth.height, out.width, out.height
             )));
         }
         Ok(Conditioner {
@@ -112,19 +113,19 @@ impl Conditioner {
     }
 
     /// Returns (H, W) of the conditioned depth.
-    pub fn shape(&self) -> (usize, usize) {
+    pub fn size(&self) -> Size {
         self.out
     }
 
     /// Allocates working memory for one call at a time.
     pub fn scratch(&self) -> ConditionScratch {
-        let size = self.depth.0 * self.depth.1;
+        let size = self.depth.height * self.depth.width;
         ConditionScratch {
             registration: self
                 .registers
                 .then(|| Registration::new(self.depth, self.crop, self.out)),
-            x: AxisMap::new(self.depth.1, self.out.1),
-            y: AxisMap::new(self.depth.0, self.out.0),
+            x: AxisMap::new(self.depth.width, self.out.width),
+            y: AxisMap::new(self.depth.height, self.out.height),
             readings: vec![0.0; size],
             before: vec![0.0; size],
             filled: vec![false; size],
@@ -135,7 +136,7 @@ impl Conditioner {
             colours: vec![Moments::default(); size],
             fill: FillScratch::new(size),
             smooth: SmoothScratch::new(self.depth),
-            pixels: Pixels::new(self.depth.0, self.out),
+            pixels: Pixels::new(self.depth.height, self.out),
         }
     }
 
@@ -164,14 +165,14 @@ impl Conditioner {
     /// # Panics
     /// Panics if a length does not match its shape.
     pub fn find(&self, depth: &[f32], rgb: &[f32], scratch: &mut ConditionScratch) -> Result<()> {
-        assert_eq!(depth.len(), self.depth.0 * self.depth.1);
-        assert_eq!(rgb.len(), 3 * self.out.0 * self.out.1);
+        assert_eq!(depth.len(), self.depth.height * self.depth.width);
+        assert_eq!(rgb.len(), 3 * self.out.height * self.out.width);
         if depth.iter().all(|d| d.is_nan()) {
             return Err(no_reading());
         }
         let growth = self.place(depth, rgb, scratch);
         self.fill(depth, rgb, growth, scratch);
-        let clean = self.depth == self.out && sharpness::is_clean(rgb, &scratch.readings, self.depth.1);
+        let clean = self.depth == self.out && sharpness::is_clean(rgb, &scratch.readings, self.depth.width);
         if clean {
             scratch.kinds.fill(Kind::Inside);
         } else {
@@ -204,15 +205,15 @@ impl Conditioner {
     /// # Panics
     /// Panics if a length does not match its shape.
     pub fn decide(&self, rgb: &[f32], to: &mut [f32], scratch: &mut ConditionScratch) {
-        assert_eq!(rgb.len(), 3 * self.out.0 * self.out.1);
-        assert_eq!(to.len(), self.out.0 * self.out.1);
+        assert_eq!(rgb.len(), 3 * self.out.height * self.out.width);
+        assert_eq!(to.len(), self.out.height * self.out.width);
         let _stage = stage!("surfaces");
         let axes = (&scratch.x, &scratch.y);
         let edges = (&scratch.kinds[..], Kind::is_at_edge);
         colour::colours(rgb, axes, 1, edges, &mut scratch.colours);
         let readings = surfaces::Readings {
             depth: &scratch.readings,
-            width: self.depth.1,
+            width: self.depth.width,
             are_coarse: self.are_coarse(),
             kinds: &scratch.kinds,
             colours: &scratch.colours,
@@ -239,7 +240,7 @@ impl Conditioner {
 
     /// Narrows near surfaces by `growth` readings and fills holes.
     fn fill(&self, depth: &[f32], rgb: &[f32], growth: usize, scratch: &mut ConditionScratch) {
-        let width = self.depth.1;
+        let width = self.depth.width;
         let stage = stage!("narrow");
         narrow::narrow(depth, width, growth, &mut scratch.readings);
         stage.end();
@@ -259,7 +260,7 @@ impl Conditioner {
 
     /// Smooths the readings, finds their kinds, and replaces contradicted readings.
     fn find_edges(&self, rgb: &[f32], scratch: &mut ConditionScratch) {
-        let (axes, width) = ((&scratch.x, &scratch.y), self.depth.1);
+        let (axes, width) = ((&scratch.x, &scratch.y), self.depth.width);
         let stage = stage!("smooth");
         smooth::smooth(&mut scratch.readings, width, &mut scratch.smooth);
         stage.end();

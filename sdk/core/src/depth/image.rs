@@ -1,5 +1,6 @@
 //! Conversion of the depth images and confidence maps of phones to metres and confidences in 0..=1.
 
+use crate::Size;
 use crate::depth::{DepthUnit, NO_READING_FROM};
 use crate::frame::{Plane, check_size};
 use crate::runtime::error::{Error, Result};
@@ -131,49 +132,41 @@ impl ConfidenceFormat {
 #[derive(Debug, Clone, Copy)]
 pub struct DepthImage<'a> {
     format: DepthFormat,
-    width: usize,
-    height: usize,
+    size: Size,
     plane: Plane<'a>,
     confidence: Option<(ConfidenceFormat, Plane<'a>)>,
 }
 
 impl<'a> DepthImage<'a> {
-    /// Creates a depth image of `width` × `height` pixels in `plane`.
+    /// Creates a depth image of `size` in `plane`.
     ///
     /// # Errors
     /// Returns [`Error::Frame`] if the image is empty or too large, a stride is too small, or the plane has too few
     /// bytes.
-    pub fn new(format: DepthFormat, width: usize, height: usize, plane: Plane<'a>) -> Result<Self> {
-        check_size("depth", width, height)?;
-        plane.check("depth", width, height, format.pixel_bytes())?;
+    pub fn new(format: DepthFormat, size: Size, plane: Plane<'a>) -> Result<Self> {
+        check_size("depth", size)?;
+        plane.check("depth", size, format.pixel_bytes())?;
         Ok(DepthImage {
             format,
-            width,
-            height,
+            size,
             plane,
             confidence: None,
         })
     }
 
-    /// Adds a confidence map of `width` × `height` pixels. The confidence of a reading is the lower of the map's and
+    /// Adds a confidence map of `size`. The confidence of a reading is the lower of the map's and
     /// the depth format's own.
     ///
     /// # Errors
     /// Returns an error in the cases of [`Self::new`], or if the map's size differs from the depth's.
-    pub fn with_confidence(
-        mut self,
-        format: ConfidenceFormat,
-        width: usize,
-        height: usize,
-        plane: Plane<'a>,
-    ) -> Result<Self> {
-        if (width, height) != (self.width, self.height) {
+    pub fn with_confidence(mut self, format: ConfidenceFormat, size: Size, plane: Plane<'a>) -> Result<Self> {
+        if size != self.size {
             return Err(Error::Frame(format!(
-                "confidence is {width}×{height} and depth {}×{}; they must be alike",
-                self.width, self.height
+                "confidence is {size} and depth {}; they must be alike",
+                self.size
             )));
         }
-        plane.check("confidence", width, height, 1)?;
+        plane.check("confidence", size, 1)?;
         self.confidence = Some((format, plane));
         Ok(self)
     }
@@ -183,9 +176,9 @@ impl<'a> DepthImage<'a> {
         self.format
     }
 
-    /// Returns (H, W) in the sensor's orientation.
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    /// Returns the size in the sensor's orientation.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns the plane of readings.
@@ -207,11 +200,11 @@ impl<'a> DepthImage<'a> {
     /// # Panics
     /// Panics if `values` or `confidence` does not have H·W values.
     pub fn readings(&self, least: f32, values: &mut [f32], confidence: &mut [f32]) -> usize {
-        assert_eq!(values.len(), self.width * self.height);
-        assert_eq!(confidence.len(), self.width * self.height);
+        assert_eq!(values.len(), self.size.pixels());
+        assert_eq!(confidence.len(), self.size.pixels());
         let rows = values
-            .chunks_exact_mut(self.width)
-            .zip(confidence.chunks_exact_mut(self.width));
+            .chunks_exact_mut(self.size.width)
+            .zip(confidence.chunks_exact_mut(self.size.width));
         let mut valid = 0;
         for (y, (values, confidences)) in rows.enumerate() {
             for (x, (value, confidence)) in values.iter_mut().zip(confidences).enumerate() {
@@ -330,10 +323,11 @@ mod tests {
                     .map(|_| random.random())
                     .collect();
                 let map: Vec<u8> = (0..h * (2 * w + 1)).map(|_| random.random_range(0..=255)).collect();
-                let mut image = DepthImage::new(format, w, h, Plane::new(&bytes, row, pixel)).unwrap();
+                let mut image =
+                    DepthImage::new(format, Size { width: w, height: h }, Plane::new(&bytes, row, pixel)).unwrap();
                 if let Some(format) = confidences {
                     image = image
-                        .with_confidence(format, w, h, Plane::new(&map, 2 * w + 1, 2))
+                        .with_confidence(format, Size { width: w, height: h }, Plane::new(&map, 2 * w + 1, 2))
                         .unwrap();
                 }
                 let (mut values, mut sure) = (vec![9.0; w * h], vec![9.0; w * h]);
@@ -357,7 +351,13 @@ mod tests {
     #[test]
     fn images_that_are_not_whole_are_named() {
         let bytes = [0; 60];
-        let image = |w, h, row, pixel| DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&bytes, row, pixel));
+        let image = |w, h, row, pixel| {
+            DepthImage::new(
+                DepthFormat::MetresF32,
+                Size { width: w, height: h },
+                Plane::new(&bytes, row, pixel),
+            )
+        };
         for (refused, word) in [
             (image(0, 3, 20, 4), "empty"),
             (image(7680, 4320, 30720, 4), "too large"),
@@ -365,13 +365,23 @@ mod tests {
             (image(5, 3, 19, 4), "row stride of 19"),
             (image(5, 3, 20, 2), "pixel stride of 2"),
             (
-                image(5, 3, 20, 4)
-                    .and_then(|i| i.with_confidence(ConfidenceFormat::U8, 4, 3, Plane::new(&bytes, 4, 1))),
+                image(5, 3, 20, 4).and_then(|i| {
+                    i.with_confidence(
+                        ConfidenceFormat::U8,
+                        Size { width: 4, height: 3 },
+                        Plane::new(&bytes, 4, 1),
+                    )
+                }),
                 "confidence is 4×3 and depth 5×3",
             ),
             (
-                image(5, 3, 20, 4)
-                    .and_then(|i| i.with_confidence(ConfidenceFormat::U8, 5, 3, Plane::new(&bytes, 4, 1))),
+                image(5, 3, 20, 4).and_then(|i| {
+                    i.with_confidence(
+                        ConfidenceFormat::U8,
+                        Size { width: 5, height: 3 },
+                        Plane::new(&bytes, 4, 1),
+                    )
+                }),
                 "confidence: a row stride of 4",
             ),
         ] {

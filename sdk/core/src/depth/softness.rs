@@ -5,6 +5,7 @@
 //! Conditioning makes a soft edge sharp in the middle, so the measure compares the largest step of an edge with the
 //! whole change around it.
 
+use crate::Size;
 use crate::frame::RgbdFrame;
 use rayon::prelude::*;
 
@@ -46,8 +47,8 @@ pub fn is_soft(sharp_edges: f32, was: Option<bool>) -> bool {
 /// Runs on the current thread pool. Does not allocate.
 pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
     let depth = frame.values().1;
-    let (height, width) = frame.shape();
-    let (window, every) = scale(height, width);
+    let Size { width, height } = frame.size();
+    let (window, every) = scale(frame.size());
     let part = |part: usize, of: usize| (part * LINES..((part + 1) * LINES).min(of)).step_by(every);
     let rows = (0..height.div_ceil(LINES)).into_par_iter();
     let rows = rows.map(|i| edges(depth, part(i, height), width, (1, width), window));
@@ -57,11 +58,10 @@ pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
     share(sharp, all)
 }
 
-/// Returns the number of steps of a window of frames of (`height`, `width`), and the number of lines of which one is
-/// measured.
+/// Returns the number of steps of a window of frames of `size`, and the number of lines of which one is measured.
 #[doc(hidden)]
-pub fn scale(height: usize, width: usize) -> (usize, usize) {
-    let longer = height.max(width);
+pub fn scale(size: Size) -> (usize, usize) {
+    let longer = size.height.max(size.width);
     ((longer / WINDOWS).max(LEAST_WINDOW), (longer / MEASURED).max(1))
 }
 

@@ -7,6 +7,7 @@ use super::condition::{ConditionScratch, ConditionedReadings, Conditioner};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::smoothing::Smoother;
+use crate::Size;
 use crate::frame::{Crop, Orientation, Plane};
 use crate::runtime::error::{Error, Result};
 use ndarray::Array2;
@@ -62,9 +63,9 @@ pub struct DepthReport {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Layout {
     format: DepthFormat,
-    sensor: (usize, usize),
+    sensor: Size,
     orientation: Orientation,
-    colour: (usize, usize),
+    colour: Size,
     cameras: Option<Cameras>,
 }
 
@@ -81,7 +82,7 @@ struct Plan {
 /// Processes the depth of a sequence of frames for one display shape.
 pub struct DepthStream {
     options: DepthOptions,
-    out: (usize, usize),
+    out: Size,
     range: RangeTracker,
     /// The range of relative depth, which has no metres.
     relative_range: RangeTracker,
@@ -90,11 +91,11 @@ pub struct DepthStream {
 }
 
 impl DepthStream {
-    /// Creates a stream with depth of (H, W) = `out`.
+    /// Creates a stream with depth of the size `out`.
     ///
     /// # Errors
     /// Returns an error if [`DepthOptions::check`] does.
-    pub fn new(options: DepthOptions, out: (usize, usize)) -> Result<Self> {
+    pub fn new(options: DepthOptions, out: Size) -> Result<Self> {
         options.check()?;
         Ok(DepthStream {
             options,
@@ -174,9 +175,9 @@ impl DepthStream {
         };
         let layout = Layout {
             format: image.format(),
-            sensor: image.shape(),
+            sensor: image.size(),
             orientation: frame.orientation,
-            colour: frame.colour.shape(),
+            colour: frame.colour.size(),
             cameras: match frame.alignment {
                 Alignment::Aligned => None,
                 Alignment::Cameras(cameras) => Some(cameras),
@@ -203,13 +204,12 @@ impl DepthStream {
         let bytes: Vec<u8> = estimate.iter().flat_map(|v| v.to_le_bytes()).collect();
         let image = DepthImage::new(
             DepthFormat::RelativeF32,
-            width,
-            height,
+            Size { width, height },
             Plane::new(&bytes, 4 * width, 4),
         )?;
         let layout = Layout {
             format: image.format(),
-            sensor: image.shape(),
+            sensor: image.size(),
             orientation: Orientation::default(),
             colour: self.out,
             cameras: None,
@@ -240,11 +240,11 @@ impl DepthStream {
         if found == 0 {
             return Err(Error::Frame(format!(
                 "depth has no usable reading in {}×{} pixels; at least one must be valid and of confidence {} or more",
-                layout.sensor.1, layout.sensor.0, self.options.least_confidence
+                layout.sensor.width, layout.sensor.height, self.options.least_confidence
             )));
         }
         let elapsed = elapsed.unwrap_or_default();
-        let width = plan.upright().1;
+        let width = plan.upright().width;
         let metric = layout.format.is_metric();
         if metric {
             self.smoother.smooth(&mut plan.values, width, elapsed, true);
@@ -279,15 +279,16 @@ impl DepthStream {
 }
 
 impl Plan {
-    fn new(layout: Layout, out: (usize, usize)) -> Result<Self> {
-        let (height, width) = layout.sensor;
-        let upright = layout.orientation.upright_shape(height, width);
-        let colour = layout.orientation.upright_shape(layout.colour.0, layout.colour.1);
-        let crop =
-            Crop::cover(colour, out).scaled(upright.1 as f64 / colour.1 as f64, upright.0 as f64 / colour.0 as f64);
+    fn new(layout: Layout, out: Size) -> Result<Self> {
+        let upright = layout.orientation.upright_size(layout.sensor);
+        let colour = layout.orientation.upright_size(layout.colour);
+        let crop = Crop::cover(colour, out).scaled(
+            upright.width as f64 / colour.width as f64,
+            upright.height as f64 / colour.height as f64,
+        );
         let conditioner = Conditioner::new(upright, crop, out, layout.cameras.is_some())?;
         let scratch = conditioner.scratch();
-        let plane = || vec![f32::NAN; height * width];
+        let plane = || vec![f32::NAN; layout.sensor.pixels()];
         Ok(Plan {
             layout,
             conditioner,
@@ -298,9 +299,8 @@ impl Plan {
         })
     }
 
-    fn upright(&self) -> (usize, usize) {
-        let (height, width) = self.layout.sensor;
-        self.layout.orientation.upright_shape(height, width)
+    fn upright(&self) -> Size {
+        self.layout.orientation.upright_size(self.layout.sensor)
     }
 
     /// Reads `image`, aligned with the colour and upright, into `values` and `confidence`, and returns the number of
@@ -317,12 +317,12 @@ impl Plan {
             self.take_moved();
         }
         if self.layout.orientation != Orientation::default() {
-            let (_, width) = self.upright();
+            let Size { width, .. } = self.upright();
             for i in 0..self.values.len() {
                 let sensor = self.layout.sensor;
                 let (x, y) = self.layout.orientation.sensor_pixel(i % width, i / width, sensor);
-                self.moved.0[i] = self.values[y * sensor.1 + x];
-                self.moved.1[i] = self.confidence[y * sensor.1 + x];
+                self.moved.0[i] = self.values[y * sensor.width + x];
+                self.moved.1[i] = self.confidence[y * sensor.width + x];
             }
             self.take_moved();
         }

@@ -3,6 +3,7 @@
 //! about [`DEFAULT_SIDE`], and both sides are multiples of [`MULTIPLE`].
 
 use super::{ColourScale, one_line};
+use crate::Size;
 use crate::frame::Axis;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::infer::Factoid;
@@ -33,9 +34,9 @@ impl ColourScale {
 pub(super) struct Picture {
     colours: ColourScale,
     /// (H, W) of the picture.
-    from: (usize, usize),
+    from: Size,
     /// (h, w) of the network.
-    to: (usize, usize),
+    to: Size,
     rows: Axis,
     columns: Axis,
     /// Whether colours are the last axis.
@@ -44,12 +45,8 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// Reads the input of `model` for a picture of (H, W) = `from`.
-    pub(super) fn of(
-        model: &InferenceModel,
-        from: (usize, usize),
-        colours: ColourScale,
-    ) -> std::result::Result<Self, String> {
+    /// Reads the input of `model` for a picture of the size `from`.
+    pub(super) fn of(model: &InferenceModel, from: Size, colours: ColourScale) -> std::result::Result<Self, String> {
         let inputs = model.inputs.len();
         if inputs != 1 {
             return Err(format!("takes {inputs} inputs; a depth network takes one picture"));
@@ -72,8 +69,8 @@ impl Picture {
         if batch.is_some_and(|n| n != 1) || channels.is_some_and(|n| n != 3) {
             return Err("takes more than one picture at a time".into());
         }
-        let open = open_sides(from);
-        let (height, width) = (rows.unwrap_or(open.0), columns.unwrap_or(open.1));
+        let open = open_size(from);
+        let (height, width) = (rows.unwrap_or(open.height), columns.unwrap_or(open.width));
         if height.saturating_mul(width) > MOST_PIXELS || height * width == 0 {
             return Err(format!(
                 "takes pictures of {width}×{height}; {MOST_PIXELS} pixels are the most"
@@ -89,21 +86,21 @@ impl Picture {
         Ok(Picture {
             colours,
             from,
-            to: (height, width),
-            rows: Axis::new(from.0, 0.0, from.0 as f64, height),
-            columns: Axis::new(from.1, 0.0, from.1 as f64, width),
+            to: Size { width, height },
+            rows: Axis::new(from.height, 0.0, from.height as f64, height),
+            columns: Axis::new(from.width, 0.0, from.width as f64, width),
             interleaved,
             bytes: kind == Some(DatumType::U8),
         })
     }
 
-    /// Returns the (h, w) that the network takes.
-    pub(super) fn to(&self) -> (usize, usize) {
+    /// Returns the size that the network takes.
+    pub(super) fn to(&self) -> Size {
         self.to
     }
 
     fn shape(&self) -> [usize; 4] {
-        let (height, width) = self.to;
+        let Size { width, height } = self.to;
         if self.interleaved {
             [1, height, width, 3]
         } else {
@@ -121,17 +118,17 @@ impl Picture {
 
     /// Converts `rgb`, (3, H, W) in 0..=1, to the network's size, numbers and order.
     pub(super) fn tensor(&self, rgb: &[f32]) -> TractResult<Tensor> {
-        let ((from_height, from_width), (height, width)) = (self.from, self.to);
-        assert_eq!(rgb.len(), 3 * from_height * from_width);
+        let Size { width, height } = self.to;
+        assert_eq!(rgb.len(), 3 * self.from.pixels());
         let mut values = vec![0.0; 3 * height * width];
         let (step, apart) = if self.interleaved { (3, 1) } else { (1, height * width) };
-        let (mut sum, mut row) = (vec![0.0; from_width], vec![0.0; width]);
+        let (mut sum, mut row) = (vec![0.0; self.from.width], vec![0.0; width]);
         let needed = self.columns.needed();
-        for (colour, plane) in rgb.chunks_exact(from_height * from_width).enumerate() {
+        for (colour, plane) in rgb.chunks_exact(self.from.pixels()).enumerate() {
             for y in 0..height {
                 sum.fill(0.0);
                 for (source, weight) in self.rows.taps(y) {
-                    let source = &plane[source * from_width..][..from_width];
+                    let source = &plane[source * self.from.width..][..self.from.width];
                     sum.iter_mut().zip(source).for_each(|(sum, v)| *sum += weight * v);
                 }
                 self.columns.apply(&sum[needed.clone()], needed.start, &mut row);
@@ -158,18 +155,21 @@ impl Picture {
 
 impl std::fmt::Debug for Picture {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{:?} for {:?}, {:?}", self.shape(), self.from, self.colours)
+        write!(f, "{:?} for {}, {:?}", self.shape(), self.from, self.colours)
     }
 }
 
-/// Returns (h, w) for a network that takes any size.
-fn open_sides((height, width): (usize, usize)) -> (usize, usize) {
+/// Returns the size for a network that takes any size.
+fn open_size(Size { width, height }: Size) -> Size {
     let scale = DEFAULT_SIDE as f64 / height.min(width) as f64;
     let side = |side: usize| {
         let steps = (side as f64 * scale / MULTIPLE as f64).round() as usize;
         steps.clamp(1, 16) * MULTIPLE
     };
-    (side(height), side(width))
+    Size {
+        width: side(width),
+        height: side(height),
+    }
 }
 
 #[cfg(test)]
@@ -177,10 +177,37 @@ mod tests {
     use super::*;
 
     #[test]
-    fn open_sides_keep_the_proportion_in_multiples() {
-        assert_eq!(open_sides((480, 640)), (448, 672));
-        assert_eq!(open_sides((1080, 1920)), (448, 896));
-        assert_eq!(open_sides((10, 4000)), (448, 3584));
+    fn open_sizes_keep_the_proportion_in_multiples() {
+        assert_eq!(
+            open_size(Size {
+                width: 640,
+                height: 480
+            }),
+            Size {
+                width: 672,
+                height: 448
+            }
+        );
+        assert_eq!(
+            open_size(Size {
+                width: 1920,
+                height: 1080
+            }),
+            Size {
+                width: 896,
+                height: 448
+            }
+        );
+        assert_eq!(
+            open_size(Size {
+                width: 4000,
+                height: 10
+            }),
+            Size {
+                width: 3584,
+                height: 448
+            }
+        );
     }
 
     #[test]
@@ -199,8 +226,8 @@ mod tests {
         for (interleaved, bytes) in [(false, false), (true, false), (false, true), (true, true)] {
             let picture = Picture {
                 colours: ColourScale::Signed,
-                from: (height, width),
-                to: (height, width),
+                from: Size { width, height },
+                to: Size { width, height },
                 rows: Axis::new(height, 0.0, height as f64, height),
                 columns: Axis::new(width, 0.0, width as f64, width),
                 interleaved,

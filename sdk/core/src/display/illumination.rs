@@ -4,6 +4,7 @@
 //! Beams are smooth, so the map is coarse. It is interpolated linearly between nodes that are evenly spaced from the
 //! first to the last pixel of each axis.
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use ndarray::{ArrayView3, Axis};
 use num_complex::Complex32;
@@ -72,13 +73,13 @@ impl Illumination {
         &self.gain
     }
 
-    /// Returns the reciprocal amplitude at pixel (`x`, `y`) of a (`height`, `width`) modulator, interpolated in y, then
+    /// Returns the reciprocal amplitude at pixel (`x`, `y`) of a modulator of `size`, interpolated in y, then
     /// in x. Tests compare [`Self::divide`] with it.
     ///
     /// # Panics
     /// Panics if the map has no such colour or the pixel lies outside the modulator.
     #[doc(hidden)]
-    pub fn gain(&self, colour: usize, y: usize, x: usize, (height, width): (usize, usize)) -> f32 {
+    pub fn gain(&self, colour: usize, y: usize, x: usize, Size { width, height }: Size) -> f32 {
         assert!(y < height && x < width);
         let (i, fy) = split(y, height, self.nodes.0);
         let (j, fx) = split(x, width, self.nodes.1);
@@ -94,15 +95,15 @@ impl Illumination {
         top + (bottom - top) * fy
     }
 
-    /// Divides `field` by the laser's amplitude. `field` has shape (C, H, W), with (H, W) = `shape`, and lies in the
-    /// middle of a `modulator` of (H, W) pixels. If an axis of the modulator is shorter than the field, the field's
+    /// Divides `field` by the laser's amplitude. `field` is (C, H, W), a plane of `size` for each colour, and lies in the
+    /// middle of a `modulator` of that size. If an axis of the modulator is shorter than the field, the field's
     /// length is used. Does not allocate.
     ///
     /// # Panics
     /// Panics if `field` does not have C·H·W values.
     #[doc(hidden)]
-    pub fn divide(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
-        self.each_row(field, shape, modulator, |value, gain| *value *= gain);
+    pub fn divide(&self, field: &mut [Complex32], size: Size, modulator: Size) {
+        self.each_row(field, size, modulator, |value, gain| *value *= gain);
     }
 
     /// Multiplies `field` by the laser's amplitude, as the inverse of [`Self::divide`]. This simulates the illumination
@@ -111,26 +112,26 @@ impl Illumination {
     /// # Panics
     /// Panics if `field` does not have C·H·W values.
     #[doc(hidden)]
-    pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
-        self.each_row(field, shape, modulator, |value, gain| *value /= gain);
+    pub fn shine(&self, field: &mut [Complex32], size: Size, modulator: Size) {
+        self.each_row(field, size, modulator, |value, gain| *value /= gain);
     }
 
     /// Divides row `row` of a stack of planes with `height` rows, like [`Self::divide`].
     #[doc(hidden)]
-    pub fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: (usize, usize)) {
+    pub fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: Size) {
         wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }
 
     /// Fills `light` with the laser's amplitude on row `row` of a stack of planes with `height` rows. The maximum is 1.
-    pub(crate) fn light_row(&self, light: &mut [f32], row: usize, height: usize, modulator: (usize, usize)) {
+    pub(crate) fn light_row(&self, light: &mut [f32], row: usize, height: usize, modulator: Size) {
         wide!(self.change_row(light, row, height, modulator, |light, gain| *light = 1.0 / gain));
     }
 
     fn each_row(
         &self,
         field: &mut [Complex32],
-        (height, width): (usize, usize),
-        modulator: (usize, usize),
+        Size { width, height }: Size,
+        modulator: Size,
         change: impl Fn(&mut Complex32, f32) + Sync,
     ) {
         assert_eq!(field.len(), self.colours() * height * width);
@@ -146,11 +147,11 @@ impl Illumination {
         mut values: &mut [T],
         row: usize,
         height: usize,
-        modulator: (usize, usize),
+        modulator: Size,
         change: impl Fn(&mut T, f32),
     ) {
         let width = values.len();
-        let (rows, columns) = (modulator.0.max(height), modulator.1.max(width));
+        let (rows, columns) = (modulator.height.max(height), modulator.width.max(width));
         let (top, left) = ((rows - height) / 2, (columns - width) / 2);
         let (i, fy) = split(row % height + top, rows, self.nodes.0);
         let (colour, end) = (row / height, left + width);
@@ -189,7 +190,8 @@ mod tests {
     use super::*;
     use ndarray::Array3;
 
-    fn beam(rows: usize, columns: usize) -> Array3<f32> {
+    fn beam(nodes: (usize, usize)) -> Array3<f32> {
+        let (rows, columns) = nodes;
         Array3::from_shape_fn((3, rows, columns), |(c, y, x)| {
             let (u, v) = (x as f32 / columns as f32 - 0.5, y as f32 / rows as f32 - 0.45);
             (c as f32 + 1.0) * (-(u * u + v * v) * (2.0 + c as f32)).exp()
@@ -198,22 +200,49 @@ mod tests {
 
     #[test]
     fn rows_agree_with_the_value_by_value_form() {
-        for shape in [(7, 33), (1, 1), (40, 3), (2, 64)] {
+        for size in [
+            Size { width: 33, height: 7 },
+            Size { width: 1, height: 1 },
+            Size { width: 3, height: 40 },
+            Size { width: 64, height: 2 },
+        ] {
             for nodes in [(2, 2), (5, 9), (50, 70)] {
-                let map = Illumination::new(beam(nodes.0, nodes.1).view()).unwrap();
-                let (h, w) = shape;
+                let map = Illumination::new(beam(nodes).view()).unwrap();
+                let Size { width: w, height: h } = size;
                 let plane = |i: usize| Complex32::new(1.0 + i as f32, -0.5);
                 let field: Vec<_> = (0..3 * h * w).map(plane).collect();
                 let mut divided = field.clone();
-                map.divide(&mut divided, shape, (h + 5, w + 8));
+                map.divide(
+                    &mut divided,
+                    size,
+                    Size {
+                        width: w + 8,
+                        height: h + 5,
+                    },
+                );
                 for (i, value) in divided.iter().enumerate() {
                     // The modulator has five more rows and eight more columns: two rows above, four columns on the
                     // left.
                     let (y, x) = (i / w % h + 2, i % w + 4);
-                    let gain = map.gain(i / (h * w), y, x, (h + 5, w + 8));
-                    assert_eq!(*value, field[i] * gain, "{shape:?} {nodes:?} {i}");
+                    let gain = map.gain(
+                        i / (h * w),
+                        y,
+                        x,
+                        Size {
+                            width: w + 8,
+                            height: h + 5,
+                        },
+                    );
+                    assert_eq!(*value, field[i] * gain, "{size} {nodes:?} {i}");
                 }
-                map.shine(&mut divided, shape, (h + 5, w + 8));
+                map.shine(
+                    &mut divided,
+                    size,
+                    Size {
+                        width: w + 8,
+                        height: h + 5,
+                    },
+                );
                 for (a, b) in divided.iter().zip(&field) {
                     assert!((a - b).norm() < 1e-5 * b.norm());
                 }
@@ -223,12 +252,15 @@ mod tests {
 
     #[test]
     fn corners_are_nodes_and_gains_are_bounded() {
-        let mut amplitude = beam(4, 5);
+        let mut amplitude = beam((4, 5));
         amplitude[(1, 0, 4)] = 0.0;
         let map = Illumination::new(amplitude.view()).unwrap();
         let most = amplitude.index_axis(Axis(0), 0).iter().copied().fold(0.0, f32::max);
-        assert_eq!(map.gain(0, 99, 49, (100, 50)), most / amplitude[(0, 3, 4)]);
-        assert_eq!(map.gain(1, 0, 49, (100, 50)), MAX_GAIN);
+        assert_eq!(
+            map.gain(0, 99, 49, Size { width: 50, height: 100 }),
+            most / amplitude[(0, 3, 4)]
+        );
+        assert_eq!(map.gain(1, 0, 49, Size { width: 50, height: 100 }), MAX_GAIN);
         assert!(map.gains().iter().all(|g| (1.0..=MAX_GAIN).contains(g)));
     }
 

@@ -10,6 +10,7 @@
 //! from there as on an ideal display. c is piecewise linear, A is bilinear over the first order, and L and Q are
 //! bilinear over the modulator. All are the same for each pixel of a colour otherwise.
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use std::f32::consts::TAU;
@@ -256,11 +257,11 @@ impl Model {
     }
 
     /// Returns L and Q of `colour` at pixel (`x`, `y`) of a modulator of (H, W) pixels.
-    pub fn light(&self, colour: usize, y: usize, x: usize, modulator: (usize, usize)) -> [Complex32; 2] {
+    pub fn light(&self, colour: usize, y: usize, x: usize, modulator: Size) -> [Complex32; 2] {
         let of = &self.colours[colour];
         let (row, column) = (
-            around(y, modulator.0, self.nodes.0),
-            around(x, modulator.1, self.nodes.1),
+            around(y, modulator.height, self.nodes.0),
+            around(x, modulator.width, self.nodes.1),
         );
         [&of.light, &of.undiffracted].map(|plane| blend(plane, self.nodes.1, row, column))
     }
@@ -383,10 +384,13 @@ mod tests {
     fn maps_are_bilinear() {
         let model = model();
         let colour = &model.colours()[0];
-        assert_eq!(model.light(0, 0, 0, (9, 11)), [colour.light[0], colour.undiffracted[0]]);
-        assert_eq!(model.light(0, 8, 10, (9, 11))[0], colour.light[5]);
+        assert_eq!(
+            model.light(0, 0, 0, Size { width: 11, height: 9 }),
+            [colour.light[0], colour.undiffracted[0]]
+        );
+        assert_eq!(model.light(0, 8, 10, Size { width: 11, height: 9 })[0], colour.light[5]);
         let between = (colour.light[1] + colour.light[4]) / 2.0;
-        assert!((model.light(0, 4, 5, (9, 11))[0] - between).norm() < 1e-6);
+        assert!((model.light(0, 4, 5, Size { width: 11, height: 9 })[0] - between).norm() < 1e-6);
         assert_eq!(colour.pupil_at(0.0, 0.0), colour.pupil[PUPIL / 2 * PUPIL + PUPIL / 2]);
         assert_eq!(colour.pupil_at(-0.5, 0.5), colour.pupil[(PUPIL - 1) * PUPIL]);
     }

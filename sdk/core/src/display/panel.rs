@@ -4,6 +4,7 @@
 //! The panel is applied between the encoder and the response, to phases in memory. The encoder's sweep does not depend
 //! on it.
 
+use crate::Size;
 use crate::display::{Display, check_colours};
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -31,52 +32,57 @@ pub struct Panel {
 /// Phases for each pixel of a modulator, with one map for all colours or one for each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flatness {
-    shape: (usize, usize),
+    size: Size,
     /// The phases, (1 or 3, H, W), in turns of 2π/65536.
     maps: Arc<[u16]>,
 }
 
 impl Flatness {
-    /// Creates the phases to add from `maps`, (1 or 3, H, W) with (H, W) = `shape`, in turns of 2π/65536.
+    /// Creates the phases to add from `maps`, (1 or 3, H, W), planes of `size`, in turns of 2π/65536.
     ///
     /// # Errors
-    /// Returns an error if the map is empty or its length does not match `shape`.
-    pub fn new(shape: (usize, usize), maps: Vec<u16>) -> Result<Self> {
-        let area = shape.0 * shape.1;
+    /// Returns an error if the map is empty or its length does not match `size`.
+    pub fn new(size: Size, maps: Vec<u16>) -> Result<Self> {
+        let area = size.height * size.width;
         if area == 0 || (maps.len() != area && maps.len() != 3 * area) {
             return Err(Error::Setting(format!(
                 "a flatness map of {} values for {}×{} pixels; there must be one for each, or one for each colour",
                 maps.len(),
-                shape.1,
-                shape.0
+                size.width,
+                size.height
             )));
         }
         Ok(Flatness {
-            shape,
+            size,
             maps: maps.into(),
         })
     }
 
-    /// Returns (H, W) of the modulator.
-    pub fn shape(&self) -> (usize, usize) {
-        self.shape
+    /// Returns the size of the modulator.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
-    /// Returns the map of the central (`height`, `width`) pixels, for a hologram smaller than the modulator.
+    /// Returns the part of the map of `size` in its middle, for a hologram smaller than the modulator.
     ///
     /// # Errors
     /// Returns an error if the map has fewer pixels.
-    pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
-        let (rows, columns) = self.shape;
+    pub fn centred(&self, size: Size) -> Result<Self> {
+        let Size { width, height } = size;
+        let Size {
+            width: columns,
+            height: rows,
+        } = self.size;
         if height > rows || width > columns {
             return Err(Error::Setting(format!(
-                "the flatness map is for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
+                "the flatness map is for {} pixels, the hologram has {size}; it must not be larger",
+                self.size
             )));
         }
         let (top, left) = ((rows - height) / 2, (columns - width) / 2);
         let maps = self.maps.chunks_exact(rows * columns);
         let middle = maps.flat_map(|map| (top..top + height).flat_map(move |y| &map[y * columns + left..][..width]));
-        Self::new((height, width), middle.copied().collect())
+        Self::new(Size { width, height }, middle.copied().collect())
     }
 
     /// Returns the maps, (1 or 3, H, W), in turns of 2π/65536.
@@ -113,23 +119,24 @@ impl Panel {
     /// finite, or the carrier and the lens change the phase by more than half a turn between neighbouring pixels.
     #[doc(hidden)]
     pub fn check(&self, display: &Display) -> Result<()> {
-        let (height, width) = (display.height(), display.width());
         if let Some(flatness) = &self.flatness
-            && flatness.shape != (height, width)
+            && flatness.size != display.size()
         {
             return Err(Error::Setting(format!(
-                "the flatness map is for {}×{} pixels, the display has {width}×{height}; both must be of one size",
-                flatness.shape.1, flatness.shape.0
+                "the flatness map is for {} pixels, the display has {}; both must be of one size",
+                flatness.size,
+                display.size()
             )));
         }
         if let Some(flatness) = &self.flatness
-            && flatness.maps.len() > height * width
+            && flatness.maps.len() > flatness.size.pixels()
         {
             check_colours("the flatness map", 3, display.colours())?;
         }
         if self.lens_m == Some(0.0) || self.lens_m.is_some_and(|f| !f.is_finite()) {
             return Err(Error::Setting("a lens of no focal length; it must not be 0".into()));
         }
+        let Size { width, height } = display.size();
         for (angle, pixels) in self.carrier_rad.into_iter().zip([width, height]) {
             let reach_m = pixels as f64 / 2.0 * display.pitch_m();
             let slope = angle.sin().abs() + self.lens_m.map_or(0.0, |f| reach_m / f.abs());
@@ -155,23 +162,23 @@ pub struct PanelPlan {
 }
 
 impl PanelPlan {
-    /// Plans (C, H, W) = `shape` phases for `display`, or returns `None` if `panel` adds nothing.
+    /// Plans phases of `size` for `display`, or returns `None` if `panel` adds nothing.
     ///
     /// # Errors
     /// Returns an error if a map is for another modulator, or if the carrier and the lens change the phase by more than
     /// half a turn between neighbouring pixels.
-    pub fn new(panel: &Panel, display: &Display, shape: (usize, usize)) -> Result<Option<Self>> {
+    pub fn new(panel: &Panel, display: &Display, size: Size) -> Result<Option<Self>> {
         panel.check(display)?;
         if panel.is_plain() {
             return Ok(None);
         }
         Ok(Some(PanelPlan {
             added: if panel.adds() {
-                added(panel, display, shape).into()
+                added(panel, display, size).into()
             } else {
                 Arc::new([])
             },
-            width: shape.1,
+            width: size.width,
             nearest: panel
                 .levels_turns
                 .as_deref()
@@ -245,11 +252,11 @@ fn radians(turns: u16) -> f32 {
 ///
 /// Light is exp(+i2πz/λ), so a wave that travels right at the angle θ is exp(i2πx·sin θ/λ), and a wave that converges
 /// at the distance f from the panel is exp(−iπ(x² + y²)/(λf)).
-fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> Vec<u16> {
-    let modulator = (display.height(), display.width());
+fn added(panel: &Panel, display: &Display, Size { width, height }: Size) -> Vec<u16> {
+    let modulator = display.size();
     let corner = (
-        (modulator.0 - height.min(modulator.0)) / 2,
-        (modulator.1 - width.min(modulator.1)) / 2,
+        (modulator.height - height.min(modulator.height)) / 2,
+        (modulator.width - width.min(modulator.width)) / 2,
     );
     let pitch_m = display.pitch_m();
     let place = |at: usize, pixels: usize| (at as f64 - (pixels as f64 - 1.0) / 2.0) * pitch_m;
@@ -265,9 +272,9 @@ fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> V
                     .lens_m
                     .map_or(0.0, |f| (x_m * x_m + y_m * y_m) / (2.0 * wavelength_m * f));
                 let flat = panel.flatness.as_ref().map_or(0, |flatness| {
-                    let area = modulator.0 * modulator.1;
+                    let area = modulator.height * modulator.width;
                     let of_colour = if flatness.maps.len() == area { 0 } else { colour * area };
-                    flatness.maps[of_colour + (y + corner.0) * modulator.1 + x + corner.1]
+                    flatness.maps[of_colour + (y + corner.0) * modulator.width + x + corner.1]
                 });
                 let turns = ((tilt - lens).rem_euclid(1.0) * 65536.0).round() as u32;
                 all.push((turns as u16).wrapping_add(flat));
@@ -343,12 +350,14 @@ mod tests {
         let panel = Panel {
             carrier_rad: [0.01, -0.004],
             lens_m: Some(0.2),
-            flatness: Some(Flatness::new((24, 40), maps.clone()).unwrap()),
+            flatness: Some(Flatness::new(Size { width: 40, height: 24 }, maps.clone()).unwrap()),
             levels_turns: None,
         };
         // A smaller hologram lies in the middle.
         let (height, width) = (10, 16);
-        let plan = PanelPlan::new(&panel, &display, (height, width)).unwrap().unwrap();
+        let plan = PanelPlan::new(&panel, &display, Size { width, height })
+            .unwrap()
+            .unwrap();
         let phases: Vec<f32> = (0..3 * 160).map(|i| (i % 63) as f32 * 0.1).collect();
         let mut shown = phases.clone();
         plan.add(&mut shown);
@@ -366,11 +375,20 @@ mod tests {
             }
         }
         let mut middle = panel.clone();
-        middle.flatness = Some(panel.flatness.as_ref().unwrap().centred(height, width).unwrap());
-        let small = display.clone().with_size(height, width).unwrap();
-        let of_middle = PanelPlan::new(&middle, &small, (height, width)).unwrap().unwrap();
+        middle.flatness = Some(
+            panel
+                .flatness
+                .as_ref()
+                .unwrap()
+                .centred(Size { width, height })
+                .unwrap(),
+        );
+        let small = display.clone().with_size(Size { width, height }).unwrap();
+        let of_middle = PanelPlan::new(&middle, &small, Size { width, height })
+            .unwrap()
+            .unwrap();
         assert_eq!(of_middle.added, plan.added);
-        assert!(panel.flatness.unwrap().centred(25, 40).is_err());
+        assert!(panel.flatness.unwrap().centred(Size { width: 40, height: 25 }).is_err());
         let mut field: Vec<Complex32> = shown.iter().map(|p| Complex32::from_polar(1.0, *p)).collect();
         plan.remove(&mut field);
         for (value, phase) in field.iter().zip(&phases) {
@@ -386,7 +404,9 @@ mod tests {
             carrier_rad: [0.008, 0.0],
             ..Panel::default()
         };
-        let plan = PanelPlan::new(&panel, &display, (64, 128)).unwrap().unwrap();
+        let plan = PanelPlan::new(&panel, &display, Size { width: 128, height: 64 })
+            .unwrap()
+            .unwrap();
         let distance_m = 20e-3;
         for (colour, wavelength_m) in display.wavelengths_m().iter().copied().enumerate() {
             // A beam 20 pixels wide that travels straight without the carrier.
@@ -397,7 +417,14 @@ mod tests {
             let mut plane: Vec<Complex32> = (0..64 * 128)
                 .map(|at| Complex32::from_polar(beam(at / 128, at % 128), plan.added(colour * 64 * 128 + at)))
                 .collect();
-            let way = Propagator::new(64, 128, 8e-6, wavelength_m, distance_m, Padding::Double).unwrap();
+            let way = Propagator::new(
+                Size { width: 128, height: 64 },
+                8e-6,
+                wavelength_m,
+                distance_m,
+                Padding::Double,
+            )
+            .unwrap();
             way.propagate(&mut plane, &mut way.scratch());
             let (mut sum, mut moved) = (0.0, 0.0);
             for (at, value) in plane.iter().enumerate() {
@@ -416,7 +443,9 @@ mod tests {
             levels_turns: Some(turns.clone()),
             ..Panel::default()
         };
-        let plan = PanelPlan::new(&panel, &display(), (1, 300)).unwrap().unwrap();
+        let plan = PanelPlan::new(&panel, &display(), Size { width: 300, height: 1 })
+            .unwrap()
+            .unwrap();
         // A ramp that rises and falls by three quarters of a turn across 2π.
         let ramp: Vec<f32> = (0..900)
             .map(|i| {
@@ -459,14 +488,27 @@ mod tests {
             (with([0.0; 2], Some(1e-3), None), "lens"),
             (with([0.0; 2], Some(0.0), None), "focal"),
             (
-                with([0.0; 2], None, Some(Flatness::new((4, 5), vec![0; 20]).unwrap())),
+                with(
+                    [0.0; 2],
+                    None,
+                    Some(Flatness::new(Size { width: 5, height: 4 }, vec![0; 20]).unwrap()),
+                ),
                 "5×4",
             ),
         ] {
-            let error = PanelPlan::new(&panel, &display(), (24, 40)).unwrap_err().to_string();
+            let error = PanelPlan::new(&panel, &display(), Size { width: 40, height: 24 })
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(word), "{panel:?}: {error}");
         }
-        assert!(PanelPlan::new(&with([0.99 * most, 0.0], None, None), &display(), (24, 40)).is_ok());
-        assert!(Flatness::new((4, 5), vec![0; 19]).is_err());
+        assert!(
+            PanelPlan::new(
+                &with([0.99 * most, 0.0], None, None),
+                &display(),
+                Size { width: 40, height: 24 }
+            )
+            .is_ok()
+        );
+        assert!(Flatness::new(Size { width: 5, height: 4 }, vec![0; 19]).is_err());
     }
 }

@@ -4,6 +4,7 @@
 //! A field is band-limited to the aperture, so values between pixels are interpolated with a windowed sinc (Lanczos,
 //! four lobes), first along rows, then along columns.
 
+use crate::Size;
 use crate::display::check_colours;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -79,11 +80,11 @@ struct Taps {
 }
 
 impl RegistrationPlan {
-    /// Plans the registration of `colours` planes of (H, W) = `shape`, or returns `None` if no colour moves.
+    /// Plans the registration of `colours` planes of `size`, or returns `None` if no colour moves.
     ///
     /// # Errors
     /// Returns an error if [`Registration::check`] does.
-    pub(crate) fn new((height, width): (usize, usize), colours: usize, of: &Registration) -> Result<Option<Self>> {
+    pub(crate) fn new(Size { width, height }: Size, colours: usize, of: &Registration) -> Result<Option<Self>> {
         of.check(colours)?;
         if !of.moves() {
             return Ok(None);
@@ -192,7 +193,7 @@ mod tests {
             shift_px: vec![[0.0; 2], [3.25, -1.5], [-2.0, 4.0]],
             scale: vec![1.0, 1.02, 1.0],
         };
-        let plan = RegistrationPlan::new((height, width), 3, &of).unwrap().unwrap();
+        let plan = RegistrationPlan::new(Size { width, height }, 3, &of).unwrap().unwrap();
         let plane: Vec<Complex32> = (0..height * width)
             .map(|at| field((at % width) as f64 - 39.5, (at / width) as f64 - 30.0))
             .collect();
@@ -201,7 +202,9 @@ mod tests {
             shift_px: vec![of.shift_px[1]],
             scale: vec![of.scale[1]],
         };
-        let alone = RegistrationPlan::new((height, width), 1, &alone).unwrap().unwrap();
+        let alone = RegistrationPlan::new(Size { width, height }, 1, &alone)
+            .unwrap()
+            .unwrap();
         for colour in 0..3 {
             let mut moved = plane.clone();
             plan.apply(colour, &mut moved, &mut scratch);
@@ -229,7 +232,7 @@ mod tests {
     fn what_cannot_be_is_refused() {
         let of = |shift_px: &[[f64; 2]], scale: &[f64]| {
             let (shift_px, scale) = (shift_px.into(), scale.into());
-            RegistrationPlan::new((4, 4), 3, &Registration { shift_px, scale })
+            RegistrationPlan::new(Size { width: 4, height: 4 }, 3, &Registration { shift_px, scale })
         };
         for good in [of(&[], &[]), of(&[[0.0; 2]; 3], &[1.0; 3])] {
             assert!(good.unwrap().is_none());

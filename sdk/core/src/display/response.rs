@@ -3,6 +3,7 @@
 
 pub mod per_pixel;
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use per_pixel::PerPixel;
 use phasefront_kernels::wide;
@@ -106,25 +107,23 @@ impl Response {
         })
     }
 
-    /// Returns the response of the central (`height`, `width`) pixels of the modulator, for a smaller hologram.
+    /// Returns the response of the part of the modulator of `size` in its middle, for a smaller hologram.
     ///
     /// # Errors
     /// Returns an error if the table has fewer pixels.
     #[doc(hidden)]
-    pub fn centred(self, height: usize, width: usize) -> Result<Self> {
+    pub fn centred(self, size: Size) -> Result<Self> {
         match self {
-            Response::PerPixel(table) if table.shape() != (height, width) => {
-                Ok(Response::PerPixel(table.centred(height, width)?.into()))
-            }
+            Response::PerPixel(table) if table.size() != size => Ok(Response::PerPixel(table.centred(size)?.into())),
             same => Ok(same),
         }
     }
 
-    /// Returns the shape (H, W) of the response, or `None` if it fits any shape.
+    /// Returns the size of the holograms that the response is for, or `None` if it fits any.
     #[doc(hidden)]
-    pub fn shape(&self) -> Option<(usize, usize)> {
+    pub fn size(&self) -> Option<Size> {
         match self {
-            Response::PerPixel(table) => Some(table.shape()),
+            Response::PerPixel(table) => Some(table.size()),
             _ => None,
         }
     }

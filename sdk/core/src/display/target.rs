@@ -11,6 +11,7 @@
 
 mod file;
 
+use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::model::Model;
 use crate::display::panel::Panel;
@@ -102,13 +103,13 @@ impl Target {
                 ));
             }
         }
-        let shape = (self.display.height(), self.display.width());
-        if let Some(other) = self.response.shape()
-            && other != shape
+        let size = self.display.size();
+        if let Some(other) = self.response.size()
+            && other != size
         {
             return Err(Error::Setting(format!(
                 "the per-pixel table is for {}×{} pixels, the display has {}×{}; both must be of one size",
-                other.1, other.0, shape.1, shape.0
+                other.width, other.height, size.width, size.height
             )));
         }
         if self.display.bits() > 8 && self.response != (Response::Linear { bits: 8 }) {
@@ -122,11 +123,11 @@ impl Target {
     }
 
     /// Returns (H, W) of the modulator.
-    pub fn modulator(&self) -> (usize, usize) {
-        (self.display.height(), self.display.width())
+    pub fn modulator(&self) -> Size {
+        self.display.size()
     }
 
-    /// Plans the propagation of each colour of (C, H, W) = `shape` fields over `distance_m`, including `correction`. A
+    /// Plans the propagation of each colour of fields of `size` over `distance_m`, including `correction`. A
     /// pixel of the fields covers `binning`² modulator pixels. Returns `None` if the distance is 0 and there is no
     /// correction.
     ///
@@ -135,7 +136,7 @@ impl Target {
     #[doc(hidden)]
     pub fn propagators(
         &self,
-        (height, width): (usize, usize),
+        Size { width, height }: Size,
         binning: usize,
         distance_m: f64,
         correction: Option<&Aberration>,
@@ -144,8 +145,7 @@ impl Target {
         let pitch_m = pupil_pitch_m * binning as f64;
         match (distance_m, correction) {
             (_, Some(correction)) => Propagator::for_colours_corrected(
-                height,
-                width,
+                Size { width, height },
                 pitch_m,
                 colours,
                 distance_m,
@@ -156,7 +156,7 @@ impl Target {
             (0.0, None) => Ok(None),
             (_, None) => {
                 let padding = Padding::Reach;
-                Propagator::for_colours(height, width, pitch_m, colours, distance_m, padding).map(Some)
+                Propagator::for_colours(Size { width, height }, pitch_m, colours, distance_m, padding).map(Some)
             }
         }
     }

@@ -172,6 +172,7 @@ fn atan2(y: f32, x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Size;
     use crate::display::response::per_pixel::{self, PerPixel};
 
     #[test]
@@ -208,14 +209,14 @@ mod tests {
     }
 
     /// Returns a table whose curves differ from node to node.
-    fn per_pixel((h, w): (usize, usize)) -> Response {
-        let (rows, columns) = per_pixel::nodes(h, w, 20);
+    fn per_pixel(Size { width: w, height: h }: Size) -> Response {
+        let (rows, columns) = per_pixel::nodes(Size { width: w, height: h }, 20);
         let steepness = |node: usize| 20.0 + (node % 11) as f32;
         let levels: Vec<f32> = (0..3 * rows * columns * 9)
             .map(|i| (i % 9) as f32 * steepness(i / 9))
             .collect();
         let turns = vec![6.0; 3 * rows * columns];
-        let table = PerPixel::new(h, w, 20, 8, &levels, &turns);
+        let table = PerPixel::new(Size { width: w, height: h }, 20, 8, &levels, &turns);
         Response::PerPixel(table.expect("a table").into())
     }
 
@@ -255,7 +256,7 @@ mod tests {
             for response in [
                 Response::Linear { bits: 8 },
                 Response::lut(std::array::from_fn(|i| 255 - i as u8)),
-                per_pixel((h, w)),
+                per_pixel(Size { width: w, height: h }),
             ] {
                 let mut fused = vec![0; field.len()];
                 let rows = field.chunks_exact(w).zip(fused.chunks_exact_mut(w));

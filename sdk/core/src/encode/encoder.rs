@@ -6,6 +6,7 @@ use super::encoding::{Prefilter, PrefilterScratch};
 use super::local::{LocalFilter, LocalScratch, Wanted};
 use super::start::{Start, StartScratch};
 use super::{EncoderOptions, double_phase};
+use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::response::Response;
 use crate::display::target::Target;
@@ -23,7 +24,7 @@ pub struct Encoder {
     dark_threshold: f32,
     local: Option<Local>,
     /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
-    illumination: Option<(Illumination, (usize, usize))>,
+    illumination: Option<(Illumination, Size)>,
     response: Response,
 }
 
@@ -77,14 +78,14 @@ enum Row<'a> {
 }
 
 impl Encoder {
-    /// Plans the encoding of fields of (C, H, W) = `shape` at the modulator of `target`. After filtering, a field is
+    /// Plans the encoding of fields of `size` at the modulator of `target`. After filtering, a field is
     /// divided by the light that falls on the modulator.
     ///
     /// # Errors
     /// Returns an error if a plane is empty, a parameter is out of its range, a network is not a pre-filter, or a table
     /// is for another modulator.
-    pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
-        let (height, width) = shape;
+    pub fn new(size: Size, target: &Target, options: &EncoderOptions) -> Result<Self> {
+        let Size { width, height } = size;
         if height == 0 || width == 0 {
             return Err(Error::Setting(format!(
                 "a plane of {width}×{height} is empty; each side must be at least 1"
@@ -92,7 +93,7 @@ impl Encoder {
         }
         target.check()?;
         options.check()?;
-        let prefilter = Prefilter::new(shape, &options.encoding, &target.display)?;
+        let prefilter = Prefilter::new(size, &options.encoding, &target.display)?;
         let illumination = target.illumination.clone();
         Ok(Encoder {
             colours: target.display.colours(),
@@ -105,7 +106,7 @@ impl Encoder {
                 steps: options.local_steps,
             }),
             illumination: illumination.map(|light| (light, target.modulator())),
-            response: target.response.clone().centred(height, width)?,
+            response: target.response.clone().centred(size)?,
         })
     }
 

@@ -5,6 +5,7 @@ pub mod anti_alias;
 pub mod band_limit;
 pub mod deep;
 
+use crate::Size;
 use crate::display::Display;
 use crate::method::network::Network;
 use crate::optics::fft::ConvolveScratch;
@@ -92,15 +93,15 @@ impl PrefilterScratch {
 
 impl Prefilter {
     /// Plans the filter of `encoding` for fields of (H, W) and the colours of `display`.
-    pub(super) fn new((height, width): (usize, usize), encoding: &Encoding, display: &Display) -> Result<Self> {
+    pub(super) fn new(Size { width, height }: Size, encoding: &Encoding, display: &Display) -> Result<Self> {
         Ok(match encoding {
             Encoding::DoublePhase => Prefilter::None,
             Encoding::AntiAlias { sigma, width } => Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?),
             Encoding::BandLimit { k } => {
                 let plane = height * width;
-                Prefilter::BandLimit(BandLimit::new(height, width, *k)?, plane)
+                Prefilter::BandLimit(BandLimit::new(Size { width, height }, *k)?, plane)
             }
-            Encoding::Deep(network) => Prefilter::Deep(Box::new(Deep::new(height, width, network, display)?)),
+            Encoding::Deep(network) => Prefilter::Deep(Box::new(Deep::new(Size { width, height }, network, display)?)),
         })
     }
 

@@ -15,6 +15,7 @@
 //! the frame keeps seven rows for each step and begins three rows earlier for each step.
 
 use super::start::{Start, StartScratch};
+use crate::Size;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
 use std::f64::consts::PI;
@@ -310,7 +311,7 @@ fn project(drawn: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f3
 /// each pixel. Returns z of the last step.
 pub fn reference(
     filter: &LocalFilter,
-    (height, width): (usize, usize),
+    Size { width, height }: Size,
     start: &[Complex64],
     goal: &[Complex64],
     light: &[f64],

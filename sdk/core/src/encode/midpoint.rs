@@ -10,6 +10,7 @@
 //! λ = 0 corrects only the amplitude, as in Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
 //! focus. λ = 1 corrects the whole wave, including the phase, which the eye does not see.
 
+use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::target::Target;
 use crate::optics::asm::{Padding, Propagator};
@@ -40,7 +41,7 @@ pub struct MidpointSteps {
     back: Vec<Propagator>,
     forth: Vec<Propagator>,
     /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
-    illumination: Option<(Illumination, (usize, usize))>,
+    illumination: Option<(Illumination, Size)>,
 }
 
 /// The working memory of [`MidpointSteps`] for one call at a time.
@@ -69,26 +70,26 @@ impl MidpointScratch {
 }
 
 impl MidpointSteps {
-    /// Plans `steps` for fields of (C, H, W) = `shape` at the modulator of `target`.
+    /// Plans `steps` for fields of `size` at the modulator of `target`.
     ///
     /// # Errors
     /// Returns an error if the offset or correction cannot be planned.
-    pub fn new(shape: (usize, usize), target: &Target, steps: usize) -> Result<Self> {
+    pub fn new(size: Size, target: &Target, steps: usize) -> Result<Self> {
         let offset_m = target.display.offset_m();
         let reversed = target.correction.as_ref().map(Aberration::reversed);
         // A path without offset and correction still has the aperture.
         let ways = |distance_m: f64, correction: Option<&Aberration>| match target
-            .propagators(shape, 1, distance_m, correction)?
+            .propagators(size, 1, distance_m, correction)?
         {
             Some(ways) => Ok(ways),
             None => {
                 let (pitch_m, colours) = (target.display.pitch_m(), target.display.wavelengths_m());
-                Propagator::for_colours(shape.0, shape.1, pitch_m, colours, distance_m, Padding::Reach)
+                Propagator::for_colours(size, pitch_m, colours, distance_m, Padding::Reach)
             }
         };
         Ok(MidpointSteps {
-            height: shape.0,
-            width: shape.1,
+            height: size.height,
+            width: size.width,
             steps,
             aperture_radius: target.display.aperture_radius(),
             back: ways(-offset_m, reversed.as_ref())?,

@@ -15,6 +15,7 @@
 //! that brings cT nearest to u: the brightness that this display reaches, and a phase that the eye does not see.
 
 use super::midpoint::{MidpointSteps, WAVE};
+use crate::Size;
 use crate::display::model::Model;
 use crate::display::response::wrap;
 use crate::display::target::Target;
@@ -88,21 +89,21 @@ impl ModelScratch {
 }
 
 impl ModelSteps {
-    /// Plans `steps` for fields of (C, H, W) = `shape` at the modulator of `target`, or returns `None` if the target
+    /// Plans `steps` for fields of `size` at the modulator of `target`, or returns `None` if the target
     /// has no model.
     ///
     /// # Errors
     /// Returns an error if the offset or correction cannot be planned.
-    pub fn new(shape: (usize, usize), target: &Target, steps: usize) -> Result<Option<Self>> {
+    pub fn new(size: Size, target: &Target, steps: usize) -> Result<Option<Self>> {
         let Some(model) = target.model.clone() else {
             return Ok(None);
         };
-        let ideal = MidpointSteps::new(shape, target, steps)?;
-        let (height, width) = shape;
+        let ideal = MidpointSteps::new(size, target, steps)?;
+        let Size { width, height } = size;
         let modulator = target.modulator();
         let corner = (
-            modulator.0.saturating_sub(height) / 2,
-            modulator.1.saturating_sub(width) / 2,
+            modulator.height.saturating_sub(height) / 2,
+            modulator.width.saturating_sub(width) / 2,
         );
         let colour = |(colour, free): (usize, &Propagator)| {
             let mut light = vec![1.0; width];
@@ -367,7 +368,7 @@ impl ModelSteps {
         by: impl Fn(Complex32, Complex32) -> Complex32 + Sync,
     ) {
         let of = &self.colours[colour];
-        let height = of.free.padded_shape().0;
+        let height = of.free.padded_size().height;
         of.free.convolve(
             plane,
             |x, column| {
@@ -383,10 +384,10 @@ impl ModelSteps {
 /// Computes the factors of `free` behind an aperture of `radius` and a pupil, which is a function of the frequency in
 /// cycles per pixel, (W', H').
 pub fn way(free: &Propagator, radius: f64, pupil: impl Fn(f64, f64) -> Complex32 + Sync) -> Vec<Complex32> {
-    let shape @ (height, width) = free.padded_shape();
+    let size @ Size { width, height } = free.padded_size();
     let mut way = vec![Complex32::ONE; height * width];
     way.par_chunks_exact_mut(height).enumerate().for_each(|(kx, column)| {
-        Opening::centred(radius).stop(kx, shape, column);
+        Opening::centred(radius).stop(kx, size, column);
         free.transfer().apply(kx, column);
         for (ky, factor) in column.iter_mut().enumerate() {
             *factor *= pupil(frequency(kx, width), frequency(ky, height));
@@ -405,7 +406,7 @@ mod tests {
     use crate::optics::reference::dft;
     use ndarray::{Array2, Array3, s};
 
-    const SHAPE: (usize, usize) = (9, 14);
+    const SIZE: Size = Size { width: 14, height: 9 };
 
     fn target(offset_m: f64) -> Target {
         let display = Display::from_toml("width = 18\nheight = 11\nwavelengths_nm = [532]").unwrap();
@@ -427,7 +428,7 @@ mod tests {
 
     /// Computes E of `phases` in f64 by direct sums, as [`crate::display::model`] defines it.
     fn energy(target: &Target, phases: &[f64], wanted: &[Complex64], factor: Complex64) -> f64 {
-        let (h, w) = SHAPE;
+        let Size { width: w, height: h } = SIZE;
         let model = target.model.as_ref().unwrap();
         let colour = &model.colours()[0];
         let curve = |phase: f64| {
@@ -437,7 +438,7 @@ mod tests {
             phase + a + (at - k as f64) * (b - a)
         };
         let (top, left) = (1, 2);
-        let field = Array2::from_shape_fn(SHAPE, |(y, x)| {
+        let field = Array2::from_shape_fn(SIZE.shape(), |(y, x)| {
             let mut psi = 0.0;
             for (i, weight) in colour.crosstalk.iter().enumerate() {
                 let at = |at: usize, d: usize, n: usize| (at + d).saturating_sub(1).min(n - 1);
@@ -448,14 +449,14 @@ mod tests {
                     .illumination
                     .as_ref()
                     .unwrap()
-                    .gain(0, y + top, x + left, (11, 18));
-            let [light, rest] = (model.light(0, y + top, x + left, (11, 18)))
+                    .gain(0, y + top, x + left, Size { width: 18, height: 11 });
+            let [light, rest] = (model.light(0, y + top, x + left, Size { width: 18, height: 11 }))
                 .map(|v| Complex64::new(v.re.into(), v.im.into()) * f64::from(laser));
             light * Complex64::from_polar(1.0, psi) + rest
         });
-        let steps = MidpointSteps::new(SHAPE, target, 1).unwrap();
-        let padded @ (ph, pw) = steps.back()[0].padded_shape();
-        let mut plane = Array2::zeros(padded);
+        let steps = MidpointSteps::new(SIZE, target, 1).unwrap();
+        let padded @ Size { width: pw, height: ph } = steps.back()[0].padded_size();
+        let mut plane = Array2::zeros(padded.shape());
         plane.slice_mut(s![..h, ..w]).assign(&field);
         let mut spectrum = dft(&plane, -1.0);
         for ((ky, kx), value) in spectrum.indexed_iter_mut() {
@@ -482,7 +483,7 @@ mod tests {
     }
 
     fn wanted() -> Vec<Complex32> {
-        (0..SHAPE.0 * SHAPE.1)
+        (0..SIZE.pixels())
             .map(|i| Complex32::from_polar(0.3 + 0.02 * (i % 17) as f32, (i % 5) as f32 * 0.2))
             .collect()
     }
@@ -491,9 +492,9 @@ mod tests {
     fn steps_follow_the_gradient_of_direct_sums() {
         for offset_m in [0.0, 1e-3] {
             let target = target(offset_m);
-            let plan = ModelSteps::new(SHAPE, &target, 1).unwrap().unwrap();
+            let plan = ModelSteps::new(SIZE, &target, 1).unwrap().unwrap();
             let mut scratch = plan.scratch();
-            let phases: Vec<f32> = (0..SHAPE.0 * SHAPE.1)
+            let phases: Vec<f32> = (0..SIZE.pixels())
                 .map(|i| 2.0 + (i * 37 % 251) as f32 / 100.0)
                 .collect();
             let wanted = wanted();
@@ -506,7 +507,7 @@ mod tests {
             }
             let colour = &target.model.as_ref().unwrap().colours()[0];
             let mut slopes = vec![0.0; phases.len()];
-            for (y, row) in slopes.chunks_exact_mut(SHAPE.1).enumerate() {
+            for (y, row) in slopes.chunks_exact_mut(SIZE.width).enumerate() {
                 colour.gather_row(&scratch.responses, y, row);
             }
             let double = |v: &Complex32| Complex64::new(v.re.into(), v.im.into());
@@ -528,22 +529,30 @@ mod tests {
     #[test]
     fn crosstalk_and_the_curve_are_undone() {
         let target = target(0.0);
-        let plan = ModelSteps::new(SHAPE, &target, 0).unwrap().unwrap();
+        let plan = ModelSteps::new(SIZE, &target, 0).unwrap().unwrap();
         let model = &plan.model.colours()[0];
         let [low, high] = model.reach();
         // The phases of a double phase around 0.
-        let asked: Vec<f32> = (0..SHAPE.0 * SHAPE.1)
-            .map(|i| wrap(if (i / SHAPE.1 + i).is_multiple_of(2) { 0.9 } else { -0.9 } + 0.1 * (i % 3) as f32))
+        let asked: Vec<f32> = (0..SIZE.pixels())
+            .map(|i| {
+                wrap(
+                    if (i / SIZE.width + i).is_multiple_of(2) {
+                        0.9
+                    } else {
+                        -0.9
+                    } + 0.1 * (i % 3) as f32,
+                )
+            })
             .collect();
         let mut scratch = plan.scratch();
         let mut phases = asked.clone();
         plan.undo(0, &mut phases, &mut scratch);
         let responses: Vec<f32> = phases.iter().map(|phase| model.response(*phase).0).collect();
-        let mut row = vec![0.0; SHAPE.1];
-        for y in 0..SHAPE.0 {
+        let mut row = vec![0.0; SIZE.width];
+        for y in 0..SIZE.height {
             model.spread_row(&responses, y, &mut row);
             for (x, shown) in row.iter().enumerate() {
-                let off = wrap(shown - 0.5 * (low + high) - asked[y * SHAPE.1 + x] + PI) - PI;
+                let off = wrap(shown - 0.5 * (low + high) - asked[y * SIZE.width + x] + PI) - PI;
                 assert!(off.abs() < 0.02, "{y} {x}: {off}");
             }
         }
@@ -567,13 +576,13 @@ mod tests {
             let field: Vec<_> = field.iter().map(double).collect();
             energy(&target, &phases, &field, double(&factor))
         };
-        let asked: Vec<f32> = (0..SHAPE.0 * SHAPE.1).map(|i| (i % 62) as f32 * 0.1).collect();
+        let asked: Vec<f32> = (0..SIZE.pixels()).map(|i| (i % 62) as f32 * 0.1).collect();
         let mut errors = vec![];
         for steps in [0, 1, 20] {
             let mut results = [1, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
                 pool.build().unwrap().install(|| {
-                    let plan = ModelSteps::new(SHAPE, &target, steps).unwrap().unwrap();
+                    let plan = ModelSteps::new(SIZE, &target, steps).unwrap().unwrap();
                     let (mut phases, mut scratch) = (asked.clone(), plan.scratch());
                     plan.keep(&wanted(), &mut scratch);
                     plan.correct(&mut phases, &mut scratch);
@@ -587,7 +596,7 @@ mod tests {
             errors.push(error(&phases, seen));
         }
         // Without steps, the phases are others than those from which steps begin.
-        let plan = ModelSteps::new(SHAPE, &target, 1).unwrap().unwrap();
+        let plan = ModelSteps::new(SIZE, &target, 1).unwrap().unwrap();
         let mut begun = asked;
         plan.begin(0, &mut begun);
         errors[0] = error(&begun, seen(&plan, &begun));

@@ -3,6 +3,7 @@
 
 use super::anti_alias::AntiAlias;
 use super::dark_threshold::DarkThreshold;
+use crate::Size;
 use crate::display::illumination::Illumination;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
@@ -18,7 +19,7 @@ pub(super) struct Start<'a> {
     pub(super) dark_threshold: Option<DarkThreshold>,
     pub(super) blur: Option<&'a AntiAlias>,
     /// The light and the modulator's (H, W).
-    pub(super) light: Option<(&'a Illumination, (usize, usize))>,
+    pub(super) light: Option<(&'a Illumination, Size)>,
 }
 
 /// The working memory for the rows of a part of a plane.

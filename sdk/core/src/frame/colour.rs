@@ -3,6 +3,7 @@
 //! [`super::convert`] converts them to amplitudes.
 
 use super::plane::Plane;
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 
 /// The largest number of pixels of a camera image. Larger images are refused because they would be slow. 4K video and
@@ -74,29 +75,29 @@ impl ColourFormat {
 #[derive(Debug, Clone, Copy)]
 pub struct ColourImage<'a> {
     format: ColourFormat,
-    width: usize,
-    height: usize,
+    size: Size,
     planes: [Plane<'a>; 3],
 }
 
 impl<'a> ColourImage<'a> {
-    /// Creates an image of `width` × `height` pixels in `planes`.
+    /// Creates an image of `size` in `planes`.
     ///
     /// ```
+    /// use phasefront::Size;
     /// use phasefront::input::{ColourFormat, ColourImage, Plane, YuvEncoding};
     ///
     /// let (luma, chroma) = ([0; 640 * 480], [128; 640 * 240]);
     /// let format = ColourFormat::Nv12(YuvEncoding::default());
     /// let planes = [Plane::new(&luma, 640, 1), Plane::new(&chroma, 640, 2)];
-    /// let image = ColourImage::new(format, 640, 480, &planes)?;
+    /// let image = ColourImage::new(format, Size { width: 640, height: 480 }, &planes)?;
     /// # Ok::<(), phasefront::Error>(())
     /// ```
     ///
     /// # Errors
     /// Returns [`Error::Frame`] if the image is empty or too large, the number of planes does not match the format, a
     /// stride is too small, or a plane has too few bytes.
-    pub fn new(format: ColourFormat, width: usize, height: usize, planes: &[Plane<'a>]) -> Result<Self> {
-        check_size("colour", width, height)?;
+    pub fn new(format: ColourFormat, size: Size, planes: &[Plane<'a>]) -> Result<Self> {
+        check_size("colour", size)?;
         let layout = format.layout();
         if planes.len() != layout.len() {
             return Err(Error::Frame(format!(
@@ -107,14 +108,16 @@ impl<'a> ColourImage<'a> {
         }
         let mut all = [Plane::default(); 3];
         for ((to, plane), (what, pixel_bytes, share)) in all.iter_mut().zip(planes).zip(layout) {
-            let (width, height) = (width.div_ceil(*share), height.div_ceil(*share));
-            plane.check(what, width, height, *pixel_bytes)?;
+            let shared = Size {
+                width: size.width.div_ceil(*share),
+                height: size.height.div_ceil(*share),
+            };
+            plane.check(what, shared, *pixel_bytes)?;
             *to = *plane;
         }
         Ok(ColourImage {
             format,
-            width,
-            height,
+            size,
             planes: all,
         })
     }
@@ -124,9 +127,9 @@ impl<'a> ColourImage<'a> {
         self.format
     }
 
-    /// Returns (H, W) in the sensor's orientation.
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    /// Returns the size in the sensor's orientation.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns the planes of the format.
@@ -136,14 +139,14 @@ impl<'a> ColourImage<'a> {
 }
 
 /// Checks the size of a camera image.
-pub fn check_size(what: &str, width: usize, height: usize) -> Result<()> {
-    match width.checked_mul(height) {
+pub fn check_size(what: &str, size: Size) -> Result<()> {
+    match size.width.checked_mul(size.height) {
         Some(0) => Err(Error::Frame(format!(
-            "{what} is empty ({width}×{height}); each side must be at least 1"
+            "{what} is empty ({size}); each side must be at least 1"
         ))),
         Some(pixels) if pixels <= MAX_SOURCE_PIXELS => Ok(()),
         _ => Err(Error::Frame(format!(
-            "{what} of {width}×{height} pixels is too large; {MAX_SOURCE_PIXELS} pixels are the most, so ask the camera for a smaller format"
+            "{what} of {size} pixels is too large; {MAX_SOURCE_PIXELS} pixels are the most, so ask the camera for a smaller format"
         ))),
     }
 }
@@ -189,11 +192,15 @@ mod tests {
             ),
         ];
         for (format, width, height, planes, word) in cases {
-            let refused = ColourImage::new(format, width, height, &planes);
+            let refused = ColourImage::new(format, Size { width, height }, &planes);
             let message = refused.map(|_| ()).map_err(|e| e.to_string());
             assert!(message.as_ref().is_err_and(|m| m.contains(word)), "{word}: {message:?}");
         }
-        let whole = ColourImage::new(yuv, 7, 9, &[plane(7, 1), plane(13, 3), plane(14, 2)]);
+        let whole = ColourImage::new(
+            yuv,
+            Size { width: 7, height: 9 },
+            &[plane(7, 1), plane(13, 3), plane(14, 2)],
+        );
         assert!(whole.is_ok());
     }
 }

@@ -5,6 +5,7 @@ use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix, check_siz
 use super::plane::View;
 use super::plane::{Orientation, Plane};
 use super::resample::{Axis, Crop};
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
@@ -17,9 +18,9 @@ const BANDS_PER_THREAD: usize = 4;
 /// threads.
 pub struct ColourPlan {
     format: ColourFormat,
-    sensor: (usize, usize),
+    sensor: Size,
     orientation: Orientation,
-    out: (usize, usize),
+    out: Size,
     luma: Axes,
     /// The axes of subsampled chroma, or `None` if all channels have full resolution.
     chroma: Option<Axes>,
@@ -41,38 +42,33 @@ struct Channel<'a> {
     plane: Plane<'a>,
     byte: usize,
     axes: &'a Axes,
-    sensor: (usize, usize),
+    sensor: Size,
 }
 
 impl ColourPlan {
-    /// Plans the conversion of images like `image`, turned by `orientation`, to (`height`, `width`) amplitudes of the
-    /// part [`Crop::cover`].
+    /// Plans the conversion of images like `image`, turned by `orientation`, to amplitudes of `size`, of the part
+    /// [`Crop::cover`].
     ///
     /// # Errors
     /// Returns an error if the output is empty.
-    pub fn new(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Result<Self> {
-        Self::for_format(image.format(), image.shape(), orientation, height, width)
+    pub fn new(image: &ColourImage<'_>, orientation: Orientation, size: Size) -> Result<Self> {
+        Self::for_format(image.format(), image.size(), orientation, size)
     }
 
-    /// Plans the conversion of images with this `format` and (H, W) = `sensor`, like [`ColourPlan::new`].
+    /// Plans the conversion of images with this `format` and the size `sensor`, like [`ColourPlan::new`].
     ///
     /// # Errors
     /// Returns an error if the image is empty or too large, or the output is empty.
-    pub fn for_format(
-        format: ColourFormat,
-        sensor: (usize, usize),
-        orientation: Orientation,
-        height: usize,
-        width: usize,
-    ) -> Result<Self> {
-        check_size("colour", sensor.1, sensor.0)?;
+    pub fn for_format(format: ColourFormat, sensor: Size, orientation: Orientation, size: Size) -> Result<Self> {
+        let Size { width, height } = size;
+        check_size("colour", sensor)?;
         if height == 0 || width == 0 {
             return Err(Error::Setting(format!(
-                "a frame of {width}×{height} is empty; each side must be at least 1"
+                "a frame of {size} is empty; each side must be at least 1"
             )));
         }
-        let upright = orientation.upright_shape(sensor.0, sensor.1);
-        let crop = Crop::cover(upright, (height, width));
+        let upright = orientation.upright_size(sensor);
+        let crop = Crop::cover(upright, size);
         let chroma = format.layout().get(1).map(|(_, _, share)| {
             let half = |n: usize| n.div_ceil(*share);
             // If a side is odd, the last chroma sample extends beyond the image, at its far end or, if flipped, at its
@@ -86,21 +82,21 @@ impl ColourPlan {
                     }
             };
             let flips = orientation.flips();
-            let x = from(crop.x, upright.1, flips.0);
-            let y = from(crop.y, upright.0, flips.1);
+            let x = from(crop.x, upright.width, flips.0);
+            let y = from(crop.y, upright.height, flips.1);
             Axes {
-                x: Axis::new(half(upright.1), x, crop.width / 2.0, width),
-                y: Axis::new(half(upright.0), y, crop.height / 2.0, height),
+                x: Axis::new(half(upright.width), x, crop.width / 2.0, width),
+                y: Axis::new(half(upright.height), y, crop.height / 2.0, height),
             }
         });
         Ok(ColourPlan {
             format,
             sensor,
             orientation,
-            out: (height, width),
+            out: size,
             luma: Axes {
-                x: Axis::new(upright.1, crop.x, crop.width, width),
-                y: Axis::new(upright.0, crop.y, crop.height, height),
+                x: Axis::new(upright.width, crop.x, crop.width, width),
+                y: Axis::new(upright.height, crop.y, crop.height, height),
             },
             chroma,
         })
@@ -108,11 +104,11 @@ impl ColourPlan {
 
     /// Returns whether the plan fits images like `image` turned by `orientation`. Strides may differ.
     pub fn fits(&self, image: &ColourImage<'_>, orientation: Orientation) -> bool {
-        (self.format, self.sensor, self.orientation) == (image.format(), image.shape(), orientation)
+        (self.format, self.sensor, self.orientation) == (image.format(), image.size(), orientation)
     }
 
     /// Returns (H, W) of the amplitudes.
-    pub fn shape(&self) -> (usize, usize) {
+    pub fn size(&self) -> Size {
         self.out
     }
 
@@ -142,7 +138,7 @@ impl ColourPlan {
     pub fn scratch(&self) -> ColourScratch {
         let bands = match rayon::current_num_threads() {
             1 => 1,
-            threads => (threads * BANDS_PER_THREAD).min(self.out.0),
+            threads => (threads * BANDS_PER_THREAD).min(self.out.height),
         };
         ColourScratch {
             rows: vec![0.0; bands * self.luma.x.needed().len().max(self.chroma_row())],
@@ -166,14 +162,14 @@ impl ColourPlan {
             return Err(Error::Frame(format!(
                 "the image is {:?} of {}×{}; this plan takes {:?} of {}×{}",
                 image.format(),
-                image.shape().1,
-                image.shape().0,
+                image.size().width,
+                image.size().height,
                 self.format,
-                self.sensor.1,
-                self.sensor.0
+                self.sensor.width,
+                self.sensor.height
             )));
         }
-        let (height, width) = self.out;
+        let Size { width, height } = self.out;
         assert_eq!(rgb.len(), 3 * height * width);
         let channels = self.channels(image);
         let band = height.div_ceil(scratch.bands);
@@ -214,7 +210,10 @@ impl ColourPlan {
                 plane: image.planes()[plane],
                 byte,
                 axes,
-                sensor: (self.sensor.0.div_ceil(2), self.sensor.1.div_ceil(2)),
+                sensor: Size {
+                    width: self.sensor.width.div_ceil(2),
+                    height: self.sensor.height.div_ceil(2),
+                },
             },
             _ => Channel {
                 plane: image.planes()[plane],

@@ -1,5 +1,6 @@
 //! Planes of samples in a camera's memory, and the orientation of the image in them.
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 
 /// One plane of a camera image, as the platform's API provides it. It is borrowed, not copied.
@@ -23,8 +24,9 @@ impl<'a> Plane<'a> {
         }
     }
 
-    /// Checks that the plane holds (`height`, `width`) pixels of `pixel_bytes` bytes.
-    pub fn check(&self, what: &str, width: usize, height: usize, pixel_bytes: usize) -> Result<()> {
+    /// Checks that the plane holds an image of `size`, pixels of `pixel_bytes` bytes.
+    pub fn check(&self, what: &str, size: Size, pixel_bytes: usize) -> Result<()> {
+        let Size { width, height } = size;
         if self.pixel_stride < pixel_bytes {
             return Err(Error::Frame(format!(
                 "{what}: a pixel stride of {} bytes is too small; a pixel has {pixel_bytes}",
@@ -96,11 +98,14 @@ impl View {
 }
 
 impl Orientation {
-    /// Returns (H, W) of the upright image of a sensor of (`height`, `width`).
-    pub fn upright_shape(self, height: usize, width: usize) -> (usize, usize) {
+    /// Returns the size of the upright image of a sensor's image of `size`.
+    pub fn upright_size(self, size: Size) -> Size {
         match self.rotation {
-            Rotation::Upright | Rotation::Half => (height, width),
-            Rotation::Clockwise90 | Rotation::Clockwise270 => (width, height),
+            Rotation::Upright | Rotation::Half => size,
+            Rotation::Clockwise90 | Rotation::Clockwise270 => Size {
+                width: size.height,
+                height: size.width,
+            },
         }
     }
 
@@ -116,10 +121,11 @@ impl Orientation {
         (x != self.mirrored, y)
     }
 
-    /// Returns the sensor pixel (x, y) at upright pixel (`x`, `y`), for a sensor of (`height`, `width`).
+    /// Returns the sensor pixel (x, y) at upright pixel (`x`, `y`), for a sensor's image of that size.
     #[doc(hidden)]
-    pub fn sensor_pixel(self, x: usize, y: usize, (height, width): (usize, usize)) -> (usize, usize) {
-        let (_, upright_width) = self.upright_shape(height, width);
+    pub fn sensor_pixel(self, x: usize, y: usize, size: Size) -> (usize, usize) {
+        let Size { width, height } = size;
+        let upright_width = self.upright_size(size).width;
         let x = if self.mirrored { upright_width - 1 - x } else { x };
         match self.rotation {
             Rotation::Upright => (x, y),
@@ -129,18 +135,18 @@ impl Orientation {
         }
     }
 
-    /// Returns the view of the upright image in `plane`, which holds a sensor's (`height`, `width`) pixels.
+    /// Returns the view of the upright image in `plane`, which holds a sensor's image of that size.
     #[doc(hidden)]
-    pub fn view(self, plane: &Plane<'_>, (height, width): (usize, usize)) -> View {
+    pub fn view(self, plane: &Plane<'_>, size: Size) -> View {
         let at = |(x, y): (usize, usize)| (y * plane.row_stride + x * plane.pixel_stride) as isize;
-        let (upright_height, upright_width) = self.upright_shape(height, width);
-        let pixel = |x, y| at(self.sensor_pixel(x, y, (height, width)));
+        let upright = self.upright_size(size);
+        let pixel = |x, y| at(self.sensor_pixel(x, y, size));
         let origin = pixel(0, 0);
         let step = |there: bool, x, y| if there { pixel(x, y) - origin } else { 0 };
         View {
             origin: origin as usize,
-            step_x: step(upright_width > 1, 1, 0),
-            step_y: step(upright_height > 1, 0, 1),
+            step_x: step(upright.width > 1, 1, 0),
+            step_y: step(upright.height > 1, 0, 1),
         }
     }
 }
@@ -164,8 +170,9 @@ mod tests {
             (Rotation::Clockwise270, true, vec![6, 3, 5, 2, 4, 1]),
         ] {
             let orientation = Orientation { rotation, mirrored };
-            let (height, width) = orientation.upright_shape(2, 3);
-            let view = orientation.view(&plane, (2, 3));
+            let size = Size { width: 3, height: 2 };
+            let Size { width, height } = orientation.upright_size(size);
+            let view = orientation.view(&plane, size);
             for (i, value) in upright.iter().enumerate() {
                 let (x, y) = (i % width, i / width);
                 assert!(y < height);
@@ -183,11 +190,19 @@ mod tests {
             (40, 4, 10, 3, "100 bytes are too few"),
             (usize::MAX / 2, 4, 10, 9, "too few"),
         ] {
-            let refused = Plane::new(&bytes, row, pixel).check("colour", width, height, 4);
+            let refused = Plane::new(&bytes, row, pixel).check("colour", Size { width, height }, 4);
             assert!(refused.is_err_and(|e| e.to_string().contains(word)), "{word}");
         }
         // The last row ends with its last pixel, and a single row needs no stride.
-        assert!(Plane::new(&bytes, 60, 4).check("colour", 10, 2, 4).is_ok());
-        assert!(Plane::new(&bytes, 0, 4).check("colour", 25, 1, 4).is_ok());
+        assert!(
+            Plane::new(&bytes, 60, 4)
+                .check("colour", Size { width: 10, height: 2 }, 4)
+                .is_ok()
+        );
+        assert!(
+            Plane::new(&bytes, 0, 4)
+                .check("colour", Size { width: 25, height: 1 }, 4)
+                .is_ok()
+        );
     }
 }

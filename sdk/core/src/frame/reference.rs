@@ -4,14 +4,16 @@
 use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix};
 use super::plane::Orientation;
 use super::resample::Crop;
+use crate::Size;
 
-/// Converts `image`, turned by `orientation`, to amplitudes (3, H, W) with (H, W) = (`height`, `width`).
+/// Converts `image`, turned by `orientation`, to amplitudes, (3, H, W), of `size`.
 ///
 /// The output covers [`Crop::cover`] of the image. Each pixel is the mean of the image under a triangle as wide as the
 /// pixel, but at least as wide as a sample. A chroma sample lies in the middle of its four pixels.
-pub fn convert(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Vec<f32> {
-    let upright = orientation.upright_shape(image.shape().0, image.shape().1);
-    let crop = Crop::cover(upright, (height, width));
+pub fn convert(image: &ColourImage<'_>, orientation: Orientation, size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
+    let upright = orientation.upright_size(image.size());
+    let crop = Crop::cover(upright, size);
     let mut rgb = vec![0.0; 3 * height * width];
     for y in 0..height {
         for x in 0..width {
@@ -46,9 +48,12 @@ fn mean(
     centre: (f64, f64),
     size: (f64, f64),
 ) -> f64 {
-    let (height, width) = image.shape();
+    let Size { width, height } = image.size();
     let plane = image.planes()[plane];
-    let (upright_height, upright_width) = orientation.upright_shape(height, width);
+    let Size {
+        width: upright_width,
+        height: upright_height,
+    } = orientation.upright_size(image.size());
     let (mut sum, mut weights) = (0.0, 0.0);
     for row in 0..height.div_ceil(share) {
         for column in 0..width.div_ceil(share) {

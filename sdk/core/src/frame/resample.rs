@@ -1,5 +1,7 @@
 //! Resampling along one axis: the part of a camera image that the display covers, and the taps of each output sample.
 
+use crate::Size;
+
 /// The displayed part of an upright image: the largest centred rectangle with the display's aspect ratio.
 ///
 /// The unit is a pixel of the image, and (0, 0) is the top left corner of its first pixel.
@@ -16,8 +18,14 @@ pub struct Crop {
 }
 
 impl Crop {
-    /// Returns the part of a (`height`, `width`) image that covers (`out_height`, `out_width`).
-    pub fn cover((height, width): (usize, usize), (out_height, out_width): (usize, usize)) -> Self {
+    /// Returns the part of an image, the first size, that covers the second.
+    pub fn cover(
+        Size { width, height }: Size,
+        Size {
+            width: out_width,
+            height: out_height,
+        }: Size,
+    ) -> Self {
         let (h, w) = (height as f64, width as f64);
         let scale = (w / out_width as f64).min(h / out_height as f64);
         let (crop_w, crop_h) = (out_width as f64 * scale, out_height as f64 * scale);
@@ -157,10 +165,26 @@ mod tests {
 
     #[test]
     fn the_crop_is_the_largest_in_the_middle() {
-        let crop = Crop::cover((1440, 1920), (1080, 1920));
+        let crop = Crop::cover(
+            Size {
+                width: 1920,
+                height: 1440,
+            },
+            Size {
+                width: 1920,
+                height: 1080,
+            },
+        );
         assert_eq!((crop.x, crop.y), (0.0, 180.0));
         assert_eq!((crop.width, crop.height), (1920.0, 1080.0));
-        let crop = Crop::cover((480, 640), (100, 50)).scaled(0.5, 0.5);
+        let crop = Crop::cover(
+            Size {
+                width: 640,
+                height: 480,
+            },
+            Size { width: 50, height: 100 },
+        )
+        .scaled(0.5, 0.5);
         assert_eq!((crop.x, crop.y, crop.width, crop.height), (100.0, 0.0, 120.0, 240.0));
     }
 

@@ -23,6 +23,7 @@ mod rgbd;
 mod stock;
 mod tensor;
 
+use crate::Size;
 pub use chain::Precision;
 pub use filter::{FilterPlan, FilterScratch};
 pub use head::Head;
@@ -263,36 +264,36 @@ impl Network {
     /// # Errors
     /// Returns the same errors as [`Self::plan`] and [`Self::depth_scale`].
     #[doc(hidden)]
-    pub fn plan_for(&self, height: usize, width: usize, display: &Display) -> Result<NetworkPlan> {
+    pub fn plan_for(&self, size: Size, display: &Display) -> Result<NetworkPlan> {
         if self.input == InputKind::SeededColour {
             self.check_display(display)?;
             return Ok(NetworkPlan {
                 colour: Some(0),
-                ..self.plan(height, width)?
+                ..self.plan(size)?
             });
         }
         let served = self.display.serve(display)?;
         Ok(NetworkPlan {
             depth_scale: depth_scale(served),
             colour: served.colour,
-            ..self.plan(height, width)?
+            ..self.plan(size)?
         })
     }
 
-    /// Prepares the network for frames of `height` × `width` pixels whose depth is for the trained display, on the
+    /// Prepares the network for frames of `size` whose depth is for the trained display, on the
     /// fastest path that supports the network.
     ///
     /// # Errors
     /// Returns [`Error::Setting`] if a frame is empty or too large, and [`Error::Network`] if the path rejects the
     /// graph.
     #[doc(hidden)]
-    pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
+    pub fn plan(&self, size: Size) -> Result<NetworkPlan> {
         Isa::of_variable().map_err(Error::Setting)?;
         match FusedChain::new(&self.chain, None) {
-            Ok(chain) => self.fused_plan(height, width, chain),
+            Ok(chain) => self.fused_plan(size, chain),
             #[cfg(feature = "tract")]
             Err(why) => {
-                let mut plan = self.plan_on_stock_tract(height, width)?;
+                let mut plan = self.plan_on_stock_tract(size)?;
                 plan.engine.why = why;
                 Ok(plan)
             }
@@ -309,17 +310,14 @@ impl Network {
     /// Returns the same errors as [`Network::plan`], and [`Error::Setting`] if the processor or the kernels do not
     /// support it.
     #[doc(hidden)]
-    pub fn plan_on(&self, isa: Isa, height: usize, width: usize) -> Result<NetworkPlan> {
+    pub fn plan_on(&self, isa: Isa, size: Size) -> Result<NetworkPlan> {
         let chain = FusedChain::new(&self.chain, Some(isa));
-        self.fused_plan(
-            height,
-            width,
-            chain.map_err(|why| Error::Setting(format!("network: {why}")))?,
-        )
+        self.fused_plan(size, chain.map_err(|why| Error::Setting(format!("network: {why}")))?)
     }
 
-    fn fused_plan(&self, height: usize, width: usize, chain: FusedChain) -> Result<NetworkPlan> {
-        check_size(height, width, MAX_PIXELS)?;
+    fn fused_plan(&self, size: Size, chain: FusedChain) -> Result<NetworkPlan> {
+        let Size { width, height } = size;
+        check_size(size, MAX_PIXELS)?;
         let engine = self.fused_engine(&chain);
         Ok(NetworkPlan {
             input: self.input,
@@ -333,14 +331,14 @@ impl Network {
         })
     }
 
-    /// Prepares a network that filters fields of (3, `height`, `width`) in place, on the fastest kernels. The caller
+    /// Prepares a network that filters fields of `size`, (3, H, W), in place, on the fastest kernels. The caller
     /// applies the blur that the input may require ([`InputKind::is_blurred`]).
     ///
     /// # Errors
     /// Returns [`Error::Network`] if the network does not take a field or the kernels do not support it, and
     /// [`Error::Setting`] if a field is empty or too large.
     #[doc(hidden)]
-    pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
+    pub fn filter_plan(&self, size: Size) -> Result<FilterPlan> {
         if !self.input.is_field() {
             return Err(Error::Network(format!(
                 "a pre-filter takes 'field', this network '{}'",
@@ -349,27 +347,27 @@ impl Network {
         }
         let chain =
             FusedChain::new(&self.chain, None).map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
-        check_size(height, width, MAX_PIXELS)?;
+        check_size(size, MAX_PIXELS)?;
         Ok(FilterPlan {
             engine: self.fused_engine(&chain),
             chain,
             input: self.input,
             head: self.head,
             colour: None,
-            size: (height, width),
+            size,
         })
     }
 
-    /// Plans like [`Self::filter_plan`] for the colours of `display`. For one laser the field is (1, `height`,
-    /// `width`), handled as in [`Self::plan_for`].
+    /// Plans like [`Self::filter_plan`] for the colours of `display`. For one laser the field is (1, H, W),
+    /// handled as in [`Self::plan_for`].
     ///
     /// # Errors
     /// Returns the same errors as [`Self::filter_plan`] and [`Self::depth_scale`].
     #[doc(hidden)]
-    pub fn filter_plan_for(&self, height: usize, width: usize, display: &Display) -> Result<FilterPlan> {
+    pub fn filter_plan_for(&self, size: Size, display: &Display) -> Result<FilterPlan> {
         Ok(FilterPlan {
             colour: self.colour(display)?,
-            ..self.filter_plan(height, width)?
+            ..self.filter_plan(size)?
         })
     }
 
@@ -408,8 +406,9 @@ impl Network {
     /// # Errors
     /// Returns the same errors as [`Network::plan`].
     #[cfg(feature = "tract")]
-    pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
-        check_size(height, width, MAX_STOCK_PIXELS)?;
+    pub fn plan_on_stock_tract(&self, size: Size) -> Result<NetworkPlan> {
+        let Size { width, height } = size;
+        check_size(size, MAX_STOCK_PIXELS)?;
         if self.chain.halved && (height % 2 == 1 || width % 2 == 1) {
             return Err(Error::Network(format!(
                 "a network at half the resolution takes frames of even sides on tract, not {width}×{height}"
@@ -439,7 +438,8 @@ fn depth_scale(served: Served) -> f32 {
 }
 
 /// Checks that a frame is not empty and has at most `most` pixels.
-pub fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
+pub fn check_size(size: Size, most: usize) -> Result<()> {
+    let Size { width, height } = size;
     match height.checked_mul(width) {
         Some(0) => Err(Error::Setting(format!(
             "network: a frame of {width}×{height} pixels is empty"
@@ -516,8 +516,11 @@ impl NetworkPlan {
     }
 
     /// Returns the frame's height and width in pixels.
-    pub fn size(&self) -> (usize, usize) {
-        (self.height, self.width)
+    pub fn size(&self) -> Size {
+        Size {
+            width: self.width,
+            height: self.height,
+        }
     }
 
     /// Returns the number of input channels and of output channels.
@@ -597,13 +600,13 @@ impl NetworkPlan {
             }
             #[cfg(feature = "tract")]
             Path::Stock(plan) => {
-                let area = size.0 * size.1;
+                let area = size.height * size.width;
                 let (inputs, outputs) = self.channels();
                 let [input, output] = &mut scratch.planes;
                 input.resize(inputs * area, 0.0);
                 output.resize(outputs * area, 0.0);
-                for (row, into) in input.chunks_exact_mut(size.1).enumerate() {
-                    source.read(row / size.0, row % size.0, 0, into);
+                for (row, into) in input.chunks_exact_mut(size.width).enumerate() {
+                    source.read(row / size.height, row % size.height, 0, into);
                 }
                 plan.run(input, output)?;
                 self.head.field_of(self.input, &colours, output, input, field)

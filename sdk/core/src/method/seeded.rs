@@ -9,6 +9,7 @@
 //! stretched about the middle by the colour's λ·V/p², because a hologram without its carrier depends on λ·z/p² alone.
 //! So one small network serves all colours and any lasers.
 
+use crate::Size;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch, Source};
@@ -53,19 +54,19 @@ impl SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`InputKind::Seeded`] or [`InputKind::SeededColour`], for frames of (`height`,
-    /// `width`), on the field of its [`seed`] at the midpoint.
+    /// Plans `network`, whose input is [`InputKind::Seeded`] or [`InputKind::SeededColour`], for frames of `size`, on the
+    /// field of its [`seed`] at the midpoint.
     ///
     /// # Errors
     /// Returns an error if the network or the sweep cannot be planned.
-    pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
+    pub fn new(size: Size, network: &Network, display: &Display) -> Result<Self> {
         let sweep = seed(network, display);
         let in_turn = network.input() == InputKind::SeededColour;
         Ok(SeededPlan {
             in_turn: in_turn.then(|| network.depth_scales_in_turn(display)).transpose()?,
             colours: display.colours(),
-            sweep: SweepPlan::new(height, width, display, sweep, 0.0)?,
-            network: network.plan_for(height, width, display)?,
+            sweep: SweepPlan::new(size, display, sweep, 0.0)?,
+            network: network.plan_for(size, display)?,
         })
     }
 
@@ -81,7 +82,7 @@ impl SeededPlan {
 
     /// Returns working memory for one frame at a time, sized for the current thread pool.
     pub fn scratch(&self) -> SeededScratch {
-        let (height, width) = self.sweep.shape();
+        let Size { width, height } = self.sweep.size();
         SeededScratch {
             seed: vec![Complex32::ZERO; self.colours * height * width],
             sweep: self.sweep.scratch(),
@@ -136,7 +137,7 @@ impl Source for SeededFrame<'_> {
         let Some(part) = plane.checked_sub(RGBD) else {
             return self.frame.read(plane, row, from, into);
         };
-        let (height, width) = self.frame.shape();
+        let Size { width, height } = self.frame.size();
         let at = ((part % 3 % self.frame.colours()) * height + row) * width + from;
         let values = into.iter_mut().zip(&self.seed[at..]);
         match part / 3 {

@@ -24,6 +24,7 @@ mod shares;
 mod tile;
 mod workers;
 
+use crate::Size;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::runtime::cancel::Cancel;
@@ -164,8 +165,7 @@ pub struct FitError {
 
 /// A plan of the sweep for one frame shape and display. It is immutable and can be shared between threads.
 pub struct SweepPlan {
-    height: usize,
-    width: usize,
+    size: Size,
     sweep: Sweep,
     z_m: f64,
     fir: Fir,
@@ -192,33 +192,33 @@ impl SweepScratch {
 }
 
 impl SweepPlan {
-    /// Plans frames of (`height`, `width`) for `display` with the hologram at `z_m`, where 0 is the midpoint. This fits
+    /// Plans frames of `size` for `display` with the hologram at `z_m`, where 0 is the midpoint. This fits
     /// the filters.
     ///
     /// # Errors
     /// Returns an error if the frame is empty or too large, a number of `sweep` is out of its range, or the hologram is
     /// so far away that light spreads over more than [`MAX_HOME_REACH`] from the front of the volume.
-    pub fn new(height: usize, width: usize, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
+    pub fn new(size: Size, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
+        let Size { width, height } = size;
         sweep.check(display)?;
         Isa::of_variable().map_err(Error::Setting)?;
         if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
             return Err(Error::Setting(format!(
-                "sweep: a frame of {width}×{height} pixels is empty or too large"
+                "sweep: a frame of {size} pixels is empty or too large"
             )));
         }
         let optics = optics(display, &sweep, z_m)?;
         // Fitting is the only slow part of planning, and colours are independent.
         let filters = optics.par_iter().map(|optics| Filters::new(optics, sweep.taps / 2));
         let filters: Vec<Filters> = filters.collect();
-        let layout = Layout::new((height, width), sweep, &optics, &filters);
+        let layout = Layout::new(size, sweep, &optics, &filters);
         Ok(SweepPlan {
-            height,
-            width,
+            size,
             sweep,
             z_m,
             fir: Fir::fastest(),
             filters,
-            hidden: Hidden::new(height, width, hidden_reach(display)),
+            hidden: Hidden::new(size, hidden_reach(display)),
             layout,
         })
     }
@@ -241,9 +241,9 @@ impl SweepPlan {
         self.fir.isa()
     }
 
-    /// Returns the frame shape (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    /// Returns the size of the frame.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns the parameters of the sweep.
@@ -272,7 +272,7 @@ impl SweepPlan {
 
     /// Returns working memory for one frame at a time, sized for the current thread pool.
     pub fn scratch(&self) -> SweepScratch {
-        let size = self.height * self.width;
+        let size = self.size.pixels();
         let layers = self.sweep.hidden_layers;
         SweepScratch {
             positions: vec![0.0; size],
@@ -293,8 +293,8 @@ impl SweepPlan {
     /// # Panics
     /// Panics if `field` does not have C·H·W values or `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
-        frame.check(self.shape(), self.filters.len())?;
-        let size = self.height * self.width;
+        frame.check(self.size(), self.filters.len())?;
+        let size = self.size.pixels();
         assert_eq!(field.len(), self.filters.len() * size);
         let (rgb, depth) = frame.values();
         const PART: usize = 1 << 14;
@@ -318,13 +318,12 @@ impl SweepPlan {
             positions: &scratch.positions,
             slots: &scratch.slots,
             hidden: &scratch.sources[..layers * size],
-            height: self.height,
-            width: self.width,
+            size: self.size,
         };
         let mut planes = field.chunks_exact_mut(size);
         // An array of the largest number of planes avoids an allocation.
         let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
-        let (down, across) = self.layout.count(self.height, self.width);
+        let (down, across) = self.layout.count(self.size);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
             if scratch.cancel.requested() {
                 return;

@@ -2,6 +2,7 @@
 //! pattern back into a complex field.
 
 use super::fft::{ConvolveScratch, Fft2};
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 
@@ -30,9 +31,9 @@ impl Opening {
         Opening { radius, shift: 0.0 }
     }
 
-    /// Zeroes the blocked frequencies of column `kx` of a spectrum of (H', W') = `shape` that is stored column by
+    /// Zeroes the blocked frequencies of column `kx` of a spectrum of that size that is stored column by
     /// column.
-    pub(crate) fn stop(self, kx: usize, (height, width): (usize, usize), column: &mut [Complex32]) {
+    pub(crate) fn stop(self, kx: usize, Size { width, height }: Size, column: &mut [Complex32]) {
         let signed = if 2 * kx > width {
             kx as f64 - width as f64
         } else {
@@ -64,11 +65,12 @@ pub struct Aperture {
 }
 
 impl Aperture {
-    /// Plans the filtering of (`height`, `width`) planes, periodic as in Eq. 8, by `opening`.
+    /// Plans the filtering of planes of `size`, periodic as in Eq. 8, by `opening`.
     ///
     /// # Errors
     /// Returns an error if the radius is not positive or the plane is empty.
-    pub fn new(height: usize, width: usize, opening: Opening) -> Result<Self> {
+    pub fn new(size: Size, opening: Opening) -> Result<Self> {
+        let Size { width, height } = size;
         opening.check()?;
         if height == 0 || width == 0 {
             return Err(Error::Setting(format!(
@@ -76,7 +78,7 @@ impl Aperture {
             )));
         }
         Ok(Aperture {
-            fft: Fft2::new(height, width, height, width),
+            fft: Fft2::new(size, size),
             opening,
         })
     }
@@ -91,12 +93,12 @@ impl Aperture {
     /// # Panics
     /// Panics if `plane` does not have H·W values or `scratch` belongs to another plan.
     pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
-        let shape = self.fft.padded_shape();
-        let scale = 1.0 / (shape.0 * shape.1) as f32;
+        let size = self.fft.padded_size();
+        let scale = 1.0 / (size.height * size.width) as f32;
         self.fft.convolve(
             plane,
             |kx, column| {
-                self.opening.stop(kx, shape, column);
+                self.opening.stop(kx, size, column);
                 column.iter_mut().for_each(|value| *value *= scale);
             },
             scratch,

@@ -12,6 +12,7 @@ use super::aperture::Opening;
 use super::aperture::passes;
 use super::fft::{ConvolveScratch, Fft2, fast_size};
 use super::zernike::Aberration;
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
@@ -48,19 +49,13 @@ pub fn carrier(distance_m: f64, wavelength_m: f64) -> Complex32 {
     Complex32::new(phase.re as f32, phase.im as f32)
 }
 
-/// Returns the padded shape (H', W') in which a (`height`, `width`) frame propagates by up to `distance_m`.
+/// Returns the padded size in which a frame of `size` propagates by up to `distance_m`.
 ///
 /// # Errors
 /// Returns an error if the frame is empty, the distance is not finite, or the padded plane would exceed
 /// [`MAX_PADDED_VALUES`].
-pub fn padded_shape(
-    height: usize,
-    width: usize,
-    pitch_m: f64,
-    wavelength_m: f64,
-    distance_m: f64,
-    padding: Padding,
-) -> Result<(usize, usize)> {
+pub fn padded_size(size: Size, pitch_m: f64, wavelength_m: f64, distance_m: f64, padding: Padding) -> Result<Size> {
+    let Size { width, height } = size;
     if height == 0 || width == 0 {
         return Err(Error::Setting(format!(
             "a plane of {width}×{height} is empty; each side must be at least 1"
@@ -88,8 +83,11 @@ pub fn padded_shape(
         )));
     }
     Ok(match padding {
-        Padding::Circular => (height, width),
-        _ => (fast_size(h as usize), fast_size(w as usize)),
+        Padding::Circular => size,
+        _ => Size {
+            width: fast_size(w as usize),
+            height: fast_size(h as usize),
+        },
     })
 }
 
@@ -116,7 +114,10 @@ impl Transfer {
     /// Computes H(µ, ν) of `distance_m` on a padded plane (H', W'). It is zero if `keep` returns false for |µ|, |ν|, in
     /// cycles per metre, or if the wave is evanescent.
     pub fn new(
-        (padded_height, padded_width): (usize, usize),
+        Size {
+            width: padded_width,
+            height: padded_height,
+        }: Size,
         pitch_m: f64,
         wavelength_m: f64,
         distance_m: f64,
@@ -146,7 +147,10 @@ impl Transfer {
     /// Computes H(µ, ν)·exp(i·`phase`(µ, ν)) of `distance_m` on a padded plane (H', W'), with signed µ and ν: free
     /// space and a correction in the pupil. Takes four times the memory of [`Self::new`].
     pub fn corrected(
-        (padded_height, padded_width): (usize, usize),
+        Size {
+            width: padded_width,
+            height: padded_height,
+        }: Size,
         pitch_m: f64,
         wavelength_m: f64,
         distance_m: f64,
@@ -234,7 +238,10 @@ fn polar(scale: f64, phase: f64) -> Complex32 {
 /// Returns the predicate `keep` of [`Transfer::new`] for `padding`. It keeps all frequencies, or only those under the
 /// band limit if the doubled plane cannot hold the kernel.
 fn band_limit(
-    (padded_height, padded_width): (usize, usize),
+    Size {
+        width: padded_width,
+        height: padded_height,
+    }: Size,
     pitch_m: f64,
     wavelength_m: f64,
     distance_m: f64,
@@ -258,7 +265,7 @@ fn band_limit(
 /// use num_complex::Complex32;
 /// use phasefront_core::optics::asm::{Padding, Propagator};
 ///
-/// let plan = Propagator::new(64, 48, 8e-6, 520e-9, 3e-3, Padding::Reach)?;
+/// let plan = Propagator::new(Size { width: 48, height: 64 }, 8e-6, 520e-9, 3e-3, Padding::Reach)?;
 /// let mut scratch = plan.scratch();
 /// let mut plane = vec![Complex32::new(1.0, 0.0); 64 * 48];
 /// plan.propagate(&mut plane, &mut scratch);
@@ -266,53 +273,45 @@ fn band_limit(
 /// ```
 #[derive(Clone)]
 pub struct Propagator {
-    shape: (usize, usize),
+    size: Size,
     fft: Arc<Fft2>,
     transfer: Arc<Transfer>,
 }
 
 impl Propagator {
-    /// Plans ASM(·, `distance_m`) of (`height`, `width`) planes.
+    /// Plans ASM(·, `distance_m`) of planes of `size`.
     ///
     /// # Errors
-    /// Returns an error if [`padded_shape`] does.
-    pub fn new(
-        height: usize,
-        width: usize,
-        pitch_m: f64,
-        wavelength_m: f64,
-        distance_m: f64,
-        padding: Padding,
-    ) -> Result<Self> {
-        let padded = padded_shape(height, width, pitch_m, wavelength_m, distance_m, padding)?;
+    /// Returns an error if [`padded_size`] does.
+    pub fn new(size: Size, pitch_m: f64, wavelength_m: f64, distance_m: f64, padding: Padding) -> Result<Self> {
+        let padded = padded_size(size, pitch_m, wavelength_m, distance_m, padding)?;
         let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
         Ok(Propagator {
-            shape: (height, width),
-            fft: Arc::new(Fft2::new(height, width, padded.0, padded.1)),
+            size,
+            fft: Arc::new(Fft2::new(size, padded)),
             transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
         })
     }
 
-    /// Creates a plan for each wavelength. The plans share the padded shape of the longest wavelength, which is the
+    /// Creates a plan for each wavelength. The plans share the padded size of the longest wavelength, which is the
     /// largest, and can therefore share one [`ConvolveScratch`].
     ///
     /// # Errors
-    /// Returns an error if [`padded_shape`] does.
+    /// Returns an error if [`padded_size`] does.
     pub fn for_colours(
-        height: usize,
-        width: usize,
+        size: Size,
         pitch_m: f64,
         wavelengths_m: &[f64],
         distance_m: f64,
         padding: Padding,
     ) -> Result<Vec<Self>> {
         let longest = wavelengths_m.iter().copied().fold(0.0, f64::max);
-        let padded = padded_shape(height, width, pitch_m, longest, distance_m, padding)?;
-        let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
+        let padded = padded_size(size, pitch_m, longest, distance_m, padding)?;
+        let fft = Arc::new(Fft2::new(size, padded));
         let plan = |&wavelength_m: &f64| {
             let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
             Propagator {
-                shape: (height, width),
+                size,
                 fft: fft.clone(),
                 transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
             }
@@ -324,11 +323,10 @@ impl Propagator {
     /// of a modulator of `modulator_pitch_m` to each colour.
     ///
     /// # Errors
-    /// Returns an error if [`padded_shape`] does for planes padded by the reach of the correction too, or if the
+    /// Returns an error if [`padded_size`] does for planes padded by the reach of the correction too, or if the
     /// correction has another number of colours.
     pub fn for_colours_corrected(
-        height: usize,
-        width: usize,
+        size: Size,
         pitch_m: f64,
         wavelengths_m: &[f64],
         distance_m: f64,
@@ -344,15 +342,18 @@ impl Propagator {
         }
         let longest = wavelengths_m.iter().copied().fold(0.0, f64::max);
         let more = (aberration.reach_m(modulator_pitch_m) / pitch_m).ceil() as usize;
-        let (h, w) = (height.saturating_add(more), width.saturating_add(more));
-        let padded = padded_shape(h, w, pitch_m, longest, distance_m, Padding::Reach)?;
-        let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
+        let wider = Size {
+            width: size.width.saturating_add(more),
+            height: size.height.saturating_add(more),
+        };
+        let padded = padded_size(wider, pitch_m, longest, distance_m, Padding::Reach)?;
+        let fft = Arc::new(Fft2::new(size, padded));
         let plan = |(colour, &wavelength_m): (usize, &f64)| {
             let transfer = Transfer::corrected(padded, pitch_m, wavelength_m, distance_m, |mu, nu| {
                 aberration.phase(colour, mu, nu, modulator_pitch_m)
             });
             Propagator {
-                shape: (height, width),
+                size,
                 fft: fft.clone(),
                 transfer: Arc::new(transfer),
             }
@@ -360,14 +361,14 @@ impl Propagator {
         Ok(wavelengths_m.iter().enumerate().map(plan).collect())
     }
 
-    /// Returns (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.shape
+    /// Returns the size.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Returns (H', W').
-    pub fn padded_shape(&self) -> (usize, usize) {
-        self.fft.padded_shape()
+    pub fn padded_size(&self) -> Size {
+        self.fft.padded_size()
     }
 
     /// Returns the transfer function.
@@ -408,9 +409,9 @@ impl Propagator {
     /// # Panics
     /// Panics in the cases of [`Self::propagate`].
     pub fn propagate_through(&self, plane: &mut [Complex32], radius: f64, scratch: &mut ConvolveScratch) {
-        let (shape, opening) = (self.padded_shape(), Opening::centred(radius));
+        let (size, opening) = (self.padded_size(), Opening::centred(radius));
         let filter = |x: usize, column: &mut [Complex32]| {
-            opening.stop(x, shape, column);
+            opening.stop(x, size, column);
             self.transfer.apply(x, column);
         };
         self.fft.convolve(plane, filter, scratch);

@@ -11,6 +11,7 @@ mod convolve;
 mod passes;
 mod size;
 
+use crate::Size;
 pub use convolve::ConvolveScratch;
 pub use passes::{Scratch, Work};
 pub use size::fast_size;
@@ -48,9 +49,13 @@ fn parts() -> usize {
 }
 
 impl Fft2 {
-    /// Plans the transforms of a (`height`, `width`) frame at the top left of a plane of (`padded_height`,
-    /// `padded_width`).
-    pub fn new(height: usize, width: usize, padded_height: usize, padded_width: usize) -> Self {
+    /// Plans the transforms of a frame of `size` at the top left of a plane of `padded_size`.
+    pub fn new(size: Size, padded_size: Size) -> Self {
+        let Size { width, height } = size;
+        let Size {
+            width: padded_width,
+            height: padded_height,
+        } = padded_size;
         assert!(0 < height && height <= padded_height && 0 < width && width <= padded_width);
         let mut planner = FftPlanner::new();
         Fft2 {
@@ -70,8 +75,11 @@ impl Fft2 {
     }
 
     /// Returns (H', W').
-    pub fn padded_shape(&self) -> (usize, usize) {
-        (self.padded_height, self.padded_width)
+    pub fn padded_size(&self) -> Size {
+        Size {
+            width: self.padded_width,
+            height: self.padded_height,
+        }
     }
 
     /// Returns the number of scratch values of one 1D transform.

@@ -1,5 +1,6 @@
 //! The definition of the angular spectrum method as direct sums in f64. Tests compare [`super::asm`] with it.
 
+use crate::Size;
 use ndarray::Array2;
 use num_complex::Complex64;
 use std::f64::consts::PI;
@@ -11,15 +12,15 @@ pub fn propagate(
     pitch_m: f64,
     wavelength_m: f64,
     distance_m: f64,
-    padded: (usize, usize),
+    padded: Size,
 ) -> Array2<Complex64> {
     let (h, w) = field.dim();
-    let mut plane = Array2::zeros(padded);
+    let mut plane = Array2::zeros(padded.shape());
     plane.slice_mut(ndarray::s![..h, ..w]).assign(field);
     let mut spectrum = dft(&plane, -1.0);
     for ((ky, kx), value) in spectrum.indexed_iter_mut() {
-        let mu = frequency(kx, padded.1) / pitch_m;
-        let nu = frequency(ky, padded.0) / pitch_m;
+        let mu = frequency(kx, padded.width) / pitch_m;
+        let nu = frequency(ky, padded.height) / pitch_m;
         let square = wavelength_m.powi(-2) - mu * mu - nu * nu;
         *value *= if square < 0.0 {
             Complex64::ZERO
@@ -27,7 +28,7 @@ pub fn propagate(
             Complex64::from_polar(1.0, 2.0 * PI * distance_m * square.sqrt())
         };
     }
-    let out = dft(&spectrum, 1.0) / (padded.0 * padded.1) as f64;
+    let out = dft(&spectrum, 1.0) / (padded.height * padded.width) as f64;
     out.slice(ndarray::s![..h, ..w]).to_owned()
 }
 

@@ -13,6 +13,7 @@
 use super::asm::{Padding, Propagator};
 use super::reference;
 use super::zernike::{Coefficients, terms};
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
@@ -23,20 +24,20 @@ pub fn sub_hologram_radius_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -
     super::asm::reach_m(distance_m, wavelength_m, pitch_m)
 }
 
-/// Computes the corrected sub-hologram φ_d of Eq. 19 in the middle of a plane of (`height`, `width`) pixels. In its
+/// Computes the corrected sub-hologram φ_d of Eq. 19 in the middle of a plane of `size`. In its
 /// circle, the amplitude is 1, and it focuses a plane wave at the signed `distance_m` (positive toward the viewer) with
 /// the correction `a`. Outside, it is 0.
 ///
 /// # Errors
 /// Returns an error if the distance is 0 or not finite, or if the aperture does not fit into the plane.
 pub fn sub_hologram(
-    height: usize,
-    width: usize,
+    size: Size,
     pitch_m: f64,
     wavelength_m: f64,
     distance_m: f64,
     a: &Coefficients,
 ) -> Result<Vec<Complex32>> {
+    let Size { width, height } = size;
     let radius_m = sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
     let pixels = radius_m / pitch_m;
     if !(pixels >= 1.0 && 2.0 * pixels <= height.min(width) as f64) {
@@ -75,17 +76,17 @@ pub fn sub_hologram(
 /// # Errors
 /// Returns an error if [`sub_hologram`] does.
 pub fn corrected_transfer_function(
-    height: usize,
-    width: usize,
+    size: Size,
     pitch_m: f64,
     wavelength_m: f64,
     distance_m: f64,
     a: &Coefficients,
 ) -> Result<Array2<Complex64>> {
+    let Size { width, height } = size;
     let spectrum = |a: &Coefficients| -> Result<Array2<Complex64>> {
-        let mut plane = sub_hologram(height, width, pitch_m, wavelength_m, distance_m, a)?;
+        let mut plane = sub_hologram(size, pitch_m, wavelength_m, distance_m, a)?;
         let padding = Padding::Reach;
-        let plan = Propagator::new(height, width, pitch_m, wavelength_m, distance_m, padding)?;
+        let plan = Propagator::new(size, pitch_m, wavelength_m, distance_m, padding)?;
         plan.propagate(&mut plane, &mut plan.scratch());
         // The centre moves to the corner, so that Φ does not depend on the position of the sub-hologram.
         let (cy, cx) = ((height - 1) / 2, (width - 1) / 2);
@@ -122,8 +123,10 @@ mod tests {
         let a = [0.6, -0.8, 0.5, 0.7, -0.4];
         let aberration = Aberration::new([a; 3]).unwrap();
         for distance in [14e-3, -14e-3] {
-            let literal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &a).unwrap();
-            let ideal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &[0.0; 5]).unwrap();
+            let literal =
+                corrected_transfer_function(Size { width: n, height: n }, PITCH, GREEN, distance, &a).unwrap();
+            let ideal =
+                corrected_transfer_function(Size { width: n, height: n }, PITCH, GREEN, distance, &[0.0; 5]).unwrap();
             let (mut square, mut count) = (0.0, 0.0);
             for ((ky, kx), value) in literal.indexed_iter() {
                 let signed = |k: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
@@ -145,7 +148,7 @@ mod tests {
     #[test]
     fn sub_holograms_that_cannot_be_are_named() {
         for distance in [0.0, f64::NAN, 1.0] {
-            let e = sub_hologram(64, 64, PITCH, GREEN, distance, &[0.0; 5]).unwrap_err();
+            let e = sub_hologram(Size { width: 64, height: 64 }, PITCH, GREEN, distance, &[0.0; 5]).unwrap_err();
             assert!(e.to_string().contains("sub-hologram"), "{e}");
         }
     }

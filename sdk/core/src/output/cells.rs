@@ -4,6 +4,7 @@
 //! Plane n of a frame is bit n mod 8 of red (n < 8), green (n < 16) or blue.
 
 use super::{check_rows, flip};
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -59,7 +60,7 @@ impl Cells {
 #[derive(Debug, Clone)]
 pub struct BitPlanes {
     levels: usize,
-    shape: (usize, usize),
+    size: Size,
     flip_x: bool,
     flip_y: bool,
     /// The four cells' bits of each level in the frame's order: upper left, upper right, lower left, lower right. Each
@@ -71,8 +72,8 @@ pub struct BitPlanes {
 }
 
 impl BitPlanes {
-    /// Plans frames of 2·H×2·W cells for `shape` = (H, W) pixels. The flips apply to both cells and pixels.
-    pub fn new(cells: &Cells, shape: (usize, usize), flip_x: bool, flip_y: bool) -> Self {
+    /// Plans frames of 2·H×2·W cells for `size`. The flips apply to both cells and pixels.
+    pub fn new(cells: &Cells, size: Size, flip_x: bool, flip_y: bool) -> Self {
         let spread: [u32; 16] = std::array::from_fn(|level| {
             // Ignores bits above those of a level.
             let bits = cells.bits(level % cells.levels());
@@ -81,7 +82,7 @@ impl BitPlanes {
         });
         BitPlanes {
             levels: cells.levels(),
-            shape,
+            size,
             flip_x,
             flip_y,
             pairs: Box::new(std::array::from_fn(|pair| spread[pair % 16] | spread[pair / 16] << 1)),
@@ -90,13 +91,16 @@ impl BitPlanes {
     }
 
     /// Returns the shape (H, W) of a frame, which has two cells for each pixel along each axis.
-    pub fn frame_shape(&self) -> (usize, usize) {
-        (2 * self.shape.0, 2 * self.shape.1)
+    pub fn frame_size(&self) -> Size {
+        Size {
+            width: 2 * self.size.width,
+            height: 2 * self.size.height,
+        }
     }
 
     /// Returns the number of bytes of a frame, with red, green and blue for each cell.
     pub fn frame_bytes(&self) -> usize {
-        12 * self.shape.0 * self.shape.1
+        12 * self.size.height * self.size.width
     }
 
     /// Packs `maps` of levels, (H, W) each, into `frame`. The maps are displayed one after another for equal times:
@@ -109,7 +113,7 @@ impl BitPlanes {
     /// # Panics
     /// Panics if a map does not have the planned length.
     pub fn pack(&self, maps: &[&[u8]], frame: &mut [u8], row_stride: usize) -> Result<()> {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         let count = maps.len();
         if count == 0 || !PLANES.is_multiple_of(count) {
             return Err(Error::Setting(format!(
@@ -163,7 +167,7 @@ impl BitPlanes {
     /// # Panics
     /// Panics if `frame` or `levels` does not have the planned length.
     pub fn unpack(&self, frame: &[u8], plane: usize, levels: &mut [u8]) -> Result<()> {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         assert!(frame.len() == self.frame_bytes() && levels.len() == height * width);
         if plane >= PLANES {
             return Err(Error::Setting(format!(
@@ -196,7 +200,7 @@ mod tests {
     const MEMORY: [u8; 16] = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12];
 
     /// Returns levels that differ between maps, rows and columns.
-    fn map(n: usize, (height, width): (usize, usize)) -> Vec<u8> {
+    fn map(n: usize, Size { width, height }: Size) -> Vec<u8> {
         (0..height * width)
             .map(|at| ((at / width * 5 + at % width * 3 + n * 7) % 16) as u8)
             .collect()
@@ -209,10 +213,10 @@ mod tests {
             ([[1, 3], [0, 2]], true, false),
             ([[1, 3], [0, 2]], true, true),
         ] {
-            let (cells, shape) = (Cells::new(&MEMORY, layout).unwrap(), (5, 7));
-            let plan = BitPlanes::new(&cells, shape, flip_x, flip_y);
+            let (cells, size) = (Cells::new(&MEMORY, layout).unwrap(), Size { width: 7, height: 5 });
+            let plan = BitPlanes::new(&cells, size, flip_x, flip_y);
             for count in [1, 2, 3, 8, 24] {
-                let maps: Vec<Vec<u8>> = (0..count).map(|n| map(n, shape)).collect();
+                let maps: Vec<Vec<u8>> = (0..count).map(|n| map(n, size)).collect();
                 let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
                 let mut frame = vec![0; plan.frame_bytes()];
                 plan.pack(&maps, &mut frame, 6 * 7).unwrap();
@@ -230,7 +234,7 @@ mod tests {
                 }
             }
             assert!(
-                plan.pack(&[map(0, shape).as_slice(); 5], &mut vec![0; plan.frame_bytes()], 6 * 7)
+                plan.pack(&[map(0, size).as_slice(); 5], &mut vec![0; plan.frame_bytes()], 6 * 7)
                     .is_err()
             );
             assert!(plan.unpack(&vec![0; plan.frame_bytes()], 24, &mut [0; 35]).is_err());

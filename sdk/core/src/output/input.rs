@@ -2,6 +2,7 @@
 
 use super::modulator::{ModulatorSpec, Packing};
 use super::{BitPlanes, Layout, Output, Placement, check_rows, rows};
+use crate::Size;
 use crate::display::levels::Levels;
 use crate::display::target::Target;
 use crate::runtime::error::{Error, Result};
@@ -10,10 +11,8 @@ use rayon::prelude::*;
 /// The size and the number of the images that a modulator's input takes of a hologram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OutputSize {
-    /// The height of an image in pixels.
-    pub height: usize,
-    /// The width of an image in pixels.
-    pub width: usize,
+    /// The size of an image.
+    pub size: Size,
     /// The number of bytes of a pixel.
     pub pixel_bytes: usize,
     /// The number of images: one, or one for each colour.
@@ -38,32 +37,33 @@ impl ModulatorSpec {
     /// Returns the size of the images that the modulator's input takes.
     #[doc(hidden)]
     pub fn output_size(&self) -> OutputSize {
-        let (height, width) = (self.display.height(), self.display.width());
+        let size = self.display.size();
         match &self.packing {
             Packing::Images(layout) => OutputSize {
-                height,
-                width,
+                size,
                 pixel_bytes: layout.pixel_bytes(),
                 images: layout.images(self.display.colours()),
             },
             // Two cells along each axis, and red, green and blue for each.
             Packing::BitPlanes(_) => OutputSize {
-                height: 2 * height,
-                width: 2 * width,
+                size: Size {
+                    width: 2 * size.width,
+                    height: 2 * size.height,
+                },
                 pixel_bytes: 3,
                 images: 1,
             },
         }
     }
 
-    /// Plans the images of holograms of `shape` = (H, W) for `target`. A smaller hologram lies in the middle of the
+    /// Plans the images of holograms of `size` for `target`. A smaller hologram lies in the middle of the
     /// modulator.
     ///
     /// # Errors
     /// Returns an error if the target has another number of lasers or bits, or if the hologram is larger than the
     /// modulator; with bit planes, also if it is smaller.
     #[doc(hidden)]
-    pub fn input(&self, shape: (usize, usize), target: &Target) -> Result<ModulatorInput> {
+    pub fn input(&self, size: Size, target: &Target) -> Result<ModulatorInput> {
         let (own, theirs) = (&self.display, &target.display);
         if (theirs.colours(), theirs.bits()) != (own.colours(), own.bits()) {
             return Err(Error::Setting(format!(
@@ -77,14 +77,13 @@ impl ModulatorSpec {
         let (flip_x, flip_y) = (self.flip_x, self.flip_y);
         let plan = match &self.packing {
             Packing::BitPlanes(cells) => {
-                let modulator = (self.display.height(), self.display.width());
-                if shape != modulator {
+                let modulator = self.display.size();
+                if size != modulator {
                     return Err(Error::Setting(format!(
-                        "a hologram of {}×{} for a modulator of {}×{} pixels; for bit planes both must be of one size",
-                        shape.1, shape.0, modulator.1, modulator.0
+                        "a hologram of {size} for a modulator of {modulator} pixels; for bit planes both must be of one size"
                     )));
                 }
-                Plan::Planes(BitPlanes::new(cells, shape, flip_x, flip_y))
+                Plan::Planes(BitPlanes::new(cells, size, flip_x, flip_y))
             }
             Packing::Images(layout) => {
                 let placement = Placement {
@@ -92,7 +91,7 @@ impl ModulatorSpec {
                     flip_y,
                     ..Placement::centred(*layout)
                 };
-                Plan::Images(Box::new(Output::new(&self.target()?, shape, placement)?))
+                Plan::Images(Box::new(Output::new(&self.target()?, size, placement)?))
             }
         };
         Ok(ModulatorInput {
@@ -144,8 +143,7 @@ impl ModulatorInput {
         row_stride: usize,
     ) -> Result<()> {
         let OutputSize {
-            height,
-            width,
+            size: Size { width, height },
             pixel_bytes,
             ..
         } = self.size;
@@ -187,8 +185,7 @@ impl ModulatorInput {
     /// Panics if `levels` does not have the planned length.
     pub fn read(&self, bytes: &[u8], levels: &mut [u16]) -> Result<()> {
         let OutputSize {
-            height,
-            width,
+            size: Size { width, height },
             pixel_bytes,
             images,
         } = self.size;
@@ -226,28 +223,37 @@ mod tests {
     fn every_bundled_modulator_gives_back_its_levels() {
         for name in ModulatorSpec::names() {
             let spec = ModulatorSpec::shipped(name).unwrap();
-            let (display, size) = (&spec.display, spec.output_size());
-            let shape = (display.height(), display.width());
-            let input = spec.input(shape, &spec.target().unwrap()).unwrap();
-            let count = display.colours() * shape.0 * shape.1;
+            let (display, output) = (&spec.display, spec.output_size());
+            let size = display.size();
+            let input = spec.input(size, &spec.target().unwrap()).unwrap();
+            let count = display.colours() * size.height * size.width;
             let words: Vec<u16> = (0..count).map(|i| (i * 37 % (1 << display.bits())) as u16).collect();
             let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
             let levels = match display.bits() {
                 0..=8 => Levels::Bytes(&bytes),
                 _ => Levels::Words(&words),
             };
-            let row = size.width * size.pixel_bytes;
-            let mut images = vec![0; size.images * size.height * row];
-            for (n, image) in images.chunks_exact_mut(size.height * row).enumerate() {
+            let row = output.size.width * output.pixel_bytes;
+            let mut images = vec![0; output.images * output.size.height * row];
+            for (n, image) in images.chunks_exact_mut(output.size.height * row).enumerate() {
                 input.write(levels, n, image, row).unwrap();
             }
             let mut read = vec![0; count];
             input.read(&images, &mut read).unwrap();
             assert!(read == words, "{name}");
-            assert!(input.write(levels, size.images, &mut images, row).is_err());
+            assert!(input.write(levels, output.images, &mut images, row).is_err());
             assert!(input.read(&images[1..], &mut read).is_err());
             let target = spec.target().unwrap();
-            assert!(spec.input((shape.0 + 1, shape.1), &target).is_err());
+            assert!(
+                spec.input(
+                    Size {
+                        width: size.width,
+                        height: size.height + 1
+                    },
+                    &target
+                )
+                .is_err()
+            );
         }
     }
 
@@ -270,7 +276,9 @@ mod tests {
             let spec = ModulatorSpec::from_toml(&format!("width = 7\nheight = 5\n{toml}")).unwrap();
             let (size, colours) = (spec.output_size(), spec.display.colours());
             assert_eq!(size.pixel_bytes, bytes, "{toml}");
-            let input = spec.input((5, 7), &spec.target().unwrap()).unwrap();
+            let input = spec
+                .input(Size { width: 7, height: 5 }, &spec.target().unwrap())
+                .unwrap();
             let words: Vec<u16> = (0..colours * 35)
                 .map(|i| (i * 37 % (1 << spec.display.bits())) as u16)
                 .collect();
@@ -279,12 +287,12 @@ mod tests {
                 0..=8 => Levels::Bytes(&narrow),
                 _ => Levels::Words(&words),
             };
-            let (row, stride) = (size.width * bytes, size.width * 4 + 3);
+            let (row, stride) = (size.size.width * bytes, size.size.width * 4 + 3);
             let last = size.images - 1;
-            let mut plain = vec![0; size.height * row];
+            let mut plain = vec![0; size.size.height * row];
             input.write(levels, last, &mut plain, row).unwrap();
             for (layout, order) in [(Layout::Rgba, [0, 1, 2]), (Layout::Bgra, [2, 1, 0])] {
-                let mut pixels = vec![9; size.height * stride];
+                let mut pixels = vec![9; size.size.height * stride];
                 input.write_pixels(levels, last, layout, &mut pixels, stride).unwrap();
                 for (y, row) in plain.chunks_exact(row).enumerate() {
                     for (x, pixel) in row.chunks_exact(bytes).enumerate() {
@@ -293,15 +301,15 @@ mod tests {
                         assert_eq!((&got[..3], got[3]), (&want[..], 255), "{toml}: {layout:?}, {x}, {y}");
                     }
                     assert_eq!(
-                        pixels[y * stride + 4 * size.width..][..3],
+                        pixels[y * stride + 4 * size.size.width..][..3],
                         [9; 3],
                         "{toml}: between rows"
                     );
                 }
-                let mut small = vec![9; size.height * row + 1];
+                let mut small = vec![9; size.size.height * row + 1];
                 assert!(
                     input
-                        .write_pixels(levels, last, layout, &mut small, 4 * size.width)
+                        .write_pixels(levels, last, layout, &mut small, 4 * size.size.width)
                         .is_err()
                 );
                 assert!(small.iter().all(|byte| *byte == 9), "nothing was written");
@@ -314,7 +322,9 @@ mod tests {
             assert!(input.write_pixels(levels, 0, Layout::Rgb, &mut plain, row).is_err());
         }
         let spec = ModulatorSpec::from_toml("width = 4\nheight = 4\nbits = 10").unwrap();
-        let input = spec.input((4, 4), &spec.target().unwrap()).unwrap();
+        let input = spec
+            .input(Size { width: 4, height: 4 }, &spec.target().unwrap())
+            .unwrap();
         let refused = input.write_pixels(Levels::Words(&[0; 48]), 0, Layout::Rgba, &mut [0; 64], 16);
         assert!(refused.unwrap_err().to_string().contains("16 bits of grey"));
     }

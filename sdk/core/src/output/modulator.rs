@@ -312,6 +312,7 @@ impl Packing {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::Size;
     use crate::output::BitPlanes;
 
     /// Returns the levels in `text`, one hexadecimal digit for each of 256 steps of 2π.
@@ -376,7 +377,7 @@ mod tests {
             let Packing::BitPlanes(cells) = &device.packing else {
                 panic!("{name} has cells")
             };
-            let plan = BitPlanes::new(cells, (2, 8), device.flip_x, device.flip_y);
+            let plan = BitPlanes::new(cells, Size { width: 8, height: 2 }, device.flip_x, device.flip_y);
             let levels: Vec<u8> = (0..16).collect();
             let mut frame = vec![0; plan.frame_bytes()];
             plan.pack(&[&levels], &mut frame, 6 * 8).unwrap();

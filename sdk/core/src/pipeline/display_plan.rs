@@ -3,6 +3,7 @@
 //!
 //! This module does not depend on how the midpoint hologram was made.
 
+use crate::Size;
 use crate::display::levels::LevelsMut;
 use crate::display::panel::PanelPlan;
 use crate::display::registration::RegistrationPlan;
@@ -78,21 +79,21 @@ pub struct Modulation {
 }
 
 impl DisplayPlan {
-    /// Plans the path of midpoint holograms of (C, H, W) = `shape` to `target`. The correction of an aberration is part
+    /// Plans the path of midpoint holograms of `size` to `target`. The correction of an aberration is part
     /// of the offset's transfer function, so it costs no extra time.
     ///
     /// # Errors
     /// Returns an error if the shape, offset or correction cannot be planned, a scale is not positive, the pre-filter
     /// is for another display or offset, or a table is for another modulator.
-    pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
-        Self::from_z(shape, 0.0, target, options)
+    pub fn new(size: Size, target: &Target, options: &EncoderOptions) -> Result<Self> {
+        Self::from_z(size, 0.0, target, options)
     }
 
     /// Plans the path of fields at `z_m` to `target`.
     ///
     /// # Errors
     /// Returns the same errors as [`Self::new`].
-    pub fn from_z(shape: (usize, usize), z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
+    pub fn from_z(size: Size, z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
         if let Encoding::Deep(network) = &options.encoding {
             network.check_prefilter(&target.display)?;
         }
@@ -100,17 +101,17 @@ impl DisplayPlan {
         let colours = target.display.colours();
         Ok(DisplayPlan {
             colours,
-            height: shape.0,
-            width: shape.1,
-            offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
-            registration: RegistrationPlan::new(shape, colours, &target.registration)?,
-            encoder: Encoder::new(shape, target, options)?,
+            height: size.height,
+            width: size.width,
+            offset: target.propagators(size, 1, distance_m, target.correction.as_ref())?,
+            registration: RegistrationPlan::new(size, colours, &target.registration)?,
+            encoder: Encoder::new(size, target, options)?,
             midpoint: match options.midpoint_steps {
-                steps if steps > 0 && target.model.is_none() => Some(MidpointSteps::new(shape, target, steps)?),
+                steps if steps > 0 && target.model.is_none() => Some(MidpointSteps::new(size, target, steps)?),
                 _ => None,
             },
-            modelled: ModelSteps::new(shape, target, options.midpoint_steps)?,
-            panel: PanelPlan::new(&target.panel, &target.display, shape)?,
+            modelled: ModelSteps::new(size, target, options.midpoint_steps)?,
+            panel: PanelPlan::new(&target.panel, &target.display, size)?,
             bits: target.display.bits(),
             keeps_phase: options.encoding.keeps_phase(),
             brightness: options.brightness,
@@ -129,8 +130,11 @@ impl DisplayPlan {
     }
 
     /// Returns the shape (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    pub fn size(&self) -> Size {
+        Size {
+            width: self.width,
+            height: self.height,
+        }
     }
 
     /// Returns working memory for one call at a time.

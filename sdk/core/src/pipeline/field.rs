@@ -1,5 +1,6 @@
 //! Checks of complex fields that come from elsewhere.
 
+use crate::Size;
 use crate::display::target::Target;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -12,11 +13,12 @@ const MOST: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 /// # Errors
 /// Returns an error if the field has another number of values, is larger than the modulator, or has values that are
 /// NaN or infinite, and if its largest amplitude is 0 or not in 10⁻⁶..=10⁶.
-pub fn check(field: &[Complex32], (height, width): (usize, usize), target: &Target) -> Result<()> {
-    let (colours, (rows, columns)) = (target.display.colours(), target.modulator());
-    if height > rows || width > columns {
+pub fn check(field: &[Complex32], size: Size, target: &Target) -> Result<()> {
+    let (colours, modulator) = (target.display.colours(), target.modulator());
+    let Size { width, height } = size;
+    if height > modulator.height || width > modulator.width {
         return Err(Error::Frame(format!(
-            "a field of {width}×{height} does not fit the modulator of {columns}×{rows}; crop it, or name its display"
+            "a field of {size} does not fit the modulator of {modulator}; crop it, or name its display"
         )));
     }
     let needed = height.checked_mul(width).and_then(|plane| plane.checked_mul(colours));
@@ -57,22 +59,42 @@ mod tests {
     fn fields_that_cannot_be_encoded_are_named() {
         let target = Target::from(Display::from_toml("width = 5\nheight = 3").unwrap());
         let field = vec![Complex32::ONE; 3 * 2 * 5];
-        check(&field, (2, 5), &target).unwrap();
+        check(&field, Size { width: 5, height: 2 }, &target).unwrap();
         let with = |value: Complex32| {
             let mut field = field.clone();
             field[2 * 10 + 7] = value;
             field
         };
-        for (field, shape, words) in [
-            (field.clone(), (2, 6), "6×2 does not fit the modulator of 5×3"),
-            (field.clone(), (2, 4), "30 values; (3, 2, 4) has 24"),
-            (with(Complex32::new(f32::NAN, 0.0)), (2, 5), "plane 2, row 1, column 2"),
-            (with(Complex32::new(0.0, f32::INFINITY)), (2, 5), "must be finite"),
-            (with(Complex32::new(3e7, 0.0)), (2, 5), "amplitude of the field is 3e7"),
-            (vec![Complex32::ZERO; 30], (2, 5), "dark"),
-            (Vec::new(), (0, 5), "dark"),
+        for (field, size, words) in [
+            (
+                field.clone(),
+                Size { width: 6, height: 2 },
+                "6×2 does not fit the modulator of 5×3",
+            ),
+            (
+                field.clone(),
+                Size { width: 4, height: 2 },
+                "30 values; (3, 2, 4) has 24",
+            ),
+            (
+                with(Complex32::new(f32::NAN, 0.0)),
+                Size { width: 5, height: 2 },
+                "plane 2, row 1, column 2",
+            ),
+            (
+                with(Complex32::new(0.0, f32::INFINITY)),
+                Size { width: 5, height: 2 },
+                "must be finite",
+            ),
+            (
+                with(Complex32::new(3e7, 0.0)),
+                Size { width: 5, height: 2 },
+                "amplitude of the field is 3e7",
+            ),
+            (vec![Complex32::ZERO; 30], Size { width: 5, height: 2 }, "dark"),
+            (Vec::new(), Size { width: 5, height: 0 }, "dark"),
         ] {
-            let said = check(&field, shape, &target).unwrap_err().to_string();
+            let said = check(&field, size, &target).unwrap_err().to_string();
             assert!(said.contains(words), "no {words:?} in {said}");
         }
     }

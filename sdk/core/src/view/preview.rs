@@ -6,6 +6,7 @@
 //! Frequencies above 1/(2·`factor`) cycles per pixel are lost, so fine detail far from focus appears less blurred than
 //! it should.
 
+use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::panel::PanelPlan;
 use crate::display::response::Response;
@@ -27,16 +28,16 @@ const MOST_SIDE: usize = 1 << 14;
 /// A plan for one hologram shape, z and screen size. It is immutable and can be shared between threads.
 pub struct Preview {
     colours: usize,
-    hologram: (usize, usize),
-    small: (usize, usize),
+    hologram: Size,
+    small: Size,
     factor: usize,
     /// `None` if the hologram is already at z.
     propagators: Option<Vec<Propagator>>,
     /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
-    illumination: Option<(Illumination, (usize, usize))>,
+    illumination: Option<(Illumination, Size)>,
     response: Response,
     panel: Option<PanelPlan>,
-    screen: (usize, usize),
+    screen: Size,
     x: Axis,
     y: Axis,
 }
@@ -45,7 +46,7 @@ pub struct Preview {
 ///
 /// # Errors
 /// Returns an error if the image has more than [`MOST_PIXELS`] in all or more than 2¹⁴ pixels along a side.
-fn check_screen((height, width): (usize, usize)) -> Result<()> {
+fn check_screen(Size { width, height }: Size) -> Result<()> {
     if height.max(width) > MOST_SIDE || height * width > MOST_PIXELS {
         return Err(Error::Setting(format!(
             "a preview of {width}×{height} is too large; {MOST_SIDE} pixels a side and {MOST_PIXELS} in all are the most"
@@ -62,41 +63,44 @@ pub struct PreviewScratch {
 }
 
 impl Preview {
-    /// Plans views at `z_m` of holograms of (H, W) for `target`, through the optics that it corrects, as images of
-    /// `screen` (H, W).
+    /// Plans views at `z_m` of holograms of `size` for `target`, through the optics that it corrects, as images of
+    /// the size `screen`.
     ///
     /// # Errors
     /// Returns an error if the hologram has fewer than 2 pixels along a side, the screen is empty or has more than
     /// [`MOST_PIXELS`], z is too far away, or a table is for another modulator.
-    pub fn new((height, width): (usize, usize), target: &Target, z_m: f64, screen: (usize, usize)) -> Result<Self> {
-        if height < 2 || width < 2 || screen.0 == 0 || screen.1 == 0 {
+    pub fn new(size: Size, target: &Target, z_m: f64, screen: Size) -> Result<Self> {
+        let Size { width, height } = size;
+        if height < 2 || width < 2 || screen.height == 0 || screen.width == 0 {
             return Err(Error::Setting(format!(
-                "a preview of {}×{} of a hologram of {width}×{height}: the screen's sides must be at least 1, the hologram's 2",
-                screen.1, screen.0
+                "a preview of {screen} of a hologram of {size}: the screen's sides must be at least 1, the hologram's 2"
             )));
         }
         check_screen(screen)?;
         // An even factor weights both colours of the checkerboard equally.
-        let ratio = (height as f64 / screen.0 as f64).min(width as f64 / screen.1 as f64);
+        let ratio = (height as f64 / screen.height as f64).min(width as f64 / screen.width as f64);
         let factor = ((ratio / 2.0) as usize * 2).clamp(2, 8);
         let factor = factor.min(height.min(width) / 2 * 2);
-        let small = (height / factor, width / factor);
+        let small = Size {
+            width: width / factor,
+            height: height / factor,
+        };
         target.check()?;
         let distance_m = z_m - target.display.offset_m();
         let aberration = target.correction.as_ref().map(Aberration::reversed);
         let illumination = target.illumination.clone();
         Ok(Preview {
             colours: target.display.colours(),
-            hologram: (height, width),
+            hologram: size,
             small,
             factor,
             propagators: target.propagators(small, factor, distance_m, aberration.as_ref())?,
             illumination: illumination.map(|light| (light, target.modulator())),
-            response: target.response.clone().centred(height, width)?,
-            panel: PanelPlan::new(&target.panel, &target.display, (height, width))?,
+            response: target.response.clone().centred(size)?,
+            panel: PanelPlan::new(&target.panel, &target.display, size)?,
             screen,
-            x: Axis::new(small.1, 0.0, small.1 as f64, screen.1),
-            y: Axis::new(small.0, 0.0, small.0 as f64, screen.0),
+            x: Axis::new(small.width, 0.0, small.width as f64, screen.width),
+            y: Axis::new(small.height, 0.0, small.height as f64, screen.height),
         })
     }
 
@@ -106,12 +110,12 @@ impl Preview {
     }
 
     /// Returns the shape (H, W) of the image.
-    pub fn screen(&self) -> (usize, usize) {
+    pub fn screen(&self) -> Size {
         self.screen
     }
 
     /// Returns the shape (H, W) of the field after averaging, (h, w).
-    pub fn small(&self) -> (usize, usize) {
+    pub fn small(&self) -> Size {
         self.small
     }
 
@@ -137,7 +141,7 @@ impl Preview {
     /// Returns the weights of the sums of the light of `factor` × `factor` pixels, (C, h, w): their mean over the gain
     /// of the light that falls on them.
     pub fn weights(&self) -> Vec<f32> {
-        let (height, width) = self.small;
+        let Size { width, height } = self.small;
         let mut weights =
             vec![Complex32::from(1.0 / (self.factor * self.factor) as f32); self.colours * height * width];
         for (row, weights) in weights.chunks_exact_mut(width).enumerate() {
@@ -148,7 +152,7 @@ impl Preview {
 
     /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> PreviewScratch {
-        let size = self.small.0 * self.small.1;
+        let size = self.small.height * self.small.width;
         PreviewScratch {
             field: vec![Complex32::ZERO; size],
             amplitude: vec![0.0; self.colours * size],
@@ -172,15 +176,22 @@ impl Preview {
         (layout, bytes, row_stride): (Layout, &mut [u8], usize),
         scratch: &mut PreviewScratch,
     ) -> Result<()> {
-        let (height, width) = self.hologram;
-        let (small_height, small_width) = self.small;
+        let Size { width, height } = self.hologram;
+        let Size {
+            width: small_width,
+            height: small_height,
+        } = self.small;
         assert_eq!(levels.len(), self.colours * height * width);
         if !layout.is_byte_for_each_colour() {
             return Err(Error::Setting(format!(
                 "a preview has bytes Rgb, Rgba or Bgra, not {layout:?}"
             )));
         }
-        let rows = rows(bytes, row_stride, (self.screen.0, layout.pixel_bytes() * self.screen.1))?;
+        let rows = rows(
+            bytes,
+            row_stride,
+            (self.screen.height, layout.pixel_bytes() * self.screen.width),
+        )?;
         let light = scale / (self.factor * self.factor) as f32;
         // If all pixels respond alike, each level has one phase.
         let shown: [Complex32; 256] = match &self.response {
@@ -218,7 +229,7 @@ impl Preview {
     /// Sums the light of `factor` × `factor` pixels into each value, from `factor` rows of levels. `light` returns the
     /// light for a level at an index in the rows.
     fn sum(&self, rows: &[u8], sums: &mut [Complex32], light: impl Fn(u8, usize) -> Complex32) {
-        let width = self.hologram.1;
+        let width = self.hologram.width;
         sums.fill(Complex32::ZERO);
         for (y, row) in rows.chunks_exact(width).enumerate() {
             for (x, (sum, pixels)) in (sums.iter_mut()).zip(row.chunks_exact(self.factor)).enumerate() {
@@ -234,21 +245,24 @@ impl Preview {
         let Some((illumination, modulator)) = &self.illumination else {
             return;
         };
-        let (height, width) = self.hologram;
+        let Size { width, height } = self.hologram;
         let middle = |at: usize, hologram: usize, modulator: usize| {
             at * self.factor + self.factor / 2 + modulator.saturating_sub(hologram) / 2
         };
-        let all = (modulator.0.max(height), modulator.1.max(width));
-        let y = middle(y, height, modulator.0);
+        let all = Size {
+            width: modulator.width.max(width),
+            height: modulator.height.max(height),
+        };
+        let y = middle(y, height, modulator.height);
         for (x, sum) in sums.iter_mut().enumerate() {
-            let x = middle(x, width, modulator.1);
+            let x = middle(x, width, modulator.width);
             *sum /= illumination.gain(colour, y, x, all);
         }
     }
 
     /// Converts the planes of amplitudes to pixels of the screen.
     fn draw<'a>(&self, amplitude: &[f32], layout: Layout, rows: impl IndexedParallelIterator<Item = &'a mut [u8]>) {
-        let (height, width) = self.small;
+        let Size { width, height } = self.small;
         rows.enumerate().for_each(|(y, pixels)| {
             let byte = |colour: usize, x: usize| {
                 let plane = &amplitude[colour * height * width..];
@@ -281,11 +295,11 @@ mod tests {
     use crate::pipeline::display_plan::DisplayPlan;
     use crate::view::refocus::{Refocus, phase_only_field};
 
-    const SHAPE: (usize, usize) = (96, 128);
+    const SIZE: Size = Size { width: 128, height: 96 };
 
     /// Returns the levels of soft blobs of each colour at z = 1 mm.
     fn hologram(display: &Display, response: &Response) -> (Vec<u8>, f32) {
-        let (height, width) = SHAPE;
+        let Size { width, height } = SIZE;
         let mut field: Vec<Complex32> = (0..3 * height * width)
             .map(|i| {
                 let (c, y, x) = (i / (height * width), i / width % height, i % width);
@@ -303,7 +317,7 @@ mod tests {
             brightness: Brightness::FrameMax,
             ..Encoding::DoublePhase.into()
         };
-        let home = DisplayPlan::new(SHAPE, &target, &options).unwrap();
+        let home = DisplayPlan::new(SIZE, &target, &options).unwrap();
         let mut scratch = home.scratch();
         home.propagate(&mut field, &mut scratch);
         let mut levels = vec![0; 3 * height * width];
@@ -314,7 +328,7 @@ mod tests {
     #[test]
     fn the_small_view_is_the_full_one_made_small() {
         let response = Response::linear(8).unwrap();
-        let (height, width) = SHAPE;
+        let Size { width, height } = SIZE;
         for offset_m in [0.0, 3e-3] {
             let display = Display::default().with_offset_m(offset_m).unwrap();
             let (levels, scale) = hologram(&display, &response);
@@ -322,18 +336,18 @@ mod tests {
             let mut shown = vec![Complex32::ZERO; levels.len()];
             phase_only_field(&levels, &response, scale, &mut shown);
             for z_m in [1e-3, -2e-3, offset_m] {
-                let full = Refocus::new(height, width, &display, &[z_m], Some(Opening::centred(1.0))).unwrap();
+                let full = Refocus::new(SIZE, &display, &[z_m], Some(Opening::centred(1.0))).unwrap();
                 let full = full.focal_stack(&shown, &[z_m]).unwrap().remove(0);
-                for (screen, factor) in [((48, 64), 2), ((24, 32), 4)] {
-                    let plan = Preview::new(SHAPE, &target, z_m, screen).unwrap();
+                for (screen, factor) in [(Size { width: 64, height: 48 }, 2), (Size { width: 32, height: 24 }, 4)] {
+                    let plan = Preview::new(SIZE, &target, z_m, screen).unwrap();
                     assert_eq!(plan.factor(), factor);
-                    let mut rgba = vec![0; 4 * screen.0 * screen.1];
-                    let image = (Layout::Rgba, &mut rgba[..], 4 * screen.1);
+                    let mut rgba = vec![0; 4 * screen.height * screen.width];
+                    let image = (Layout::Rgba, &mut rgba[..], 4 * screen.width);
                     plan.look(&levels, scale, image, &mut plan.scratch()).unwrap();
                     let mut squares = 0.0;
                     for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
                         assert_eq!(pixel[3], 255);
-                        let (y, x) = (i / screen.1 * factor, i % screen.1 * factor);
+                        let (y, x) = (i / screen.width * factor, i % screen.width * factor);
                         for (c, byte) in pixel[..3].iter().enumerate() {
                             let row = |dy| &full[(c * height + y + dy) * width + x..][..factor];
                             let sum: f32 = (0..factor).flat_map(row).map(|a| a.min(1.0)).sum();
@@ -341,7 +355,7 @@ mod tests {
                             squares += (mean - f32::from(*byte) / 255.0).powi(2);
                         }
                     }
-                    let error = (squares / (3 * screen.0 * screen.1) as f32).sqrt();
+                    let error = (squares / (3 * screen.height * screen.width) as f32).sqrt();
                     assert!(error < 0.03, "offset {offset_m} z {z_m} {screen:?}: {error}");
                 }
             }
@@ -351,10 +365,31 @@ mod tests {
     #[test]
     fn impossible_views_are_refused() {
         let target = Target::default();
-        assert!(Preview::new((1, 50), &target, 0.0, (10, 10)).is_err());
-        assert!(Preview::new(SHAPE, &target, 0.0, (0, 10)).is_err());
-        assert!(Preview::new(SHAPE, &target, f64::NAN, (10, 10)).is_err());
+        assert!(
+            Preview::new(
+                Size { width: 50, height: 1 },
+                &target,
+                0.0,
+                Size { width: 10, height: 10 }
+            )
+            .is_err()
+        );
+        assert!(Preview::new(SIZE, &target, 0.0, Size { width: 10, height: 0 }).is_err());
+        assert!(Preview::new(SIZE, &target, f64::NAN, Size { width: 10, height: 10 }).is_err());
         // A screen can be larger than the hologram.
-        assert_eq!(Preview::new((5, 7), &target, 1e-3, (300, 200)).unwrap().factor(), 2);
+        assert_eq!(
+            Preview::new(
+                Size { width: 7, height: 5 },
+                &target,
+                1e-3,
+                Size {
+                    width: 200,
+                    height: 300
+                }
+            )
+            .unwrap()
+            .factor(),
+            2
+        );
     }
 }

@@ -3,6 +3,7 @@
 //! A hologram at z = offset is propagated to the plane z, positive toward the viewer. The field of a phase-only
 //! hologram passes the Fourier aperture on the way, as its light does.
 
+use crate::Size;
 use crate::display::Display;
 use crate::display::levels::Levels;
 use crate::display::panel::PanelPlan;
@@ -33,12 +34,12 @@ pub struct Spectrum {
 }
 
 impl Refocus {
-    /// Plans views of a (`height`, `width`) hologram at `display.offset_m()` from every z of `z_m`, in metres.
+    /// Plans views of a hologram of `size` at `display.offset_m()` from every z of `z_m`, in metres.
     /// `aperture` is the aperture in the Fourier plane. A complex hologram needs none: pass `None`.
     ///
     /// # Errors
-    /// Returns an error if `z_m` is empty or [`asm::padded_shape`] rejects one of its values.
-    pub fn new(height: usize, width: usize, display: &Display, z_m: &[f64], aperture: Option<Opening>) -> Result<Self> {
+    /// Returns an error if `z_m` is empty or [`asm::padded_size`] rejects one of its values.
+    pub fn new(size: Size, display: &Display, z_m: &[f64], aperture: Option<Opening>) -> Result<Self> {
         if z_m.is_empty() {
             return Err(Error::Setting("no z to refocus at; give at least one".into()));
         }
@@ -48,14 +49,14 @@ impl Refocus {
             )));
         }
         if let Some(opening) = aperture {
-            Aperture::new(1, 1, opening)?;
+            Aperture::new(Size { width: 1, height: 1 }, opening)?;
         }
         let reach_m = z_m.iter().map(|z| (z - display.offset_m()).abs()).fold(0.0, f64::max);
         let (pitch_m, longest_m) = (display.pitch_m(), display.longest_wavelength_m());
-        let padded = asm::padded_shape(height, width, pitch_m, longest_m, reach_m, Padding::Reach)?;
+        let padded = asm::padded_size(size, pitch_m, longest_m, reach_m, Padding::Reach)?;
         Ok(Refocus {
             display: display.clone(),
-            fft: Fft2::new(height, width, padded.0, padded.1),
+            fft: Fft2::new(size, padded),
             aperture,
             reach_m,
         })
@@ -72,15 +73,15 @@ impl Refocus {
     /// # Panics
     /// Panics if `plane` does not have H·W values or the display does not have the colour.
     pub fn spectrum(&self, plane: &[Complex32], colour: usize, scratch: &mut Scratch) -> Spectrum {
-        let shape = self.fft.padded_shape();
-        let mut columns = vec![Complex32::ZERO; shape.0 * shape.1];
+        let size = self.fft.padded_size();
+        let mut columns = vec![Complex32::ZERO; size.height * size.width];
         self.fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         self.fft.spectrum(
             &scratch.rows,
             &mut columns,
             |kx, column, _| {
                 if let Some(opening) = self.aperture {
-                    opening.stop(kx, shape, column);
+                    opening.stop(kx, size, column);
                 }
             },
             &mut scratch.work,
@@ -108,9 +109,9 @@ impl Refocus {
                 self.reach_m * 1e3
             )));
         }
-        let (padded_height, padded_width) = self.fft.padded_shape();
+        let padded = self.fft.padded_size();
         let transfer = Transfer::new(
-            (padded_height, padded_width),
+            padded,
             self.display.pitch_m(),
             spectrum.wavelength_m,
             distance_m,
@@ -118,8 +119,8 @@ impl Refocus {
         );
         scratch
             .columns
-            .par_chunks_exact_mut(padded_height)
-            .zip(spectrum.columns.par_chunks_exact(padded_height))
+            .par_chunks_exact_mut(padded.height)
+            .zip(spectrum.columns.par_chunks_exact(padded.height))
             .for_each(|(to, from)| to.copy_from_slice(from));
         self.fft.columns_inverse(
             &mut scratch.columns,
@@ -176,8 +177,8 @@ pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &
     }
 }
 
-/// Returns the light, (C, H, W), behind the modulator of `target` that displays the `levels` of a hologram of (H, W) =
-/// `shape`. `scale` is the amplitude that maps to full light. The panel's phases are left out because they compensate
+/// Returns the light, (C, H, W), behind the modulator of `target` that displays the `levels` of a hologram of
+/// `size`. `scale` is the amplitude that maps to full light. The panel's phases are left out because they compensate
 /// the panel's own curvature or rotate all light equally.
 ///
 /// # Errors
@@ -185,11 +186,11 @@ pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &
 ///
 /// # Panics
 /// Panics if `levels` does not have C·H·W values.
-pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, shape: (usize, usize)) -> Result<Vec<Complex32>> {
-    let mut field = vec![Complex32::ZERO; target.display.colours() * shape.0 * shape.1];
+pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, size: Size) -> Result<Vec<Complex32>> {
+    let mut field = vec![Complex32::ZERO; target.display.colours() * size.height * size.width];
     match levels {
         Levels::Bytes(levels) => {
-            let response = target.response.clone().centred(shape.0, shape.1)?;
+            let response = target.response.clone().centred(size)?;
             phase_only_field(levels, &response, scale, &mut field);
         }
         Levels::Words(levels) => {
@@ -200,11 +201,11 @@ pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, shape: (usiz
             }
         }
     }
-    if let Some(panel) = PanelPlan::new(&target.panel, &target.display, shape)? {
+    if let Some(panel) = PanelPlan::new(&target.panel, &target.display, size)? {
         panel.remove(&mut field);
     }
     if let Some(light) = &target.illumination {
-        light.shine(&mut field, shape, target.modulator());
+        light.shine(&mut field, size, target.modulator());
     }
     Ok(field)
 }
@@ -218,22 +219,16 @@ pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, shape: (usiz
 ///
 /// # Panics
 /// Panics under the same conditions as [`shown_field`].
-pub fn seen_field(
-    levels: Levels<'_>,
-    scale: f32,
-    target: &Target,
-    shape: (usize, usize),
-    z_m: f64,
-) -> Result<Vec<Complex32>> {
+pub fn seen_field(levels: Levels<'_>, scale: f32, target: &Target, size: Size, z_m: f64) -> Result<Vec<Complex32>> {
     // Rejects a z that is too far away before a field is allocated.
     let opening = Opening::centred(target.display.aperture_radius());
-    let plan = Refocus::new(shape.0, shape.1, &target.display, &[z_m], Some(opening))?;
+    let plan = Refocus::new(size, &target.display, &[z_m], Some(opening))?;
     let aberration = target.correction.as_ref().map(Aberration::reversed);
-    let optics = target.propagators(shape, 1, 0.0, aberration.as_ref())?;
-    let mut field = shown_field(levels, scale, target, shape)?;
+    let optics = target.propagators(size, 1, 0.0, aberration.as_ref())?;
+    let mut field = shown_field(levels, scale, target, size)?;
     let mut through = optics.as_ref().map(|optics| optics[0].scratch());
     let mut scratch = plan.scratch();
-    for (colour, plane) in field.chunks_exact_mut(shape.0 * shape.1).enumerate() {
+    for (colour, plane) in field.chunks_exact_mut(size.height * size.width).enumerate() {
         if let (Some(optics), Some(through)) = (&optics, &mut through) {
             optics[colour].propagate(plane, through);
         }

@@ -1,6 +1,7 @@
 //! Compares the dark threshold and the local steps of encoders with f64 sums over whole planes, and tests their
 //! benefit.
 use crate::reference;
+use phasefront_core::Size;
 
 use ndarray::{Array2, Array3};
 use phasefront_core::display::Display;
@@ -27,7 +28,7 @@ const ONE_LASER: &str = "wavelengths_nm = [532]\n";
 /// divided by the light and by `scale`.
 fn start(
     field: &[Complex32],
-    (h, w): (usize, usize),
+    Size { width: w, height: h }: Size,
     encoding: &Encoding,
     (dark, scale): (f64, f64),
     light: &[f64],
@@ -59,9 +60,9 @@ fn start(
 }
 
 /// Compares a case with the oracle, by phases and by levels. The bits must be the same on any number of threads.
-fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderOptions) {
+fn check(display: &str, size: Size, laser: Option<&Illumination>, options: &EncoderOptions) {
     const SCALE: f32 = 1.3;
-    let (h, w) = shape;
+    let Size { width: w, height: h } = size;
     let response = Response::linear(8).unwrap();
     let radius = if laser.is_some() { 0.9 } else { 1.0 };
     let display = Display::from_toml(&format!("{display}aperture_radius = {radius:?}")).unwrap();
@@ -69,13 +70,13 @@ fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, opt
     let target = Target {
         response: response.clone(),
         illumination: laser.cloned(),
-        ..display.with_size(h, w).unwrap().into()
+        ..display.with_size(Size { width: w, height: h }).unwrap().into()
     };
-    let given: Vec<_> = (0..colours).flat_map(|c| test_plane(shape, 40 + c)).collect();
+    let given: Vec<_> = (0..colours).flat_map(|c| test_plane(size, 40 + c)).collect();
     let mut results = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
-            let encoder = Encoder::new(shape, &target, options).unwrap();
+            let encoder = Encoder::new(size, &target, options).unwrap();
             let mut scratch = encoder.scratch();
             let (mut phases, mut levels) = (vec![0.0; given.len()], vec![0; given.len()]);
             encoder.encode(&mut given.clone(), Some(SCALE), &mut phases, &mut scratch);
@@ -89,19 +90,19 @@ fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, opt
     assert!((phases.iter().zip(&levels).enumerate()).all(|(at, (p, l))| response.level(*p, at) == *l));
 
     for (c, (plane, phases)) in given.chunks_exact(h * w).zip(phases.chunks_exact(h * w)).enumerate() {
-        let light = |i: usize| laser.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, shape)));
+        let light = |i: usize| laser.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, size)));
         let light: Vec<f64> = (0..h * w).map(light).collect();
         let mut filtered = plane.to_vec();
         if let Encoding::BandLimit { k } = options.encoding {
-            let filter = BandLimit::new(h, w, k).unwrap();
+            let filter = BandLimit::new(Size { width: w, height: h }, k).unwrap();
             filter.filter(&mut filtered, &mut filter.scratch());
         }
         let dark = (f64::from(options.dark_threshold), f64::from(SCALE));
-        let start = start(&filtered, shape, &options.encoding, dark, &light);
+        let start = start(&filtered, size, &options.encoding, dark, &light);
         let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
         let goal: Vec<Complex64> = plane.iter().map(goal).collect();
         let filter = LocalFilter::of_aperture(radius);
-        let expected = local::reference(&filter, shape, &start, &goal, &light, options.local_steps);
+        let expected = local::reference(&filter, size, &start, &goal, &light, options.local_steps);
         let mut squares = 0.0;
         for (z, phase) in expected.iter().zip(phases) {
             assert!((0.0..std::f32::consts::TAU).contains(phase));
@@ -123,7 +124,16 @@ fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
     let alone = Illumination::new(beam.slice(ndarray::s![1..2, .., ..])).unwrap();
     let wide = Encoding::AntiAlias { sigma: 2.0, width: 9 };
     let encodings = [Encoding::DoublePhase, Encoding::ANTI_ALIAS, wide, Encoding::BAND_LIMIT];
-    for shape in [(61, 47), (40, 150), (7, 130), (1, 1), (2, 2), (33, 1), (1, 40), (3, 5)] {
+    for size in [
+        Size { width: 47, height: 61 },
+        Size { width: 150, height: 40 },
+        Size { width: 130, height: 7 },
+        Size { width: 1, height: 1 },
+        Size { width: 2, height: 2 },
+        Size { width: 1, height: 33 },
+        Size { width: 40, height: 1 },
+        Size { width: 5, height: 3 },
+    ] {
         for encoding in &encodings {
             for (dark, local_steps) in [(0.4, 0), (0.0, 1), (0.4, 1), (0.4, 2), (1.0, 3)] {
                 let options = EncoderOptions {
@@ -132,9 +142,9 @@ fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
                     ..encoding.clone().into()
                 };
                 for light in [None, Some(&laser)] {
-                    check("", shape, light, &options);
+                    check("", size, light, &options);
                 }
-                check(ONE_LASER, shape, Some(&alone), &options);
+                check(ONE_LASER, size, Some(&alone), &options);
             }
         }
     }
@@ -143,10 +153,13 @@ fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
 /// Encodes an image with noise in its dark parts and returns the root mean square error of the amplitudes behind the
 /// aperture.
 fn error_behind_the_aperture(options: &EncoderOptions, laser: Option<&Illumination>) -> f64 {
-    let shape @ (h, w) = (96, 120);
+    let size @ Size { width: w, height: h } = Size { width: 120, height: 96 };
     let target = Target {
         illumination: laser.cloned(),
-        ..Display::default().with_size(h, w).unwrap().into()
+        ..Display::default()
+            .with_size(Size { width: w, height: h })
+            .unwrap()
+            .into()
     };
     let value = |i: usize| {
         let (c, y, x) = (i / (h * w), i / w % h, i % w);
@@ -167,14 +180,14 @@ fn error_behind_the_aperture(options: &EncoderOptions, laser: Option<&Illuminati
         )
     };
     let field: Vec<Complex32> = (0..3 * h * w).map(value).collect();
-    let encoder = Encoder::new(shape, &target, options).unwrap();
+    let encoder = Encoder::new(size, &target, options).unwrap();
     let mut phases = vec![0.0; field.len()];
     encoder.encode(&mut field.clone(), Some(1.0), &mut phases, &mut encoder.scratch());
     let mut shown: Vec<_> = phases.iter().map(|phase| Complex32::from_polar(1.0, *phase)).collect();
     if let Some(laser) = laser {
-        laser.shine(&mut shown, shape, shape);
+        laser.shine(&mut shown, size, size);
     }
-    let aperture = Aperture::new(h, w, Opening::centred(1.0)).unwrap();
+    let aperture = Aperture::new(Size { width: w, height: h }, Opening::centred(1.0)).unwrap();
     for plane in shown.chunks_exact_mut(h * w) {
         aperture.filter(plane, &mut aperture.scratch());
     }
@@ -207,16 +220,16 @@ fn each_stage_brings_what_is_shown_nearer_to_the_field() {
     }
 }
 
-/// Propagates a colour of (H, W) = `shape` over `distance_m` without the carrier, through an aperture of `radius`.
+/// Propagates a colour of that size over `distance_m` without the carrier, through an aperture of `radius`.
 fn through_aperture(
     plane: &[Complex64],
-    (h, w): (usize, usize),
-    padded: (usize, usize),
+    Size { width: w, height: h }: Size,
+    padded: Size,
     wavelength_m: f64,
     distance_m: f64,
     radius: f64,
 ) -> Vec<Complex64> {
-    let mut all = Array2::from_elem(padded, Complex64::ZERO);
+    let mut all = Array2::from_elem(padded.shape(), Complex64::ZERO);
     for (i, value) in plane.iter().enumerate() {
         all[(i / w, i % w)] = *value;
     }
@@ -224,7 +237,7 @@ fn through_aperture(
     let pitch_m = Display::default().pitch_m();
     for ((y, x), value) in spectrum.indexed_iter_mut() {
         let frequency = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
-        let square = frequency(y, padded.0).powi(2) + frequency(x, padded.1).powi(2);
+        let square = frequency(y, padded.height).powi(2) + frequency(x, padded.width).powi(2);
         let f2 = square / pitch_m.powi(2);
         let root = (1.0 - wavelength_m.powi(2) * f2).sqrt();
         let phase = -2.0 * std::f64::consts::PI * distance_m * wavelength_m * f2 / (1.0 + root);
@@ -244,28 +257,28 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
     let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
     let laser = Illumination::new(beam.view()).unwrap();
     let alone = Illumination::new(beam.slice(ndarray::s![1..2, .., ..])).unwrap();
-    for (display, shape @ (h, w), offset_m, radius, light, steps) in [
-        ("", (61, 47), 0.0, 1.0, None, 1),
-        ("", (40, 66), 2e-3, 0.9, Some(&laser), 2),
-        ("", (33, 20), 1e-3, 0.3, None, 2),
-        ("", (1, 9), -1e-3, 1.2, None, 3),
-        ("", (1, 1), 0.0, 1.0, None, 1),
-        (ONE_LASER, (61, 47), 0.0, 1.0, None, 1),
-        (ONE_LASER, (40, 66), 2e-3, 0.9, Some(&alone), 2),
+    for (display, size @ Size { width: w, height: h }, offset_m, radius, light, steps) in [
+        ("", Size { width: 47, height: 61 }, 0.0, 1.0, None, 1),
+        ("", Size { width: 66, height: 40 }, 2e-3, 0.9, Some(&laser), 2),
+        ("", Size { width: 20, height: 33 }, 1e-3, 0.3, None, 2),
+        ("", Size { width: 9, height: 1 }, -1e-3, 1.2, None, 3),
+        ("", Size { width: 1, height: 1 }, 0.0, 1.0, None, 1),
+        (ONE_LASER, Size { width: 47, height: 61 }, 0.0, 1.0, None, 1),
+        (ONE_LASER, Size { width: 66, height: 40 }, 2e-3, 0.9, Some(&alone), 2),
     ] {
         let display = Display::from_toml(&format!("{display}aperture_radius = {radius:?}")).unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
         let target = Target {
             illumination: light.cloned(),
-            ..display.clone().with_size(h, w).unwrap().into()
+            ..display.clone().with_size(Size { width: w, height: h }).unwrap().into()
         };
         let planes = 0..display.colours() as u32;
-        let field: Vec<_> = planes.flat_map(|c| test_plane(shape, 40 + c)).collect();
+        let field: Vec<_> = planes.flat_map(|c| test_plane(size, 40 + c)).collect();
         let start: Vec<f32> = (0..field.len()).map(|i| (i * 37 % 628) as f32 / 100.0).collect();
         let mut results = [1, 3].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().unwrap().install(|| {
-                let plan = MidpointSteps::new(shape, &target, steps).unwrap();
+                let plan = MidpointSteps::new(size, &target, steps).unwrap();
                 let mut phases = start.clone();
                 let mut scratch = plan.scratch();
                 plan.keep(&field, None, &mut scratch);
@@ -276,13 +289,27 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
         assert!(results[0] == results[1], "{w}×{h}: other bits on other threads");
         let phases = std::mem::take(&mut results[0]);
         let colours = display.wavelengths_m();
-        let plans = Propagator::for_colours(h, w, display.pitch_m(), colours, offset_m, Padding::Reach).unwrap();
-        let padded = plans[0].padded_shape();
+        let plans = Propagator::for_colours(
+            Size { width: w, height: h },
+            display.pitch_m(),
+            colours,
+            offset_m,
+            Padding::Reach,
+        )
+        .unwrap();
+        let padded = plans[0].padded_size();
         for (c, (got, field)) in phases.chunks_exact(h * w).zip(field.chunks_exact(h * w)).enumerate() {
-            let light = |i: usize| light.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, shape)));
+            let light = |i: usize| light.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, size)));
             let light: Vec<f64> = (0..h * w).map(light).collect();
             let mut wanted = field.to_vec();
-            let back = Propagator::for_colours(h, w, display.pitch_m(), colours, -offset_m, Padding::Reach).unwrap();
+            let back = Propagator::for_colours(
+                Size { width: w, height: h },
+                display.pitch_m(),
+                colours,
+                -offset_m,
+                Padding::Reach,
+            )
+            .unwrap();
             back[c].propagate(&mut wanted, &mut back[c].scratch());
             let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
             let wanted: Vec<Complex64> = wanted.iter().map(goal).collect();
@@ -291,7 +318,7 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
                 .map(|(phase, light)| Complex64::from_polar(*light, f64::from(*phase)))
                 .collect();
             let to = |distance_m: f64| {
-                move |u: &[Complex64]| through_aperture(u, shape, padded, colours[c], distance_m, radius)
+                move |u: &[Complex64]| through_aperture(u, size, padded, colours[c], distance_m, radius)
             };
             let expected = midpoint::reference(to(-offset_m), to(offset_m), &wanted, start, &light, steps);
             let apart =
@@ -305,26 +332,26 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
 
 #[test]
 fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
-    let shape @ (h, w) = (48, 70);
+    let size @ Size { width: w, height: h } = Size { width: 70, height: 48 };
     let target = Target::from(Display::from_toml("width = 70\nheight = 48\noffset_mm = 1").unwrap());
-    let field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
+    let field: Vec<_> = (0..3).flat_map(|c| test_plane(size, 50 + c)).collect();
     let levels = |midpoint_steps: usize| {
         let options = EncoderOptions {
             midpoint_steps,
             brightness: Brightness::Fixed(1.2),
             ..Default::default()
         };
-        let plan = DisplayPlan::new(shape, &target, &options).unwrap();
+        let plan = DisplayPlan::new(size, &target, &options).unwrap();
         let mut levels = vec![0; 3 * h * w];
         let out = LevelsMut::Bytes(&mut levels);
         plan.modulate(None, &mut field.clone(), out, &mut plan.scratch());
         levels
     };
-    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let encoder = Encoder::new(size, &target, &EncoderOptions::default()).unwrap();
     let mut phases = vec![0.0; field.len()];
     encoder.encode(&mut field.clone(), Some(1.2), &mut phases, &mut encoder.scratch());
     assert!((levels(0).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
-    let plan = MidpointSteps::new(shape, &target, 2).unwrap();
+    let plan = MidpointSteps::new(size, &target, 2).unwrap();
     let mut scratch = plan.scratch();
     plan.keep(&field, None, &mut scratch);
     plan.correct(1.2, &mut phases, &mut scratch);
@@ -337,14 +364,14 @@ fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
 #[test]
 fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
     const SCALE: f32 = 1.2;
-    let shape @ (_, w) = (40, 66);
+    let size @ Size { width: w, height: _ } = Size { width: 66, height: 40 };
     let target = Target::from(Display::from_toml("width = 66\nheight = 40\noffset_mm = 1").unwrap());
-    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
-    let first: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 70 + c)).collect();
+    let encoder = Encoder::new(size, &target, &EncoderOptions::default()).unwrap();
+    let first: Vec<_> = (0..3).flat_map(|c| test_plane(size, 70 + c)).collect();
     let moved = |at: usize| at % w > w / 2;
     let second = first
         .iter()
-        .zip((0..3).flat_map(|c| test_plane(shape, 80 + c)))
+        .zip((0..3).flat_map(|c| test_plane(size, 80 + c)))
         .enumerate();
     let second: Vec<_> = second
         .map(|(at, (still, other))| if moved(at) { other } else { *still })
@@ -355,7 +382,7 @@ fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
         phases
     };
     let run = |steps: usize, frames: &[(&[Complex32], Option<f32>)]| {
-        let plan = MidpointSteps::new(shape, &target, steps).unwrap();
+        let plan = MidpointSteps::new(size, &target, steps).unwrap();
         let mut scratch = plan.scratch();
         let each = frames.iter().map(|(field, past)| {
             let mut phases = encoded(field);
@@ -392,7 +419,7 @@ fn a_dark_frame_is_dark() {
         local_steps: 2,
         ..Default::default()
     };
-    let encoder = Encoder::new((4, 6), &Target::default(), &options).unwrap();
+    let encoder = Encoder::new(Size { width: 6, height: 4 }, &Target::default(), &options).unwrap();
     let mut phases = vec![1.0; 72];
     let scale = encoder.encode(&mut [Complex32::ZERO; 72], None, &mut phases, &mut encoder.scratch());
     assert_eq!(scale, 0.0);
@@ -403,11 +430,11 @@ fn a_dark_frame_is_dark() {
 /// Checks that a value that is not a number affects only its surroundings, not the whole frame.
 #[test]
 fn no_number_stays_where_it_is() {
-    let shape @ (h, w) = (40, 50);
-    let target = Target::from(Display::default().with_size(h, w).unwrap());
-    let good: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 60 + c)).collect();
-    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
-    let steps = MidpointSteps::new(shape, &target, 2).unwrap();
+    let size @ Size { width: w, height: h } = Size { width: 50, height: 40 };
+    let target = Target::from(Display::default().with_size(Size { width: w, height: h }).unwrap());
+    let good: Vec<_> = (0..3).flat_map(|c| test_plane(size, 60 + c)).collect();
+    let encoder = Encoder::new(size, &target, &EncoderOptions::default()).unwrap();
+    let steps = MidpointSteps::new(size, &target, 2).unwrap();
     for bad in [f32::NAN, f32::INFINITY] {
         let mut field = good.clone();
         field[20 * w + 25].im = bad;
@@ -431,7 +458,7 @@ fn no_number_stays_where_it_is() {
 }
 
 fn refused(options: EncoderOptions, what: &str) {
-    let why = Encoder::new((4, 6), &Target::default(), &options)
+    let why = Encoder::new(Size { width: 6, height: 4 }, &Target::default(), &options)
         .err()
         .unwrap()
         .to_string();

@@ -1,5 +1,6 @@
 //! Compares the network with its naive oracle, and checks that invalid files are rejected.
 use crate::network_models;
+use phasefront_core::Size;
 
 use network_models::{Model, frame, int, ints};
 use num_complex::Complex32;
@@ -9,7 +10,12 @@ use phasefront_core::method::network::{Head, InputKind, Isa, Precision, Source, 
 use prost::Message;
 use tract_onnx::pb::{ModelProto, NodeProto};
 
-const SIZES: [(usize, usize); 4] = [(1, 1), (7, 5), (2, 33), (61, 47)];
+const SIZES: [Size; 4] = [
+    Size { width: 1, height: 1 },
+    Size { width: 5, height: 7 },
+    Size { width: 33, height: 2 },
+    Size { width: 47, height: 61 },
+];
 
 fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len());
@@ -18,16 +24,17 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
 
 /// Returns `size`. For a model at half the resolution, which tract runs only with even sides, returns the next even
 /// sides.
-fn even((height, width): (usize, usize), model: &Model) -> (usize, usize) {
-    if model.halved {
-        (height.next_multiple_of(2), width.next_multiple_of(2))
-    } else {
-        (height, width)
+fn even(Size { width, height }: Size, model: &Model) -> Size {
+    let side = |side: usize| if model.halved { side.next_multiple_of(2) } else { side };
+    Size {
+        width: side(width),
+        height: side(height),
     }
 }
 
-fn run_stock(network: &Network, input: &[f32], height: usize, width: usize) -> Vec<f32> {
-    let plan = network.plan_on_stock_tract(height, width).unwrap();
+fn run_stock(network: &Network, input: &[f32], size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
+    let plan = network.plan_on_stock_tract(size).unwrap();
     let mut output = vec![f32::NAN; 6 * height * width];
     plan.run(input, &mut output, &mut plan.scratch()).unwrap();
     output
@@ -57,10 +64,10 @@ fn stock_tract_agrees_with_the_definition_in_f32() {
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
-        for (height, width) in SIZES.map(|size| even(size, &model)) {
-            let input = frame(model.inputs, height, width, 7);
-            let expected = reference::run(network.chain(), &input, height, width);
-            let output = run_stock(&network, &input, height, width);
+        for Size { width, height } in SIZES.map(|size| even(size, &model)) {
+            let input = frame(model.inputs, Size { width, height }, 7);
+            let expected = reference::run(network.chain(), &input, Size { width, height });
+            let output = run_stock(&network, &input, Size { width, height });
             let worst = largest_difference(&output, &expected);
             assert!(worst < 2e-5, "{} layers, {width}×{height}: {worst}", model.layers);
         }
@@ -77,10 +84,10 @@ fn stock_tract_agrees_with_the_definition_in_int8() {
             };
             let network = Network::from_onnx(&model.bytes()).unwrap();
             assert_eq!(network.precision(), Precision::Int8);
-            for (height, width) in SIZES {
-                let input = frame(4, height, width, 7);
-                let expected = reference::run(network.chain(), &input, height, width);
-                let output = run_stock(&network, &input, height, width);
+            for Size { width, height } in SIZES {
+                let input = frame(4, Size { width, height }, 7);
+                let expected = reference::run(network.chain(), &input, Size { width, height });
+                let output = run_stock(&network, &input, Size { width, height });
                 // A value on the other side of a rounding changes its neighbours by a step.
                 let off = output
                     .iter()
@@ -152,12 +159,12 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
-        for (height, width) in SIZES {
-            let input = frame(model.inputs, height, width, 7);
-            let expected = reference::run(network.chain(), &input, height, width);
+        for Size { width, height } in SIZES {
+            let input = frame(model.inputs, Size { width, height }, 7);
+            let expected = reference::run(network.chain(), &input, Size { width, height });
             let mut first: Option<Vec<f32>> = None;
             for isa in kernels(&network) {
-                let plan = network.plan_on(isa, height, width).unwrap();
+                let plan = network.plan_on(isa, Size { width, height }).unwrap();
                 assert_eq!(plan.engine().name, isa.name());
                 let mut output = vec![f32::NAN; 6 * height * width];
                 plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
@@ -182,12 +189,12 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
 /// Planes in memory as a network's source.
 struct Planes<'a> {
     values: &'a [f32],
-    size: (usize, usize),
+    size: Size,
 }
 
 impl Source for Planes<'_> {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
-        let at = (plane * self.size.0 + row) * self.size.1 + from;
+        let at = (plane * self.size.height + row) * self.size.width + from;
         into.copy_from_slice(&self.values[at..][..into.len()]);
     }
 }
@@ -230,17 +237,18 @@ fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         // The last size is cut into bands, and into strips if there are few threads.
         for (height, width) in [(1, 1), (7, 5), (61, 47), (150, 300)] {
-            let values = frame(model.inputs, height, width, 7);
+            let values = frame(model.inputs, Size { width, height }, 7);
             let source = Planes {
                 values: &values,
-                size: (height, width),
+                size: Size { width, height },
             };
-            let stock_too = even((height, width), &model) == (height, width);
+            let size = Size { width, height };
+            let stock_too = even(size, &model) == size;
             for stock in [false, true].into_iter().take(1 + usize::from(stock_too)) {
                 let plan = if stock {
-                    network.plan_on_stock_tract(height, width)
+                    network.plan_on_stock_tract(Size { width, height })
                 } else {
-                    network.plan(height, width)
+                    network.plan(Size { width, height })
                 };
                 let plan = plan.unwrap();
                 let mut scratch = plan.scratch();
@@ -289,7 +297,7 @@ fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         for (height, width) in [(1, 1), (7, 5), (150, 70)] {
-            let values = frame(6, height, width, 3);
+            let values = frame(6, Size { width, height }, 3);
             let area = height * width;
             let planes = if model.inputs == 12 {
                 let parts = values.iter().map(|v| {
@@ -301,7 +309,7 @@ fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
             } else {
                 values.clone()
             };
-            let plan = network.plan(height, width).unwrap();
+            let plan = network.plan(Size { width, height }).unwrap();
             let mut output = vec![0.0; 6 * area];
             plan.run(&planes, &mut output, &mut plan.scratch()).unwrap();
             let mut expected = vec![Complex32::ZERO; 3 * area];
@@ -309,7 +317,7 @@ fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
                 .head()
                 .field(network.input(), &output, &planes, &mut expected)
                 .unwrap();
-            let plan = network.filter_plan(height, width).unwrap();
+            let plan = network.filter_plan(Size { width, height }).unwrap();
             let mut scratch = plan.scratch();
             for threads in [1, 2, 5] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -323,7 +331,11 @@ fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
         }
     }
     let other = Network::from_onnx(&Model::new(3, 8).bytes()).unwrap();
-    let why = other.filter_plan(4, 4).err().unwrap().to_string();
+    let why = other
+        .filter_plan(Size { width: 4, height: 4 })
+        .err()
+        .unwrap()
+        .to_string();
     assert!(why.contains("takes 'field', this network 'rgbd'"), "{why}");
     let odd = Model {
         inputs: 6,
@@ -331,7 +343,7 @@ fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
         ..Model::new(3, 5)
     };
     let odd = Network::from_onnx(&odd.bytes()).unwrap();
-    let why = odd.filter_plan(4, 4).err().unwrap().to_string();
+    let why = odd.filter_plan(Size { width: 4, height: 4 }).err().unwrap().to_string();
     assert!(why.contains("5 filters"), "{why}");
 }
 
@@ -352,9 +364,9 @@ fn the_operator_in_a_tract_graph_yields_the_same_bits_at_any_size() {
         let operators: Vec<_> = graph.nodes().iter().map(|node| node.op.name().to_string()).collect();
         assert_eq!(operators, ["Source", "HologramChain"]);
         let graph = graph.into_runnable().unwrap();
-        for (height, width) in SIZES {
-            let input = frame(4, height, width, 5);
-            let plan = network.plan(height, width).unwrap();
+        for Size { width, height } in SIZES {
+            let input = frame(4, Size { width, height }, 5);
+            let plan = network.plan(Size { width, height }).unwrap();
             let mut expected = vec![0.0; 6 * height * width];
             plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
             let tensor = Tensor::from_shape(&[1, 4, height, width], &input).unwrap();
@@ -369,15 +381,20 @@ fn the_operator_in_a_tract_graph_yields_the_same_bits_at_any_size() {
 #[test]
 fn chains_that_the_kernels_do_not_take_say_why_and_run_on_stock_tract() {
     let network = Network::from_onnx(&Model::new(3, 5).bytes()).unwrap();
-    let plan = network.plan(4, 6).unwrap();
+    let plan = network.plan(Size { width: 6, height: 4 }).unwrap();
     assert_eq!(plan.engine().name, "tract");
     assert!(plan.engine().why.contains("5 filters"), "{}", plan.engine().why);
-    assert!(network.plan_on(Isa::Portable, 4, 6).is_err());
+    assert!(network.plan_on(Isa::Portable, Size { width: 6, height: 4 }).is_err());
     assert!(network.tract_model().is_err());
-    let input = frame(4, 4, 6, 1);
+    let input = frame(4, Size { width: 6, height: 4 }, 1);
     let mut output = vec![f32::NAN; 6 * 24];
     plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
-    assert!(largest_difference(&output, &reference::run(network.chain(), &input, 4, 6)) < 1e-5);
+    assert!(
+        largest_difference(
+            &output,
+            &reference::run(network.chain(), &input, Size { width: 6, height: 4 })
+        ) < 1e-5
+    );
 }
 
 #[test]
@@ -397,10 +414,10 @@ fn a_network_tells_what_it_is() {
     assert_eq!(network.chain().macs_per_pixel(), 33_480);
     assert!((network.display().pitch_m - 8e-6).abs() < 1e-12);
     assert!((network.display().wavelengths_m[1] - 520e-9).abs() < 1e-15);
-    let plan = network.plan_on_stock_tract(5, 9).unwrap();
+    let plan = network.plan_on_stock_tract(Size { width: 9, height: 5 }).unwrap();
     assert_eq!(
         (plan.size(), plan.channels(), plan.engine().name),
-        ((5, 9), (4, 6), "tract")
+        (Size { width: 9, height: 5 }, (4, 6), "tract")
     );
 }
 
@@ -410,10 +427,14 @@ fn a_network_at_half_the_resolution_tells_so() {
     assert_eq!((network.layers(), network.filters()), (8, 48));
     let macs = 9 * (16 * 48 + 6 * 48 * 48 + (48 + 16) * 24) / 4;
     assert_eq!(network.chain().macs_per_pixel(), macs);
-    let plan = network.plan(5, 9).unwrap();
-    assert_eq!((plan.size(), plan.channels()), ((5, 9), (4, 6)));
+    let plan = network.plan(Size { width: 9, height: 5 }).unwrap();
+    assert_eq!((plan.size(), plan.channels()), (Size { width: 9, height: 5 }, (4, 6)));
     assert!(plan.engine().why.contains("half the resolution"));
-    let why = network.plan_on_stock_tract(5, 9).err().unwrap().to_string();
+    let why = network
+        .plan_on_stock_tract(Size { width: 9, height: 5 })
+        .err()
+        .unwrap()
+        .to_string();
     assert!(why.contains("even sides on tract, not 9×5"), "{why}");
     let prefilter = Model::prefilter("0").halved();
     let why = Network::from_onnx(&prefilter.bytes()).unwrap_err().to_string();
@@ -435,8 +456,8 @@ fn a_prefilter_serves_displays_whose_light_spreads_as_much() {
 #[test]
 fn one_plan_serves_many_threads() {
     let network = Network::from_onnx(&Model::new(4, 8).bytes()).unwrap();
-    let plan = network.plan(9, 13).unwrap();
-    let input = frame(4, 9, 13, 3);
+    let plan = network.plan(Size { width: 13, height: 9 }).unwrap();
+    let input = frame(4, Size { width: 13, height: 9 }, 3);
     let outputs: Vec<Vec<f32>> = std::thread::scope(|scope| {
         let run = || {
             let mut output = vec![0.0; 6 * 9 * 13];
@@ -453,10 +474,13 @@ fn one_plan_serves_many_threads() {
 fn wrong_frames_are_refused() {
     let network = Network::from_onnx(&Model::new(2, 8).bytes()).unwrap();
     for (height, width) in [(0, 4), (4, 0), (usize::MAX, 2), (1 << 20, 1 << 20)] {
-        assert!(network.plan(height, width).is_err(), "{width}×{height}");
-        assert!(network.plan_on_stock_tract(height, width).is_err(), "{width}×{height}");
+        assert!(network.plan(Size { width, height }).is_err(), "{width}×{height}");
+        assert!(
+            network.plan_on_stock_tract(Size { width, height }).is_err(),
+            "{width}×{height}"
+        );
     }
-    let plan = network.plan(4, 4).unwrap();
+    let plan = network.plan(Size { width: 4, height: 4 }).unwrap();
     let mut scratch = plan.scratch();
     assert!(plan.run(&[0.0; 63], &mut [0.0; 96], &mut scratch).is_err());
     assert!(plan.run(&[0.0; 64], &mut [0.0; 95], &mut scratch).is_err());

@@ -1,6 +1,7 @@
 //! Compares the optics with the paper's equations in f64 and checks physical laws.
 use crate::network_models;
 use crate::reference;
+use phasefront_core::Size;
 
 use ndarray::{Array2, Array3};
 use network_models::Model;
@@ -32,12 +33,21 @@ use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-const SIZES: [(usize, usize); 5] = [(64, 64), (61, 47), (270, 480), (1, 1), (7, 130)];
+const SIZES: [Size; 5] = [
+    Size { width: 64, height: 64 },
+    Size { width: 47, height: 61 },
+    Size {
+        width: 480,
+        height: 270,
+    },
+    Size { width: 1, height: 1 },
+    Size { width: 130, height: 7 },
+];
 const RED: f64 = 638e-9;
 const PITCH: f64 = 8e-6;
 
-fn propagated(plane: &[Complex32], (h, w): (usize, usize), s: f64, padding: Padding) -> Vec<Complex32> {
-    let plan = Propagator::new(h, w, PITCH, RED, s, padding).unwrap();
+fn propagated(plane: &[Complex32], Size { width: w, height: h }: Size, s: f64, padding: Padding) -> Vec<Complex32> {
+    let plan = Propagator::new(Size { width: w, height: h }, PITCH, RED, s, padding).unwrap();
     let mut out = plane.to_vec();
     plan.propagate(&mut out, &mut plan.scratch());
     out
@@ -51,8 +61,8 @@ fn largest(encoding: Encoding) -> EncoderOptions {
     }
 }
 
-fn double_phase_encoder(shape: (usize, usize)) -> Encoder {
-    Encoder::new(shape, &Target::default(), &EncoderOptions::plain(Encoding::DoublePhase)).unwrap()
+fn double_phase_encoder(size: Size) -> Encoder {
+    Encoder::new(size, &Target::default(), &EncoderOptions::plain(Encoding::DoublePhase)).unwrap()
 }
 
 fn energy(plane: &[Complex32]) -> f64 {
@@ -60,13 +70,13 @@ fn energy(plane: &[Complex32]) -> f64 {
 }
 
 /// Returns light that stays away from the frame's edge over ±3 mm.
-fn inner_plane((h, w): (usize, usize), margin: usize) -> Vec<Complex32> {
+fn inner_plane(Size { width: w, height: h }: Size, margin: usize) -> Vec<Complex32> {
     let taper = |i: usize, n: usize| {
         let edge = i.min(n - 1 - i) as f32 - margin as f32;
         (edge / 16.0).clamp(0.0, 1.0)
     };
     let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
-    let mut plane = test_plane((h, w), 3);
+    let mut plane = test_plane(Size { width: w, height: h }, 3);
     for (i, value) in plane.iter_mut().enumerate() {
         *value *= smooth(taper(i / w, h)) * smooth(taper(i % w, w));
     }
@@ -75,23 +85,23 @@ fn inner_plane((h, w): (usize, usize), margin: usize) -> Vec<Complex32> {
 
 #[test]
 fn propagation_agrees_with_equation_2() {
-    for shape in SIZES {
-        let plane = test_plane(shape, 1);
+    for size in SIZES {
+        let plane = test_plane(size, 1);
         for distance in [3e-3, -1.7e-3, 0.0, 20e-3] {
             for padding in [Padding::Reach, Padding::Double, Padding::Circular] {
-                let padded = asm::padded_shape(shape.0, shape.1, PITCH, RED, distance, padding).unwrap();
-                let wide = widen(&plane, shape);
+                let padded = asm::padded_size(size, PITCH, RED, distance, padding).unwrap();
+                let wide = widen(&plane, size);
                 let expected = reference::asm(&wide, PITCH, RED, distance, padded);
                 let carrier = asm::carrier(distance, RED);
-                let mut out = propagated(&plane, shape, distance, padding);
+                let mut out = propagated(&plane, size, distance, padding);
                 if padding == Padding::Double
-                    && asm::reach_m(distance, RED, PITCH) / PITCH > shape.0.min(shape.1) as f64
+                    && asm::reach_m(distance, RED, PITCH) / PITCH > size.height.min(size.width) as f64
                 {
                     continue; // The band limit applies, so the equation differs.
                 }
                 out.iter_mut().for_each(|v| *v *= carrier);
-                let error = relative_error(&widen(&out, shape), &expected);
-                assert!(error < 1e-4, "{shape:?} {distance} {padding:?}: {error:e}");
+                let error = relative_error(&widen(&out, size), &expected);
+                assert!(error < 1e-4, "{size} {distance} {padding:?}: {error:e}");
             }
         }
     }
@@ -99,8 +109,11 @@ fn propagation_agrees_with_equation_2() {
 
 #[test]
 fn the_naive_oracle_agrees_too() {
-    for (shape, padded) in [((9, 14), (20, 27)), ((61, 47), (75, 64))] {
-        let wide = widen(&test_plane(shape, 2), shape);
+    for (size, padded) in [
+        (Size { width: 14, height: 9 }, Size { width: 27, height: 20 }),
+        (Size { width: 47, height: 61 }, Size { width: 64, height: 75 }),
+    ] {
+        let wide = widen(&test_plane(size, 2), size);
         let expected = reference::asm(&wide, PITCH, RED, 2e-3, padded);
         let naive = optics::reference::propagate(&wide, PITCH, RED, 2e-3, padded);
         assert!(relative_error(&naive, &expected) < 1e-9);
@@ -109,48 +122,73 @@ fn the_naive_oracle_agrees_too() {
 
 #[test]
 fn colours_share_a_shape_and_agree_with_equation_2() {
-    let shape = (61, 47);
+    let size = Size { width: 47, height: 61 };
     for lambdas in [&[638e-9, 520e-9, 450e-9][..], &[532e-9]] {
-        let plans = Propagator::for_colours(shape.0, shape.1, PITCH, lambdas, 6e-3, Padding::Reach).unwrap();
+        let plans = Propagator::for_colours(size, PITCH, lambdas, 6e-3, Padding::Reach).unwrap();
         assert_eq!(plans.len(), lambdas.len());
         let mut scratch = plans[0].scratch();
         for (plan, &lambda) in plans.iter().zip(lambdas) {
-            let mut plane = test_plane(shape, 4);
-            let expected = reference::asm(&widen(&plane, shape), PITCH, lambda, 6e-3, plan.padded_shape());
+            let mut plane = test_plane(size, 4);
+            let expected = reference::asm(&widen(&plane, size), PITCH, lambda, 6e-3, plan.padded_size());
             plan.propagate(&mut plane, &mut scratch);
             plane.iter_mut().for_each(|v| *v *= asm::carrier(6e-3, lambda));
-            assert!(relative_error(&widen(&plane, shape), &expected) < 1e-4);
+            assert!(relative_error(&widen(&plane, size), &expected) < 1e-4);
         }
     }
 }
 
 #[test]
 fn padding_by_reach_holds_what_double_padding_holds() {
-    for (shape, distance) in [((256, 256), 3e-3), ((270, 480), -3e-3), ((192, 320), 6e-3)] {
-        let plane = inner_plane(shape, 4);
-        let near = widen(&propagated(&plane, shape, distance, Padding::Reach), shape);
-        let far = widen(&propagated(&plane, shape, distance, Padding::Double), shape);
+    for (size, distance) in [
+        (
+            Size {
+                width: 256,
+                height: 256,
+            },
+            3e-3,
+        ),
+        (
+            Size {
+                width: 480,
+                height: 270,
+            },
+            -3e-3,
+        ),
+        (
+            Size {
+                width: 320,
+                height: 192,
+            },
+            6e-3,
+        ),
+    ] {
+        let plane = inner_plane(size, 4);
+        let near = widen(&propagated(&plane, size, distance, Padding::Reach), size);
+        let far = widen(&propagated(&plane, size, distance, Padding::Double), size);
         let error = relative_error(&near, &far);
-        assert!(error < 2e-3, "{shape:?} {distance}: {error:e}");
+        assert!(error < 2e-3, "{size} {distance}: {error:e}");
     }
 }
 
 #[test]
 fn energy_is_kept_and_the_way_back_returns_the_field() {
-    for shape in SIZES {
-        let plane = test_plane(shape, 5);
-        let there = propagated(&plane, shape, 2.5e-3, Padding::Circular);
-        assert!((energy(&there) / energy(&plane) - 1.0).abs() < 1e-4, "{shape:?}");
-        let back = propagated(&there, shape, -2.5e-3, Padding::Circular);
-        assert!(relative_error(&widen(&back, shape), &widen(&plane, shape)) < 1e-4);
+    for size in SIZES {
+        let plane = test_plane(size, 5);
+        let there = propagated(&plane, size, 2.5e-3, Padding::Circular);
+        assert!((energy(&there) / energy(&plane) - 1.0).abs() < 1e-4, "{size}");
+        let back = propagated(&there, size, -2.5e-3, Padding::Circular);
+        assert!(relative_error(&widen(&back, size), &widen(&plane, size)) < 1e-4);
     }
     // Energy is also conserved in a padded frame if the light does not leave it.
-    let shape = (200, 240);
-    let plane = inner_plane(shape, 40);
-    let there = propagated(&plane, shape, 3e-3, Padding::Reach);
+    let size = Size {
+        width: 240,
+        height: 200,
+    };
+    let plane = inner_plane(size, 40);
+    let there = propagated(&plane, size, 3e-3, Padding::Reach);
     assert!((energy(&there) / energy(&plane) - 1.0).abs() < 1e-3);
-    let back = propagated(&there, shape, -3e-3, Padding::Reach);
-    assert!(relative_error(&widen(&back, shape), &widen(&plane, shape)) < 0.03);
+    let back = propagated(&there, size, -3e-3, Padding::Reach);
+    assert!(relative_error(&widen(&back, size), &widen(&plane, size)) < 0.03);
 }
 
 #[test]
@@ -166,17 +204,17 @@ fn a_positive_distance_converges_light_that_a_lens_sends_toward_the_viewer() {
         })
         .collect();
     let peak = |plane: Vec<Complex32>| plane.iter().map(Complex32::norm_sqr).fold(0.0, f32::max);
-    let toward = peak(propagated(&lens, (h, w), 5e-3, Padding::Reach));
-    let away = peak(propagated(&lens, (h, w), -5e-3, Padding::Reach));
+    let toward = peak(propagated(&lens, Size { width: w, height: h }, 5e-3, Padding::Reach));
+    let away = peak(propagated(&lens, Size { width: w, height: h }, -5e-3, Padding::Reach));
     assert!(toward > 10.0 * away, "{toward} {away}");
 }
 
 #[test]
 fn the_band_limit_keeps_a_far_field_from_wrapping_around() {
     // At 2 m the kernel is far wider than the doubled plane. The result must still be finite and no brighter.
-    let shape = (64, 64);
-    let plane = inner_plane(shape, 8);
-    let far = propagated(&plane, shape, 2.0, Padding::Double);
+    let size = Size { width: 64, height: 64 };
+    let plane = inner_plane(size, 8);
+    let far = propagated(&plane, size, 2.0, Padding::Double);
     assert!(far.iter().all(|v| v.is_finite()));
     assert!(energy(&far) < energy(&plane));
 }
@@ -184,16 +222,20 @@ fn the_band_limit_keeps_a_far_field_from_wrapping_around() {
 #[test]
 fn distances_that_cannot_be_held_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, 1e3] {
-        let e = Propagator::new(64, 64, PITCH, RED, bad, Padding::Reach).err().unwrap();
+        let e = Propagator::new(Size { width: 64, height: 64 }, PITCH, RED, bad, Padding::Reach)
+            .err()
+            .unwrap();
         assert!(!e.to_string().contains('\n'), "{e}");
     }
-    assert!(Propagator::new(0, 64, PITCH, RED, 1e-3, Padding::Reach).is_err());
+    assert!(Propagator::new(Size { width: 64, height: 0 }, PITCH, RED, 1e-3, Padding::Reach).is_err());
 }
 
 #[test]
 fn double_phase_agrees_with_equation_7() {
-    for (h, w) in SIZES {
-        let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 10 + c)).collect();
+    for Size { width: w, height: h } in SIZES {
+        let mut field: Vec<_> = (0..3)
+            .flat_map(|c| test_plane(Size { width: w, height: h }, 10 + c))
+            .collect();
         let wide = Array3::from_shape_vec(
             (3, h, w),
             field.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).collect(),
@@ -201,7 +243,7 @@ fn double_phase_agrees_with_equation_7() {
         .unwrap();
         let brightest = wide.iter().map(|v| v.norm()).fold(0.0, f64::max);
         for (scale, number) in [(None, brightest), (Some(0.8), 0.8)] {
-            let encoder = double_phase_encoder((h, w));
+            let encoder = double_phase_encoder(Size { width: w, height: h });
             let mut phase = vec![0.0; 3 * h * w];
             let used = encoder.encode(&mut field, scale, &mut phase, &mut encoder.scratch());
             assert!((f64::from(used) - number).abs() < 1e-6);
@@ -232,7 +274,12 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
     };
     let field = Array3::from_shape_fn((3, h, w), |(c, y, x)| smooth(c, y, x));
     for encoding in [Encoding::DoublePhase, Encoding::ANTI_ALIAS, Encoding::BAND_LIMIT] {
-        let encoder = Encoder::new((h, w), &Target::default(), &encoding.clone().into()).unwrap();
+        let encoder = Encoder::new(
+            Size { width: w, height: h },
+            &Target::default(),
+            &encoding.clone().into(),
+        )
+        .unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
         let scale = encoder.encode(&mut given, None, &mut phase, &mut encoder.scratch());
@@ -242,11 +289,14 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         response.levels(&phase, 0, &mut levels);
         let mut shown = vec![Complex32::ZERO; phase.len()];
         phase_only_field(&levels, &response, scale, &mut shown);
-        let aperture = Aperture::new(h, w, Opening::centred(0.7)).unwrap();
+        let aperture = Aperture::new(Size { width: w, height: h }, Opening::centred(0.7)).unwrap();
         for (shown, wanted) in shown.chunks_exact_mut(h * w).zip(field.outer_iter()) {
             aperture.filter(shown, &mut aperture.scratch());
             let wanted: Vec<_> = wanted.iter().copied().collect();
-            let error = relative_error(&widen(shown, (h, w)), &widen(&wanted, (h, w)));
+            let error = relative_error(
+                &widen(shown, Size { width: w, height: h }),
+                &widen(&wanted, Size { width: w, height: h }),
+            );
             assert!(error < 0.02, "{encoding:?}: {error}");
         }
     }
@@ -254,14 +304,23 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
 
 #[test]
 fn refocus_agrees_with_equation_2_from_any_offset() {
-    for (offset_m, shape) in [(0.0, (64, 64)), (6e-3, (61, 47)), (-4e-3, (270, 480))] {
+    for (offset_m, size) in [
+        (0.0, Size { width: 64, height: 64 }),
+        (6e-3, Size { width: 47, height: 61 }),
+        (
+            -4e-3,
+            Size {
+                width: 480,
+                height: 270,
+            },
+        ),
+    ] {
         let display = Display::default().with_offset_m(offset_m).unwrap();
-        let hologram: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 20 + c)).collect();
+        let hologram: Vec<_> = (0..3).flat_map(|c| test_plane(size, 20 + c)).collect();
         let z = [3e-3, 0.0, -2.2e-3];
-        let plan = Refocus::new(shape.0, shape.1, &display, &z, None).unwrap();
-        let padded = asm::padded_shape(
-            shape.0,
-            shape.1,
+        let plan = Refocus::new(size, &display, &z, None).unwrap();
+        let padded = asm::padded_size(
+            size,
             PITCH,
             RED,
             z.iter().map(|z| (z - offset_m).abs()).fold(0.0, f64::max),
@@ -271,12 +330,12 @@ fn refocus_agrees_with_equation_2_from_any_offset() {
         let views = plan.focal_stack(&hologram, &z).unwrap();
         for (view, z) in views.iter().zip(z) {
             for (c, lambda) in display.wavelengths_m().iter().copied().enumerate() {
-                let size = shape.0 * shape.1;
-                let plane = widen(&hologram[c * size..][..size], shape);
+                let area = size.pixels();
+                let plane = widen(&hologram[c * area..][..area], size);
                 let expected = reference::asm(&plane, PITCH, lambda, z - offset_m, padded);
                 let seen = Array2::from_shape_vec(
-                    shape,
-                    view[c * size..][..size]
+                    size.shape(),
+                    view[c * area..][..area]
                         .iter()
                         .map(|v| Complex64::from(f64::from(*v)))
                         .collect(),
@@ -308,7 +367,7 @@ fn deep_encoding(input: &'static str) {
     let (h, w) = (40, 33);
     let plan = |display: &Display, network: &Arc<Network>| {
         let options = largest(Encoding::Deep(network.clone()));
-        DisplayPlan::new((h, w), &display.into(), &options)
+        DisplayPlan::new(Size { width: w, height: h }, &display.into(), &options)
     };
     let modulator = plan(&display, &network).unwrap();
     assert!(modulator.keeps_phase());
@@ -320,9 +379,9 @@ fn deep_encoding(input: &'static str) {
         let blur = AntiAlias::new(0.7, 3).unwrap();
         (filtered.chunks_exact_mut(h * w)).for_each(|plane| blur.filter(plane, w));
     }
-    let filter = network.filter_plan(h, w).unwrap();
+    let filter = network.filter_plan(Size { width: w, height: h }).unwrap();
     filter.filter(&mut filtered, &mut filter.scratch());
-    let encoder = double_phase_encoder((h, w));
+    let encoder = double_phase_encoder(Size { width: w, height: h });
     let mut expected = vec![0; 3 * h * w];
     let mut scratch = encoder.scratch();
     let scale = encoder.encode_levels(&mut filtered, None, &mut expected, &mut scratch);
@@ -347,26 +406,45 @@ fn a_correction_is_part_of_the_offset() {
         [0.7, -1.7, 0.9, 0.6, -1.3],
     ])
     .unwrap();
-    for (offset_m, shape) in [(0.0, (61, 47)), (4e-3, (40, 72))] {
+    for (offset_m, size) in [
+        (0.0, Size { width: 47, height: 61 }),
+        (4e-3, Size { width: 72, height: 40 }),
+    ] {
         let display = Display::default().with_offset_m(offset_m).unwrap();
-        let (h, w) = shape;
+        let Size { width: w, height: h } = size;
         let target = Target {
             correction: Some(a.clone()),
             ..Target::from(&display)
         };
-        let plan = DisplayPlan::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
-        let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
+        let plan = DisplayPlan::new(Size { width: w, height: h }, &target, &Encoding::DoublePhase.into()).unwrap();
+        let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(size, 50 + c)).collect();
         let given = field.clone();
         plan.propagate(&mut field, &mut plan.scratch());
-        let plans =
-            Propagator::for_colours_corrected(h, w, PITCH, display.wavelengths_m(), offset_m, &a, PITCH).unwrap();
+        let plans = Propagator::for_colours_corrected(
+            Size { width: w, height: h },
+            PITCH,
+            display.wavelengths_m(),
+            offset_m,
+            &a,
+            PITCH,
+        )
+        .unwrap();
         // Compares first in the plan's own periodic plane, then with enough space that nothing wraps around: the
         // kernel's tails at the corner frequencies reach farther than rays do.
-        for ((ph, pw), most) in [(plans[0].padded_shape(), 1e-4), ((4 * h, 4 * w), 0.03)] {
+        for (Size { width: pw, height: ph }, most) in [
+            (plans[0].padded_size(), 1e-4),
+            (
+                Size {
+                    width: 4 * w,
+                    height: 4 * h,
+                },
+                0.03,
+            ),
+        ] {
             for (c, lambda) in display.wavelengths_m().iter().copied().enumerate() {
-                let size = h * w;
+                let area = h * w;
                 let mut plane = Array2::zeros((ph, pw));
-                let source = widen(&given[c * size..][..size], shape);
+                let source = widen(&given[c * area..][..area], size);
                 plane.slice_mut(ndarray::s![..h, ..w]).assign(&source);
                 let mut spectrum = reference::fft2(&plane, false);
                 for ((ky, kx), value) in spectrum.indexed_iter_mut() {
@@ -380,8 +458,8 @@ fn a_correction_is_part_of_the_offset() {
                 }
                 let expected = reference::fft2(&spectrum, true);
                 let expected = expected.slice(ndarray::s![..h, ..w]).to_owned();
-                let error = relative_error(&widen(&field[c * size..][..size], shape), &expected);
-                assert!(error < most, "{offset_m} {shape:?} {c}: {error}");
+                let error = relative_error(&widen(&field[c * area..][..area], size), &expected);
+                assert!(error < most, "{offset_m} {size} {c}: {error}");
             }
         }
     }
@@ -402,8 +480,10 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
         brightness: Brightness::Fixed(2.5),
         ..EncoderOptions::plain(Encoding::ANTI_ALIAS)
     };
-    let plan = DisplayPlan::new((h, w), &target, &options).unwrap();
-    let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
+    let plan = DisplayPlan::new(Size { width: w, height: h }, &target, &options).unwrap();
+    let mut field: Vec<_> = (0..3)
+        .flat_map(|c| test_plane(Size { width: w, height: h }, 60 + c))
+        .collect();
     let mut filtered = field.clone();
     let mut levels = vec![0; 3 * h * w];
     let out = LevelsMut::Bytes(&mut levels);
@@ -412,8 +492,12 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     for plane in filtered.chunks_exact_mut(h * w) {
         filter.filter(plane, w);
     }
-    laser.divide(&mut filtered, (h, w), (50, 60));
-    let encoder = double_phase_encoder((h, w));
+    laser.divide(
+        &mut filtered,
+        Size { width: w, height: h },
+        Size { width: 60, height: 50 },
+    );
+    let encoder = double_phase_encoder(Size { width: w, height: h });
     let mut expected = vec![0; 3 * h * w];
     encoder.encode_levels(&mut filtered, Some(2.5), &mut expected, &mut encoder.scratch());
     assert_eq!(levels, expected);
@@ -424,7 +508,9 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
 #[test]
 fn a_panel_adds_its_phases_after_the_encoder() {
     let (h, w) = (40, 33);
-    let field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 80 + c)).collect();
+    let field: Vec<_> = (0..3)
+        .flat_map(|c| test_plane(Size { width: w, height: h }, 80 + c))
+        .collect();
     let steps = |at: usize| (at * 13 % 256) as u16;
     for (midpoint_steps, bits) in [(0, 8), (1, 8), (0, 10)] {
         let display = Display::from_toml(&format!("width = {w}\nheight = {h}\nbits = {bits}")).unwrap();
@@ -432,7 +518,7 @@ fn a_panel_adds_its_phases_after_the_encoder() {
         let maps = (0..h * w).map(|at| steps(at) << 8).collect();
         let added = Target {
             panel: Panel {
-                flatness: Some(Flatness::new((h, w), maps).unwrap()),
+                flatness: Some(Flatness::new(Size { width: w, height: h }, maps).unwrap()),
                 ..Panel::default()
             },
             ..plain.clone()
@@ -442,7 +528,7 @@ fn a_panel_adds_its_phases_after_the_encoder() {
             ..Encoding::ANTI_ALIAS.into()
         };
         let [before, after] = [&plain, &added].map(|target| {
-            let plan = DisplayPlan::new((h, w), target, &options).unwrap();
+            let plan = DisplayPlan::new(Size { width: w, height: h }, target, &options).unwrap();
             let (mut field, mut scratch) = (field.clone(), plan.scratch());
             let mut words = vec![0; 3 * h * w];
             if bits > 8 {
@@ -474,7 +560,7 @@ fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
     let pipeline = |height, width| {
         let method = Method::trained(network.clone());
         let options = largest(Encoding::Deep(prefilter.clone()));
-        Pipeline::new((height, width), method, &target, &options)
+        Pipeline::new(Size { width, height }, method, &target, &options)
     };
     for (h, w) in [(1, 1), (7, 5000), (5000, 7)] {
         let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
@@ -505,23 +591,28 @@ fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
 /// row and must produce the same bits on any number of threads.
 #[test]
 fn one_sweep_from_field_to_levels_is_stage_after_stage() {
-    for ((h, w), more) in [
-        ((61, 47), (0, 0)),
-        ((40, 300), (10, 13)),
-        ((7, 130), (1, 0)),
-        ((1, 1), (3, 2)),
-        ((33, 1), (0, 5)),
-        ((1, 40), (0, 0)),
+    for (Size { width: w, height: h }, more) in [
+        (Size { width: 47, height: 61 }, (0, 0)),
+        (Size { width: 300, height: 40 }, (10, 13)),
+        (Size { width: 130, height: 7 }, (1, 0)),
+        (Size { width: 1, height: 1 }, (3, 2)),
+        (Size { width: 1, height: 33 }, (0, 5)),
+        (Size { width: 40, height: 1 }, (0, 0)),
     ] {
-        let modulator = (h + more.0, w + more.1);
+        let modulator = Size {
+            width: w + more.1,
+            height: h + more.0,
+        };
         let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
         let laser = Illumination::new(beam.view()).unwrap();
-        let (rows, columns) = per_pixel::nodes(modulator.0, modulator.1, 16);
+        let (rows, columns) = per_pixel::nodes(modulator, 16);
         let knots = (0..3 * rows * columns * 9).map(|i| (i % 9) as f32 * (20.0 + (i / 9 % 11) as f32));
         let turns = vec![6.0; 3 * rows * columns];
         let knots = knots.collect::<Vec<_>>();
-        let table = PerPixel::new(modulator.0, modulator.1, 16, 8, &knots, &turns).unwrap();
-        let given: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 70 + c)).collect();
+        let table = PerPixel::new(modulator, 16, 8, &knots, &turns).unwrap();
+        let given: Vec<_> = (0..3)
+            .flat_map(|c| test_plane(Size { width: w, height: h }, 70 + c))
+            .collect();
         for (encoding, blur) in [
             (Encoding::DoublePhase, None),
             (Encoding::ANTI_ALIAS, Some((0.7, 3))),
@@ -532,13 +623,13 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                 (Some(&laser), None, Response::PerPixel(table.clone().into())),
                 (Some(&laser), Some(1.5), Response::linear(5).unwrap()),
             ] {
-                let display = Display::default().with_size(modulator.0, modulator.1);
+                let display = Display::default().with_size(modulator);
                 let target = Target {
                     response: response.clone(),
                     illumination: light.cloned(),
                     ..display.unwrap().into()
                 };
-                let response = response.centred(h, w).unwrap();
+                let response = response.centred(Size { width: w, height: h }).unwrap();
                 let mut field = given.clone();
                 if let Some((sigma, taps)) = blur {
                     let filter = AntiAlias::new(sigma, taps).unwrap();
@@ -568,7 +659,7 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
                     pool.build().unwrap().install(|| {
                         let options = EncoderOptions::plain(encoding.clone());
-                        let encoder = Encoder::new((h, w), &target, &options).unwrap();
+                        let encoder = Encoder::new(Size { width: w, height: h }, &target, &options).unwrap();
                         let mut scratch = encoder.scratch();
                         let (mut field, mut got) = (given.clone(), vec![0; 3 * h * w]);
                         let scaled = encoder.encode_levels(&mut field, scale, &mut got, &mut scratch);

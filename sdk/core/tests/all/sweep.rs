@@ -1,5 +1,6 @@
 //! Compares the plane sweep with its naive oracle on every instruction set and tests its edge cases.
 use crate::network_models;
+use phasefront_core::Size;
 
 use ndarray::{Array2, Array3, Axis};
 use network_models::Model;
@@ -35,7 +36,8 @@ fn sweep() -> Sweep {
 }
 
 /// Returns surfaces at several depths with sharp edges, one of them slanted, and fine colour.
-fn frame(height: usize, width: usize) -> RgbdFrame {
+fn frame(size: Size) -> RgbdFrame {
+    let Size { width, height } = size;
     let depth = Array2::from_shape_fn((height, width), |(y, x)| {
         let (v, u) = (y as f32 / height as f32, x as f32 / width as f32);
         match () {
@@ -52,7 +54,7 @@ fn frame(height: usize, width: usize) -> RgbdFrame {
 }
 
 fn run(plan: &SweepPlan, frame: &RgbdFrame) -> Vec<Complex32> {
-    let (height, width) = plan.shape();
+    let Size { width, height } = plan.size();
     // The previous contents must not matter.
     let mut field = vec![Complex32::new(f32::NAN, f32::NAN); frame.colours() * height * width];
     let mut scratch = plan.scratch();
@@ -122,8 +124,8 @@ fn the_sweep_is_its_oracle() {
         (35, 37, sweep(), -1e-3),
     ] {
         for display in [display(), one_laser()] {
-            let frame = frame(height, width).for_display(&display);
-            let plan = SweepPlan::new(height, width, &display, sweep, z_m).unwrap();
+            let frame = frame(Size { width, height }).for_display(&display);
+            let plan = SweepPlan::new(Size { width, height }, &display, sweep, z_m).unwrap();
             let slow = reference::field(&frame, &display, sweep, z_m).unwrap();
             let fast = run(&plan, &frame);
             let (worst, error) = (farthest(&fast, &slow), error(&fast, &slow));
@@ -149,8 +151,8 @@ fn the_worst_frames_are_right() {
     ];
     for (case, depth) in depths.into_iter().enumerate() {
         let depth = Array2::from_shape_fn((height, width), |(y, x)| depth(y, x));
-        let frame = RgbdFrame::new(frame(height, width).rgb().to_owned(), depth).unwrap();
-        let plan = SweepPlan::new(height, width, &display(), sweep(), 0.0).unwrap();
+        let frame = RgbdFrame::new(frame(Size { width, height }).rgb().to_owned(), depth).unwrap();
+        let plan = SweepPlan::new(Size { width, height }, &display(), sweep(), 0.0).unwrap();
         let slow = reference::field(&frame, &display(), sweep(), 0.0).unwrap();
         let fast = run(&plan, &frame);
         let (worst, error) = (farthest(&fast, &slow), error(&fast, &slow));
@@ -164,7 +166,16 @@ fn a_flat_frame_of_one_colour_stays_as_it_is_far_from_its_border() {
     let size = 140;
     let display = Display::default();
     let sweep = Sweep::for_display(&display);
-    let plan = SweepPlan::new(size, size, &display, sweep, 0.0).unwrap();
+    let plan = SweepPlan::new(
+        Size {
+            width: size,
+            height: size,
+        },
+        &display,
+        sweep,
+        0.0,
+    )
+    .unwrap();
     for depth in [0.0, 0.3, 1.0] {
         let depth = Array2::from_elem((size, size), depth);
         let frame = RgbdFrame::new(Array3::from_elem((3, size, size), 0.6), depth).unwrap();
@@ -190,7 +201,10 @@ fn slopes_have_no_stripes() {
             between_planes,
             ..sweep()
         };
-        run(&SweepPlan::new(height, width, &display(), sweep, 0.0).unwrap(), &frame)
+        run(
+            &SweepPlan::new(Size { width, height }, &display(), sweep, 0.0).unwrap(),
+            &frame,
+        )
     };
     let truth = of(300, false);
     let amplitude_error = |field: Vec<Complex32>| {
@@ -204,7 +218,7 @@ fn slopes_have_no_stripes() {
 #[test]
 fn what_cannot_be_swept_is_named() {
     let refused = |sweep: Sweep, z_m: f64| {
-        let plan = SweepPlan::new(8, 8, &Display::default(), sweep, z_m);
+        let plan = SweepPlan::new(Size { width: 8, height: 8 }, &Display::default(), sweep, z_m);
         plan.err().unwrap().to_string()
     };
     let default = Sweep::for_display(&Display::default());
@@ -249,12 +263,12 @@ fn a_seeded_network_corrects_the_sweep() {
         (Model::int8(5, 8), 0.05, Some(24), "[520]"),
     ] {
         let display = Display::from_toml(&format!("wavelengths_nm = {wavelengths_nm}")).unwrap();
-        let frame = frame(height, width).for_display(&display);
+        let frame = frame(Size { width, height }).for_display(&display);
         let sweep = match planes {
             Some(planes) => Sweep::of_planes(&display, planes),
             None => Sweep::for_display(&display),
         };
-        let sweep = SweepPlan::new(height, width, &display, sweep, 0.0).unwrap();
+        let sweep = SweepPlan::new(Size { width, height }, &display, sweep, 0.0).unwrap();
         let seed = run(&sweep, &frame);
         let model = Model {
             inputs: 10,
@@ -269,12 +283,12 @@ fn a_seeded_network_corrects_the_sweep() {
         let mut input: Vec<f32> = rgb.iter().chain(frame.depth()).map(|v| v - 0.5).collect();
         input.extend(seeds.iter().map(|u| 0.5 * (u.re - 0.5)));
         input.extend(seeds.iter().map(|u| 0.5 * u.im));
-        let output = network::reference::run(network.chain(), &input, height, width);
+        let output = network::reference::run(network.chain(), &input, Size { width, height });
         let (re, im) = output.split_at(seeds.len());
         let expected = (seeds.iter().zip(re).zip(im)).map(|((u, re), im)| u + Complex32::new(*re, *im));
         let first = network.colour(&display).unwrap().unwrap_or(0) * height * width;
         let expected: Vec<_> = expected.skip(first).take(seed.len()).collect();
-        let plan = MethodPlan::new(height, width, Method::trained(network), &display).unwrap();
+        let plan = MethodPlan::new(Size { width, height }, Method::trained(network), &display).unwrap();
         let mut field = vec![Complex32::ZERO; seed.len()];
         plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
         let worst = farthest(&field, &expected);
@@ -352,10 +366,10 @@ fn auto_gives_each_frame_what_suits_its_depth() {
         plan.field(frame, &mut field, &mut plan.scratch()).unwrap();
         field
     };
-    let plan = |method| MethodPlan::new(height, width, method, &display).unwrap();
+    let plan = |method| MethodPlan::new(Size { width, height }, method, &display).unwrap();
     let either = plan(Method::Auto(default, network.clone()));
     assert!(either.z_m() == 0.0 && either.engine().is_some());
-    let midpoint = SweepPlan::new(height, width, &display, default, 0.0).unwrap();
+    let midpoint = SweepPlan::new(Size { width, height }, &display, default, 0.0).unwrap();
     let (sharp, soft) = (frame(1), frame(5));
     assert!(made(&either, &sharp) == run(&midpoint, &sharp));
     assert!(made(&either, &soft) == made(&plan(Method::trained(network)), &soft));
@@ -364,13 +378,28 @@ fn auto_gives_each_frame_what_suits_its_depth() {
 #[test]
 fn tiles_are_the_whole_frame() {
     let display = Display::default();
-    let frame = frame(150, 170);
+    let frame = frame(Size {
+        width: 170,
+        height: 150,
+    });
     let of = |tile| {
         let sweep = Sweep {
             tile,
             ..Sweep::for_display(&display)
         };
-        run(&SweepPlan::new(150, 170, &display, sweep, 0.0).unwrap(), &frame)
+        run(
+            &SweepPlan::new(
+                Size {
+                    width: 170,
+                    height: 150,
+                },
+                &display,
+                sweep,
+                0.0,
+            )
+            .unwrap(),
+            &frame,
+        )
     };
     let whole = of(512);
     for tile in [32, 64, 144] {
@@ -384,9 +413,9 @@ fn tiles_are_the_whole_frame() {
 
 #[test]
 fn instruction_sets_give_the_same_bits() {
-    let frame = frame(45, 51);
+    let frame = frame(Size { width: 51, height: 45 });
     let of = |isa| {
-        let plan = SweepPlan::new(45, 51, &display(), sweep(), 0.0).unwrap();
+        let plan = SweepPlan::new(Size { width: 51, height: 45 }, &display(), sweep(), 0.0).unwrap();
         run(&plan.on(isa).unwrap(), &frame)
     };
     let plain = of(Isa::Portable);
@@ -399,12 +428,12 @@ fn instruction_sets_give_the_same_bits() {
 fn hidden_surfaces_are_their_oracle() {
     for (height, width, reach) in [(70, 45, 7), (33, 64, 30), (1, 9, 3), (9, 1, 40)] {
         let noise = Array2::from_shape_fn((height, width), |(y, x)| ((x * 7 + y * 13 + x * y) % 17) as f32 / 16.0);
-        for depth in [noise, frame(height, width).depth().to_owned()] {
+        for depth in [noise, frame(Size { width, height }).depth().to_owned()] {
             let depth = depth.as_slice().unwrap();
-            let plan = hidden::Hidden::new(height, width, reach);
+            let plan = hidden::Hidden::new(Size { width, height }, reach);
             let mut sources = vec![0; 2 * depth.len()];
             plan.find(depth, &mut sources, &mut plan.scratch());
-            assert!(sources == hidden::reference(depth, height, width, reach));
+            assert!(sources == hidden::reference(depth, Size { width, height }, reach));
         }
     }
 }
@@ -413,7 +442,13 @@ fn hidden_surfaces_are_their_oracle() {
 fn what_light_spreads_too_far_in_is_refused_at_once() {
     for text in ["pitch_um = 1.0", "volume_depth_mm = 400"] {
         let display = Display::from_toml(text).unwrap();
-        let refused = SweepPlan::new(12, 16, &display, Sweep::for_display(&display), 0.0).map(|_| ());
+        let refused = SweepPlan::new(
+            Size { width: 16, height: 12 },
+            &display,
+            Sweep::for_display(&display),
+            0.0,
+        )
+        .map(|_| ());
         let message = refused.unwrap_err().to_string();
         assert!(message.contains("512 are the most: a volume of"), "{message}");
     }

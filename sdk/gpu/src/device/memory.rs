@@ -2,6 +2,7 @@
 
 use super::{Device, one_line};
 use crate::{GpuError, Result};
+use phasefront_core::Size;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 /// Constants of a program and their address space.
@@ -46,7 +47,7 @@ impl Device {
     pub(crate) fn picture(
         &self,
         what: &str,
-        (height, width): (usize, usize),
+        Size { width, height }: Size,
         usage: wgpu::TextureUsages,
     ) -> Result<wgpu::Texture> {
         let most = self.limits.max_texture_dimension_2d as usize;

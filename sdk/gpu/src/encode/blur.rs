@@ -3,6 +3,7 @@
 use super::COLUMNS;
 use crate::Result;
 use crate::device::{Constants, Device, Dispatch};
+use phasefront_core::Size;
 
 /// A Gaussian on fields of one size.
 pub(super) struct Blur<'a> {
@@ -11,13 +12,13 @@ pub(super) struct Blur<'a> {
     pub(super) frame: &'a Constants,
     /// The centre tap and the taps on one side.
     pub(super) taps: &'a [f32],
-    pub(super) size: (usize, usize),
+    pub(super) size: Size,
 }
 
 impl Blur<'_> {
     /// Blurs along x, removing the mean phase if `turn` is given, and then along y back into `field`.
     pub(super) fn steps(&self, field: &wgpu::Buffer, turn: Option<&wgpu::Buffer>) -> Result<[Dispatch; 2]> {
-        let (height, width) = self.size;
+        let Size { width, height } = self.size;
         let room = (self.device).buffer("the blurred field", 24 * height * width)?;
         Ok([
             self.step((1, 0), field, &room, turn)?,
@@ -51,6 +52,10 @@ impl Blur<'_> {
             (3, to.as_entire_binding()),
             (4, turn.unwrap_or(from).as_entire_binding()),
         ];
-        program.on(device, &arguments, [self.size.1.div_ceil(COLUMNS), self.size.0, 3])
+        program.on(
+            device,
+            &arguments,
+            [self.size.width.div_ceil(COLUMNS), self.size.height, 3],
+        )
     }
 }

@@ -23,7 +23,7 @@ impl DoublePhase {
         shared: &Shared<'_>,
         buffers: &[LevelsBuffers],
     ) -> Result<Self> {
-        let grid = [job.size.1.div_ceil(COLUMNS), job.size.0, 1];
+        let grid = [job.size.width.div_ceil(COLUMNS), job.size.height, 1];
         let peak = if job.options.brightness == Brightness::FrameMax {
             let program = device.program("the largest amplitude", shared.source.clone(), "peak");
             let mut arguments = shared.arguments(&[0, 1, 2, 3, 9]);

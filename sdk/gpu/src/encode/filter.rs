@@ -71,7 +71,7 @@ impl Filter {
             }
             Encoding::BandLimit { k } => {
                 rest.replaces = true;
-                let limit = BandLimit::new(size.0, size.1, *k)?;
+                let limit = BandLimit::new(size, *k)?;
                 let kept = quadrant(size, |kx, ky| f32::from(u8::from(limit.keeps(kx, ky))));
                 let planes = Planes {
                     field: job.field,

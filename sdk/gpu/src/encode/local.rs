@@ -6,6 +6,7 @@ use super::shared::Shared;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
 use crate::device::{Device, Dispatch};
+use phasefront_core::Size;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::local::LocalFilter;
 
@@ -35,7 +36,7 @@ impl Local {
         shared: &Shared<'_>,
         buffers: &[LevelsBuffers],
     ) -> Result<Self> {
-        let (height, width) = job.size;
+        let Size { width, height } = job.size;
         let bytes = 24 * height * width;
         // A saved field is turned when it is saved; otherwise the field is turned when it is read.
         let replaces = shared.filtered.replaces;

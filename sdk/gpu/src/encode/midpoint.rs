@@ -7,6 +7,7 @@ use crate::Result;
 use crate::device::{Constants, Device, Dispatch};
 use crate::fft::{Convolution, Planes};
 use num_complex::Complex32;
+use phasefront_core::Size;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::midpoint::{GAIN, MidpointSteps, STILL, WAVE};
 
@@ -35,7 +36,7 @@ impl Midpoint {
         [wanted, missing]: [&wgpu::Buffer; 2],
         buffers: &[LevelsBuffers],
     ) -> Result<Self> {
-        let (height, width) = job.size;
+        let Size { width, height } = job.size;
         let room = |what| device.buffer(what, 24 * height * width);
         let aim = room("the wave at the midpoint")?;
         let (phasors, kept) = (
@@ -92,15 +93,15 @@ impl Midpoint {
                     (18, &bound.buffer),
                 ],
             )?,
-            aim: convolution(&aim, &free, back[0].padded_shape())?,
-            back: convolution(missing, &there, back[0].padded_shape())?,
+            aim: convolution(&aim, &free, back[0].padded_size())?,
+            back: convolution(missing, &there, back[0].padded_size())?,
             ask: dispatch(
                 "what is missing at the midpoint",
                 "ask",
                 &[0],
                 &[(14, &aim), (15, missing)],
             )?,
-            forth: convolution(missing, &here, forth[0].padded_shape())?,
+            forth: convolution(missing, &here, forth[0].padded_size())?,
             follow: dispatch(
                 "a step at the midpoint",
                 "follow",
@@ -140,6 +141,7 @@ mod tests {
     use crate::method::chain::ChainOptions;
     use ndarray::Array3;
     use num_complex::Complex32;
+    use phasefront_core::Size;
     use phasefront_core::display::Display;
     use phasefront_core::display::illumination::Illumination;
     use phasefront_core::display::levels::LevelsMut;
@@ -157,15 +159,15 @@ mod tests {
         let laser = Illumination::new(beam.view()).unwrap();
         let lens = Aberration::new([[0.0, 0.0, 1.5, 0.0, 0.0]; 3]).unwrap();
         let cases = [
-            ((61, 47), 0.0, 1.0, (1, 1), false, None),
-            ((61, 47), 2e-3, 0.9, (0, 2), true, None),
-            ((40, 66), -1e-3, 1.0, (2, 3), false, None),
-            ((48, 70), 1e-3, 1.0, (1, 2), true, Some(lens)),
-            ((1, 1), 0.0, 1.0, (0, 1), false, None),
+            (Size { width: 47, height: 61 }, 0.0, 1.0, (1, 1), false, None),
+            (Size { width: 47, height: 61 }, 2e-3, 0.9, (0, 2), true, None),
+            (Size { width: 66, height: 40 }, -1e-3, 1.0, (2, 3), false, None),
+            (Size { width: 70, height: 48 }, 1e-3, 1.0, (1, 2), true, Some(lens)),
+            (Size { width: 1, height: 1 }, 0.0, 1.0, (0, 1), false, None),
         ];
         for (size, offset_m, radius, (local_steps, midpoint_steps), lit, correction) in cases {
             let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
-            let display = display.with_size(size.0, size.1).unwrap();
+            let display = display.with_size(size).unwrap();
             let target = Target {
                 illumination: lit.then(|| laser.clone()),
                 correction,
@@ -177,7 +179,7 @@ mod tests {
                 midpoint_steps,
                 ..Default::default()
             };
-            let area = size.0 * size.1;
+            let area = size.height * size.width;
             let mut values = field(area);
             let buffer = upload(&device, &values);
             let (encoder, buffers) = device

@@ -4,6 +4,7 @@ use super::filter::Filtered;
 use super::{EncoderJob, LevelsBuffers};
 use crate::Result;
 use crate::device::{Constants, Device, Dispatch, Program};
+use phasefront_core::Size;
 use phasefront_core::display::response::{Response, per_pixel};
 use phasefront_core::encode::brightness::Brightness;
 
@@ -99,7 +100,7 @@ struct Curves {
 }
 
 impl Curves {
-    fn of(response: &Response, (height, width): (usize, usize)) -> Self {
+    fn of(response: &Response, Size { width, height }: Size) -> Self {
         let curves = |steps, table| Curves {
             steps,
             table,
@@ -115,7 +116,7 @@ impl Curves {
                 let values = pixels.knots().iter().chain(pixels.turns());
                 Curves {
                     pixels: true,
-                    nodes: per_pixel::nodes(height, width, pixels.spacing()),
+                    nodes: per_pixel::nodes(Size { width, height }, pixels.spacing()),
                     spacing: pixels.spacing(),
                     intervals: pixels.intervals(),
                     ..curves(256, values.map(|value| value.to_bits()).collect())
@@ -163,7 +164,7 @@ fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> Str
         job.target.illumination.is_some(),
         lit.0,
         lit.1,
-        modulator.0,
-        modulator.1,
+        modulator.height,
+        modulator.width,
     )
 }

@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::device::{Constants, Device};
+use phasefront_core::Size;
 use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, Plane, yuv_constants};
 
 /// The plan for reading a camera's images.
@@ -22,9 +23,9 @@ impl Camera {
         device: &Device,
         plan: ColourPlan,
         format: ColourFormat,
-        sensor: (usize, usize),
+        sensor: Size,
     ) -> Result<(Self, usize, String)> {
-        let (height, width) = sensor;
+        let Size { width, height } = sensor;
         let mut places = Vec::new();
         let mut bytes = 0;
         for (_, pixel_bytes, share) in format.layout() {
@@ -61,15 +62,18 @@ impl Camera {
     /// Uploads an image to the colour buffer.
     pub(super) fn upload(&self, device: &Device, to: &wgpu::Buffer, image: &ColourImage<'_>) -> Result<()> {
         let format = image.format();
-        let (height, width) = image.shape();
+        let Size { width, height } = image.size();
         let mut planes = image.planes().to_vec();
         let mut tight = Vec::new();
         for ((plane, (_, pixel_bytes, share)), (_, room)) in planes.iter_mut().zip(format.layout()).zip(&self.places) {
-            let (rows, columns) = (height.div_ceil(*share), width.div_ceil(*share));
-            let last = (rows - 1) * plane.row_stride + (columns - 1) * plane.pixel_stride;
+            let part = Size {
+                width: width.div_ceil(*share),
+                height: height.div_ceil(*share),
+            };
+            let last = (part.height - 1) * plane.row_stride + (part.width - 1) * plane.pixel_stride;
             plane.bytes = &plane.bytes[..last + pixel_bytes];
             if plane.bytes.len() > *room {
-                tight.push(tightened(plane, rows, columns, *pixel_bytes));
+                tight.push(tightened(plane, part, *pixel_bytes));
             } else {
                 tight.push(Vec::new());
             }
@@ -82,7 +86,7 @@ impl Camera {
                 *plane = Plane::new(tight, width.div_ceil(*share) * pixel_bytes, *pixel_bytes);
             }
         }
-        let image = ColourImage::new(format, width, height, &planes)?;
+        let image = ColourImage::new(format, image.size(), &planes)?;
         let mut words = [0i32; 12];
         for (c, (plane, view)) in self.plan.views(&image).into_iter().enumerate() {
             words[4 * c] = (self.places[plane].0 + view.origin) as i32;
@@ -119,10 +123,10 @@ fn taps(plan: &ColourPlan) -> (String, Vec<u32>) {
 }
 
 /// Copies a plane's pixels without gaps, for strides larger than cameras use.
-fn tightened(plane: &Plane<'_>, rows: usize, columns: usize, pixel_bytes: usize) -> Vec<u8> {
+fn tightened(plane: &Plane<'_>, size: Size, pixel_bytes: usize) -> Vec<u8> {
     let pixel = |i: usize| {
-        let at = i / columns * plane.row_stride + i % columns * plane.pixel_stride;
+        let at = i / size.width * plane.row_stride + i % size.width * plane.pixel_stride;
         &plane.bytes[at..at + pixel_bytes]
     };
-    (0..rows * columns).flat_map(pixel).copied().collect()
+    (0..size.pixels()).flat_map(pixel).copied().collect()
 }

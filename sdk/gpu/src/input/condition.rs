@@ -3,13 +3,14 @@
 
 use crate::Result;
 use crate::device::{Device, Dispatch};
+use phasefront_core::Size;
 use phasefront_core::depth::condition::{ConditionedReadings, constants};
 use phasefront_core::runtime::error::Error;
 
 /// The stage for one number of readings and pixels. It remembers the choices of earlier frames.
 pub(super) struct Conditioning {
-    shape: (usize, usize),
-    out: (usize, usize),
+    size: Size,
+    out: Size,
     sizes: wgpu::Buffer,
     readings: wgpu::Buffer,
     places: wgpu::Buffer,
@@ -17,15 +18,10 @@ pub(super) struct Conditioning {
 }
 
 impl Conditioning {
-    /// Plans the stage for (h, w) = `shape` readings. It adds their depth to `picture`, the red, green, blue and depth
-    /// of (H, W) = `out` pixels.
-    pub(super) fn new(
-        device: &Device,
-        shape: (usize, usize),
-        out: (usize, usize),
-        picture: &wgpu::Buffer,
-    ) -> Result<Self> {
-        let (cells, pixels) = (shape.0 * shape.1, out.0 * out.1);
+    /// Plans the stage for readings of `size`. It adds their depth to `picture`, the red, green, blue and depth
+    /// of an image of the size `out`.
+    pub(super) fn new(device: &Device, size: Size, out: Size, picture: &wgpu::Buffer) -> Result<Self> {
+        let (cells, pixels) = (size.height * size.width, out.height * out.width);
         let header: String = constants()
             .iter()
             .map(|(name, value)| format!("const {name}: f32 = {value:?};\n"))
@@ -33,7 +29,7 @@ impl Conditioning {
         let source = header + include_str!("condition.wgsl");
         let sizes = device.buffer("sizes", 24)?;
         let readings = device.buffer("readings", 4 * (cells + cells.div_ceil(4)))?;
-        let places = device.buffer("places", 8 * (shape.0 + shape.1 + out.0 + out.1))?;
+        let places = device.buffer("places", 8 * (size.height + size.width + out.height + out.width))?;
         let colours = device.buffer("the colours of readings", 16 * cells)?;
         let choices = device.buffer("choices", 12 * pixels)?;
         let history = device.buffer("earlier choices", 8 * pixels)?;
@@ -45,15 +41,15 @@ impl Conditioning {
             let program = device.program("conditioning", source.clone(), entry);
             program.on(device, &arguments, grid)
         };
-        let rows = |(height, width): (usize, usize)| [width.div_ceil(64), height, 1];
-        let tiles = [out.1.div_ceil(8), out.0.div_ceil(8), 1];
+        let rows = |size: Size| [size.width.div_ceil(64), size.height, 1];
+        let tiles = [out.width.div_ceil(8), out.height.div_ceil(8), 1];
         let steps = [
-            step("sum", &[0, 1, 2, 3, 4], rows(shape))?,
+            step("sum", &[0, 1, 2, 3, 4], rows(size))?,
             step("choose", &[0, 1, 2, 3, 4, 5, 6], tiles)?,
             step("decide", &[0, 1, 2, 3, 5, 6], rows(out))?,
         ];
         Ok(Conditioning {
-            shape,
+            size,
             out,
             sizes,
             readings,
@@ -64,10 +60,11 @@ impl Conditioning {
 
     /// Uploads the readings of a frame.
     pub(super) fn upload(&self, device: &Device, readings: &ConditionedReadings<'_>) -> Result<()> {
-        if (readings.shape(), readings.out()) != (self.shape, self.out) {
+        if (readings.size(), readings.out()) != (self.size, self.out) {
             return Err(Error::Frame("depth comes in another form than was planned".into()).into());
         }
-        let ((rows, columns), (height, width)) = (self.shape, self.out);
+        let Size { width, height } = self.out;
+        let (rows, columns) = self.size.shape();
         let flags = [readings.are_coarse(), readings.has_past()].map(u32::from);
         let sizes = [
             width as u32,
@@ -101,6 +98,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::{Colour, ColourData, Depth, DepthData, Form, Frame, Packer, Source};
     use crate::device::testing::{device, run};
+    use phasefront_core::Size;
     use phasefront_core::depth::condition::{ConditionScratch, Conditioner};
     use phasefront_core::frame::Crop;
     use rand::{RngExt, SeedableRng};
@@ -108,19 +106,19 @@ mod tests {
 
     /// A video of two surfaces of different colours before a slope, with noise, holes and a shift. A part moves.
     struct Scene {
-        cells: (usize, usize),
-        out: (usize, usize),
+        cells: Size,
+        out: Size,
         crop: Crop,
         random: ChaCha8Rng,
     }
 
     impl Scene {
-        fn new(cells: (usize, usize), out: (usize, usize)) -> Self {
+        fn new(cells: Size, out: Size) -> Self {
             Scene {
                 cells,
                 out,
                 crop: Crop::cover(cells, out),
-                random: ChaCha8Rng::seed_from_u64((cells.0 * out.1) as u64),
+                random: ChaCha8Rng::seed_from_u64((cells.height * out.width) as u64),
             }
         }
 
@@ -133,24 +131,25 @@ mod tests {
                 false => 2,
             };
             let mut noise = |most: f32| self.random.random_range(-most..most);
-            let depth = (0..cells.0 * cells.1).map(|i| {
+            let depth = (0..cells.height * cells.width).map(|i| {
                 // Readings mix what lies in them, a pixel or a reading beside the colour.
                 let part = |k: usize| {
                     let beside = if cells == out { 1.0 } else { 0.4 };
-                    let x = ((i % cells.1) as f64 + (k % 4) as f64 / 4.0 + beside) / cells.1 as f64;
-                    let y = ((i / cells.1) as f64 + (k / 4) as f64 / 4.0) / cells.0 as f64;
+                    let x = ((i % cells.width) as f64 + (k % 4) as f64 / 4.0 + beside) / cells.width as f64;
+                    let y = ((i / cells.width) as f64 + (k / 4) as f64 / 4.0) / cells.height as f64;
                     [0.2, 0.45, 0.7 + 0.2 * y as f32][surface(x, y)]
                 };
                 let mean = (0..16).map(part).sum::<f32>() / 16.0;
-                let is_hole = noise(1.0) > 0.95 || i % cells.1 > 4 * cells.1 / 5 && i / cells.1 < cells.0 / 3;
+                let is_hole =
+                    noise(1.0) > 0.95 || i % cells.width > 4 * cells.width / 5 && i / cells.width < cells.height / 3;
                 if is_hole { f32::NAN } else { mean + noise(0.02) }
             });
             let depth = depth.collect();
-            let mut rgb = vec![0.0; 3 * out.0 * out.1];
+            let mut rgb = vec![0.0; 3 * out.height * out.width];
             for (i, value) in rgb.iter_mut().enumerate() {
-                let (c, y, x) = (i / (out.0 * out.1), i / out.1 % out.0, i % out.1);
-                let x = (crop.x + (x as f64 + 0.5) * crop.width / out.1 as f64) / cells.1 as f64;
-                let y = (crop.y + (y as f64 + 0.5) * crop.height / out.0 as f64) / cells.0 as f64;
+                let (c, y, x) = (i / (out.height * out.width), i / out.width % out.height, i % out.width);
+                let x = (crop.x + (x as f64 + 0.5) * crop.width / out.width as f64) / cells.width as f64;
+                let y = (crop.y + (y as f64 + 0.5) * crop.height / out.height as f64) / cells.height as f64;
                 let colour = [[0.9, 0.5, 0.1], [0.3, 0.6, 0.3], [0.2, 0.4, 0.6]][surface(x, y)];
                 *value = (colour[c] + noise(0.05)).clamp(0.0, 1.0);
             }
@@ -170,7 +169,7 @@ mod tests {
             packer.run(pass);
             packer.condition(pass);
         });
-        let (height, width) = plan.shape();
+        let Size { width, height } = plan.size();
         let pixels = device.read(&packer.input.first, 16 * height * width).unwrap();
         let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&pixels);
         let mut expected = vec![0.0; height * width];
@@ -185,19 +184,24 @@ mod tests {
         let device = device();
         let (mut kinds, mut is_shifted) = ([0; 4], false);
         for (cells, out) in [
-            ((19, 27), (131, 187)),
-            ((41, 53), (83, 107)),
-            ((60, 80), (77, 99)),
-            ((67, 91), (67, 91)),
-            ((75, 101), (37, 51)),
-            ((1, 1), (5, 3)),
-            ((2, 9), (70, 81)),
+            (
+                Size { width: 27, height: 19 },
+                Size {
+                    width: 187,
+                    height: 131,
+                },
+            ),
+            (Size { width: 53, height: 41 }, Size { width: 107, height: 83 }),
+            (Size { width: 80, height: 60 }, Size { width: 99, height: 77 }),
+            (Size { width: 91, height: 67 }, Size { width: 91, height: 67 }),
+            (Size { width: 101, height: 75 }, Size { width: 51, height: 37 }),
+            (Size { width: 1, height: 1 }, Size { width: 3, height: 5 }),
+            (Size { width: 9, height: 2 }, Size { width: 81, height: 70 }),
         ] {
             let mut scene = Scene::new(cells, out);
             let plan = Conditioner::new(cells, scene.crop, out, false).unwrap();
             let mut scratch = plan.scratch();
-            let (height, width) = cells;
-            let source = Source::Frame(Colour::Planar, Depth::Readings { height, width });
+            let source = Source::Frame(Colour::Planar, Depth::Readings(cells));
             let packer = device
                 .guarded(|| Packer::new(&device, Form::Surfaces, out, source, None))
                 .unwrap();
@@ -219,7 +223,7 @@ mod tests {
                 differ += apart.filter(|apart| apart.is_nan() || *apart > 1e-5).count();
                 others += made.iter().zip(&expected).filter(|(a, b)| a != b).count();
             }
-            let all = 6 * out.0 * out.1;
+            let all = 6 * out.height * out.width;
             println!("{cells:?} {out:?}: {differ} of {all} apart, {others} with other bits");
             assert!(differ * 2000 <= all, "{cells:?} {out:?}: {differ} of {all}");
         }

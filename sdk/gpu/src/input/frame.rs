@@ -1,6 +1,7 @@
 //! A borrowed captured frame, in camera formats or as planes.
 
 use ndarray::{Array2, Array3};
+use phasefront_core::Size;
 use phasefront_core::depth::condition::ConditionedReadings;
 use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, RgbdFrame};
 
@@ -14,10 +15,8 @@ pub enum Colour {
     Camera {
         /// The memory layout. Strides may differ between images.
         format: ColourFormat,
-        /// The rows of the sensor.
-        height: usize,
-        /// The columns of the sensor.
-        width: usize,
+        /// The size in the sensor's orientation.
+        size: Size,
         /// The orientation that makes the images upright.
         orientation: Orientation,
     },
@@ -34,12 +33,10 @@ pub enum Depth {
     U16,
     /// Conditioned readings, from which the GPU decides the depth of each pixel. It remembers its choices from frame to
     /// frame.
-    Readings {
-        /// The rows of the sensor.
-        height: usize,
-        /// The columns of the sensor.
-        width: usize,
-    },
+    Readings(
+        /// The size in the sensor's orientation.
+        Size,
+    ),
 }
 
 /// The colour of a frame in the planned [`Colour`] format.
@@ -82,21 +79,17 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Converts the frame to (`height`, `width`) on the CPU, as the input stage does. `orientation` applies to a camera
+    /// Converts the frame to `size` on the CPU, as the input stage does. `orientation` applies to a camera
     /// image.
     ///
     /// # Errors
     /// Returns [`phasefront_core::runtime::error::Error::Frame`] if the data has another size or invalid values.
-    pub fn read(
-        &self,
-        orientation: Orientation,
-        height: usize,
-        width: usize,
-    ) -> phasefront_core::runtime::error::Result<RgbdFrame> {
+    pub fn read(&self, orientation: Orientation, size: Size) -> phasefront_core::runtime::error::Result<RgbdFrame> {
+        let Size { width, height } = size;
         let rgb = match &self.colour {
             ColourData::Planar(values) => values.to_vec(),
             ColourData::Camera(image) => {
-                let plan = ColourPlan::new(image, orientation, height, width)?;
+                let plan = ColourPlan::new(image, orientation, size)?;
                 let mut rgb = vec![0.0; 3 * height * width];
                 plan.convert(image, &mut rgb, &mut plan.scratch())?;
                 rgb

@@ -5,6 +5,7 @@ use super::condition::Conditioning;
 use super::frame::{Colour, ColourData, Depth, DepthData, Frame};
 use crate::Result;
 use crate::device::Device;
+use phasefront_core::Size;
 use phasefront_core::frame::ColourPlan;
 use phasefront_core::method::network::InputKind;
 
@@ -40,7 +41,7 @@ pub(super) struct Reader {
 pub(super) struct Frames {
     pub(super) formats: (Colour, Depth),
     pub(super) camera: Option<Camera>,
-    size: (usize, usize),
+    size: Size,
     colour: wgpu::Buffer,
     depth: Option<wgpu::Buffer>,
     /// Adds the depth of readings.
@@ -49,7 +50,7 @@ pub(super) struct Frames {
 
 impl Reader {
     /// Creates a reader of pixels with this number of `channels`.
-    pub(super) fn new(device: &Device, source: Source<'_>, channels: usize, size: (usize, usize)) -> Result<Self> {
+    pub(super) fn new(device: &Device, source: Source<'_>, channels: usize, size: Size) -> Result<Self> {
         let reader = |text: &str, first| Reader {
             header: String::new(),
             text: text.to_owned(),
@@ -59,7 +60,7 @@ impl Reader {
         };
         Ok(match source {
             Source::Planes => {
-                let bytes = 4 * channels * size.0 * size.1;
+                let bytes = 4 * channels * size.height * size.width;
                 let planes = device.buffer("the network's input", bytes)?;
                 reader(include_str!("planes.wgsl"), planes)
             }
@@ -84,20 +85,18 @@ impl Reader {
         })
     }
 
-    fn of_frames(device: &Device, colour: Colour, depth: Depth, size: (usize, usize)) -> Result<Self> {
-        let (height, width) = size;
+    fn of_frames(device: &Device, colour: Colour, depth: Depth, size: Size) -> Result<Self> {
+        let Size { width, height } = size;
         let area = height * width;
         let mut header = format!("const WORDS: bool = {};\n", depth == Depth::U16);
         let (bytes, text, camera) = match colour {
             Colour::Planar => (12 * area, include_str!("planar.wgsl"), None),
             Colour::Camera {
                 format,
-                height: rows,
-                width: columns,
+                size: sensor,
                 orientation,
             } => {
-                let sensor = (rows, columns);
-                let plan = ColourPlan::for_format(format, sensor, orientation, height, width)?;
+                let plan = ColourPlan::for_format(format, sensor, orientation, size)?;
                 let (camera, bytes, constants) = Camera::new(device, plan, format, sensor)?;
                 header += &constants;
                 (bytes, include_str!("camera.wgsl"), Some(camera))
@@ -106,7 +105,7 @@ impl Reader {
         let depth_bytes = match depth {
             Depth::F32 => Some(4 * area),
             Depth::U16 => Some(2 * area),
-            Depth::Readings { .. } => None,
+            Depth::Readings(_) => None,
         };
         let depth_text = match depth_bytes {
             Some(_) => include_str!("depth.wgsl"),
@@ -132,7 +131,7 @@ impl Reader {
 
 impl Frames {
     pub(super) fn upload(&self, device: &Device, frame: &Frame<'_>) -> Result<()> {
-        let area = self.size.0 * self.size.1;
+        let area = self.size.height * self.size.width;
         let length = |what: &str, is: usize, right: usize| {
             if is == right {
                 Ok(())
@@ -168,7 +167,7 @@ impl Frames {
                 length("depth", words.len(), area)?;
                 device.write(buffer, 0, bytemuck::cast_slice(words));
             }
-            (DepthData::Readings(readings), Depth::Readings { .. }, _, Some(conditioning)) => {
+            (DepthData::Readings(readings), Depth::Readings(_), _, Some(conditioning)) => {
                 conditioning.upload(device, &readings)?;
             }
             _ => return Err(other("depth").into()),

@@ -6,6 +6,7 @@ use crate::device::{Constants, Device, Dispatch};
 use crate::input::{ChainInput, Form, Packer, Source};
 use crate::numbers::{Float, GROUP, Numbers};
 use crate::{GpuError, Result};
+use phasefront_core::Size;
 use phasefront_core::method::network::chain::{Chain, Layer, Weights};
 use phasefront_core::method::network::{Head, InputKind, Network};
 use phasefront_core::runtime::clock::Instant;
@@ -71,8 +72,8 @@ pub(crate) struct ChainPlan {
 struct Maker<'a> {
     device: &'a Device,
     numbers: Numbers,
-    /// The rows and columns of the layers' pixels.
-    size: (usize, usize),
+    /// The size of the layers in pixels.
+    size: Size,
     frame: Constants,
 }
 
@@ -96,12 +97,12 @@ struct Tables {
 }
 
 impl ChainPlan {
-    /// Plans `chain` for frames of `size` (height, width) from `input`, with the given or the measured fusion.
+    /// Plans `chain` for frames of `size` from `input`, with the given or the measured fusion.
     pub(crate) fn new(
         device: &Device,
         chain: &Chain,
         numbers: Numbers,
-        size: (usize, usize),
+        size: Size,
         input: &ChainInput,
         end: End,
         fusion: Fusion,
@@ -112,14 +113,14 @@ impl ChainPlan {
                 .map(|(i, layer)| pack_float(chain, i, layer, numbers))
                 .collect::<Result<_>>()?,
         };
-        let pixels = size.0 * size.1;
-        let (height, width) = (size.0.div_ceil(chain.side()), size.1.div_ceil(chain.side()));
+        let pixels = size.height * size.width;
+        let (width, height) = (size.width.div_ceil(chain.side()), size.height.div_ceil(chain.side()));
         let tiles = (width.div_ceil(TILE.0), height.div_ceil(TILE.1));
-        let constants = [width, height, width * height, tiles.0, size.1, size.0, 0, 0].map(|n| n as u32);
+        let constants = [width, height, width * height, tiles.0, size.width, size.height, 0, 0].map(|n| n as u32);
         let maker = Maker {
             device,
             numbers,
-            size: (height, width),
+            size: Size { width, height },
             frame: device.constants("frame", bytemuck::cast_slice(&constants))?,
         };
         let groups = chain.filters().div_ceil(GROUP);
@@ -266,7 +267,7 @@ impl Maker<'_> {
         let mut arguments = self.arguments(&weights, from, from);
         arguments.push((4, to.as_entire_binding()));
         arguments.extend(tables.iter().map(|t| (8, t.buffer.as_entire_binding())));
-        let (height, width) = self.size;
+        let Size { width, height } = self.size;
         let grid = [width.div_ceil(PAIR_INNER), height.div_ceil(PAIR_INNER), 1];
         program.on(self.device, &arguments, grid)
     }
@@ -301,7 +302,7 @@ impl Maker<'_> {
     }
 
     fn grid(&self) -> [usize; 3] {
-        [self.size.1.div_ceil(TILE.0), self.size.0.div_ceil(TILE.1), 1]
+        [self.size.width.div_ceil(TILE.0), self.size.height.div_ceil(TILE.1), 1]
     }
 
     fn arguments<'b>(
@@ -533,7 +534,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
 /// A network on the GPU for one frame size: the counterpart of [`phasefront_core::method::network::NetworkPlan`].
 pub struct GpuNetworkPlan {
     device: Arc<Device>,
-    size: (usize, usize),
+    size: Size,
     inputs: usize,
     numbers: Numbers,
     packer: Packer,
@@ -541,20 +542,13 @@ pub struct GpuNetworkPlan {
 }
 
 impl GpuNetworkPlan {
-    /// Prepares `network` for frames of `height` × `width` pixels.
+    /// Prepares `network` for frames of `size`.
     ///
     /// # Errors
     /// Returns [`GpuError::Refused`] if `device` does not support the number format or the size, or
     /// [`GpuError::OutOfMemory`].
-    pub async fn new_async(
-        device: &Arc<Device>,
-        network: &Network,
-        height: usize,
-        width: usize,
-        options: ChainOptions,
-    ) -> Result<Self> {
-        let size = (height, width);
-        phasefront_core::method::network::check_size(height, width, phasefront_core::method::network::MAX_PIXELS)?;
+    pub async fn new_async(device: &Arc<Device>, network: &Network, size: Size, options: ChainOptions) -> Result<Self> {
+        phasefront_core::method::network::check_size(size, phasefront_core::method::network::MAX_PIXELS)?;
         let build = || {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
@@ -589,15 +583,15 @@ impl GpuNetworkPlan {
     /// # Errors
     /// Returns an error if a length is wrong, or [`GpuError::Lost`].
     pub async fn run_async(&self, input: &[f32], output: &mut [f32]) -> Result<()> {
-        let area = self.size.0 * self.size.1;
+        let area = self.size.height * self.size.width;
         if input.len() != self.inputs * area || output.len() != 6 * area {
             return Err(phasefront_core::runtime::error::Error::Frame(format!(
                 "network input has {} values and output {}; {} and 6 planes of {}×{} pixels are right",
                 input.len(),
                 output.len(),
                 self.inputs,
-                self.size.1,
-                self.size.0
+                self.size.width,
+                self.size.height
             ))
             .into());
         }

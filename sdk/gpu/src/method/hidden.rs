@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::device::{Device, Dispatch};
+use phasefront_core::Size;
 use phasefront_core::method::sweep::hidden::JUMP;
 
 /// The number of pixels in a line for which a thread finds the sources.
@@ -22,7 +23,7 @@ impl Search {
     pub(crate) fn new(
         device: &Device,
         surfaces: &wgpu::Buffer,
-        (height, width): (usize, usize),
+        Size { width, height }: Size,
         reach: usize,
     ) -> Result<Self> {
         let area = height * width;
@@ -79,7 +80,7 @@ mod tests {
     use phasefront_core::method::sweep::hidden::{Hidden, NOTHING, reference};
 
     /// Creates depths with edges, some of them blurred, and with noise at every pixel.
-    fn depths((height, width): (usize, usize)) -> Vec<Vec<f32>> {
+    fn depths(Size { width, height }: Size) -> Vec<Vec<f32>> {
         let mut state = 1u32;
         let mut random = move || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -106,14 +107,20 @@ mod tests {
     fn sources_are_those_of_the_cpu() {
         let device = device();
         for (size, reach) in [
-            ((61, 47), 31),
-            ((1, 150), 9),
-            ((150, 1), 200),
-            ((7, 200), 1),
-            ((384, 384), 31),
-            ((1, 1), 5),
+            (Size { width: 47, height: 61 }, 31),
+            (Size { width: 150, height: 1 }, 9),
+            (Size { width: 1, height: 150 }, 200),
+            (Size { width: 200, height: 7 }, 1),
+            (
+                Size {
+                    width: 384,
+                    height: 384,
+                },
+                31,
+            ),
+            (Size { width: 1, height: 1 }, 5),
         ] {
-            let area = size.0 * size.1;
+            let area = size.height * size.width;
             for (case, depth) in depths(size).into_iter().enumerate() {
                 let values: Vec<[f32; 4]> = depth.iter().map(|&d| [0.0, 0.0, 0.0, d]).collect();
                 let surfaces = device.table("surfaces", bytemuck::cast_slice(&values)).unwrap();
@@ -128,9 +135,9 @@ mod tests {
                 let found = device.read(&search.sources, 8 * area).unwrap();
                 let found: Vec<u32> = bytemuck::pod_collect_to_vec(&found);
                 let expected = match area {
-                    0..10_000 => reference(&depth, size.0, size.1, reach),
+                    0..10_000 => reference(&depth, size, reach),
                     _ => {
-                        let plan = Hidden::new(size.0, size.1, reach);
+                        let plan = Hidden::new(size, reach);
                         let mut sources = vec![0; 2 * area];
                         plan.find(&depth, &mut sources, &mut plan.scratch());
                         sources
@@ -138,7 +145,7 @@ mod tests {
                 };
                 assert!(found == expected, "{size:?}, {reach}, depth {case}");
                 let some = found.iter().any(|&source| source != NOTHING);
-                assert!(some || case > 1 || size != (384, 384));
+                assert!(some || case > 1 || area != 384 * 384);
             }
         }
     }

@@ -9,6 +9,7 @@ use crate::device::{Device, Dispatch};
 use crate::method::chain::time;
 use crate::method::hidden::Search;
 use crate::{GpuError, Result};
+use phasefront_core::Size;
 use phasefront_core::display::Display;
 use phasefront_core::method::sweep::{self, MARGIN, SweepPlan};
 
@@ -80,10 +81,10 @@ impl Sweeper {
             0 => None,
             _ => {
                 let reach = sweep::hidden_reach(display);
-                Some(Search::new(device, surfaces, plan.shape(), reach)?)
+                Some(Search::new(device, surfaces, plan.size(), reach)?)
             }
         };
-        let (height, width) = plan.shape();
+        let Size { width, height } = plan.size();
         let area = height * width;
         let border = border(plan, display)?;
         let tiles = (width.div_ceil(COLUMNS), height.div_ceil(HOME_ROWS));
@@ -95,9 +96,12 @@ impl Sweeper {
             sources: search.as_ref().map_or(surfaces, |search| &search.sources),
             points: &device.buffer("points", 4 * area)?,
             border,
-            padded: (height + 2 * border, width + 2 * border),
+            padded: Size {
+                width: width + 2 * border,
+                height: height + 2 * border,
+            },
         };
-        let swept = 24 * maker.padded.0 * maker.padded.1;
+        let swept = 24 * maker.padded.height * maker.padded.width;
         let fields = [
             device.buffer("the swept field", swept)?,
             device.buffer("the swept field", swept)?,
@@ -115,7 +119,7 @@ impl Sweeper {
             Some(_) => (4 * 16 + 8) * area,
             None => 0,
         };
-        let half_home = 24 * maker.padded.0 * width;
+        let half_home = 24 * maker.padded.height * width;
         Ok(Sweeper {
             search,
             home,
@@ -151,8 +155,8 @@ struct Maker<'a> {
     sources: &'a wgpu::Buffer,
     points: &'a wgpu::Buffer,
     border: usize,
-    /// (H, W) with the border.
-    padded: (usize, usize),
+    /// The size with the border.
+    padded: Size,
 }
 
 impl Maker<'_> {
@@ -169,7 +173,7 @@ impl Maker<'_> {
 
     /// Plans the dispatch that finds the planes of each pixel's points.
     fn points(&self) -> Result<Dispatch> {
-        let (height, width) = self.plan.shape();
+        let Size { width, height } = self.plan.size();
         let frame = [width, height, height * width, 0].map(|n| n as u32);
         let frame = (self.device).constants("frame", bytemuck::cast_slice(&frame))?;
         let source = self.header() + include_str!("sweep_points.wgsl");
@@ -186,7 +190,7 @@ impl Maker<'_> {
     /// Returns the faster of one plane and `most` planes per dispatch. The test frame is lit everywhere from its last
     /// plane on: it has white rows there, at least one in each tile.
     fn faster(&self, most: usize, fields: &[wgpu::Buffer; 2]) -> Result<(Vec<Dispatch>, usize)> {
-        let (height, width) = self.plan.shape();
+        let Size { width, height } = self.plan.size();
         let row = vec![[1.0f32; 4]; width];
         for y in (0..height).step_by(TILE.1 / 2) {
             let at = (16 * y * width) as u64;
@@ -219,10 +223,13 @@ impl Maker<'_> {
             + include_str!("sweep.wgsl");
         let program = device.program("planes", source, "cross_planes");
         let halo = 2 * radius * together;
-        let (high, wide) = self.padded;
+        let Size {
+            width: wide,
+            height: high,
+        } = self.padded;
         let grid = [wide.div_ceil(columns - halo), high.div_ceil(rows - halo), 3];
         let count = sweep.planes.div_ceil(together);
-        let (height, width) = self.plan.shape();
+        let Size { width, height } = self.plan.size();
         let crossings = (0..count).map(|step| {
             let first = (count - step) * together - 1;
             let frame = [width, height, self.border, first].map(|n| n as u32);
@@ -250,7 +257,11 @@ impl Maker<'_> {
         let radius = lengths.max().unwrap_or(1) - 1;
         let taps = filters.iter().map(|f| &f.home[..]);
         let taps = device.constants("the way home", &packed(taps, radius))?;
-        let ((height, width), (high, wide)) = (self.plan.shape(), self.padded);
+        let Size { width, height } = self.plan.size();
+        let Size {
+            width: wide,
+            height: high,
+        } = self.padded;
         let go = |down: bool, written: usize, read: usize, from, to: &wgpu::Buffer| {
             let tiles = [width.div_ceil(COLUMNS), written.div_ceil(HOME_ROWS), 3];
             let way = [width, written, read, high, self.border, tiles[0], 0, 0];
@@ -342,7 +353,7 @@ mod tests {
     }
 
     /// Creates a frame with fine colour detail and the depth that `depth` returns.
-    fn frame((height, width): (usize, usize), depth: fn(usize, usize) -> f32) -> RgbdFrame {
+    fn frame(Size { width, height }: Size, depth: fn(usize, usize) -> f32) -> RgbdFrame {
         let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
             ((c * 5 + y * 3 + x * x + y * x) % 11) as f32 / 10.0
         });
@@ -369,7 +380,7 @@ mod tests {
 
     fn on_gpu(frame: &RgbdFrame, plan: &SweepPlan, display: &Display, measured: bool) -> Vec<Complex32> {
         let device = device();
-        let (height, width) = frame.shape();
+        let Size { width, height } = frame.size();
         let (rgb, depth) = (frame.rgb(), frame.depth());
         let values: Vec<[f32; 4]> = depth
             .indexed_iter()
@@ -438,15 +449,22 @@ mod tests {
             },
         ];
         let mut cases = Vec::new();
-        cases.extend(depths.map(|depth| ((34, 38), depth, sweep(), 0.0)));
-        cases.extend(sweeps.map(|sweep| ((41, 29), depths[0], sweep, 0.0)));
-        cases.push(((29, 31), depths[1], sweep(), -1e-3));
-        for size in [(61, 47), (50, 7), (7, 50), (1, 29), (30, 1), (1, 1)] {
+        cases.extend(depths.map(|depth| (Size { width: 38, height: 34 }, depth, sweep(), 0.0)));
+        cases.extend(sweeps.map(|sweep| (Size { width: 29, height: 41 }, depths[0], sweep, 0.0)));
+        cases.push((Size { width: 31, height: 29 }, depths[1], sweep(), -1e-3));
+        for size in [
+            Size { width: 47, height: 61 },
+            Size { width: 7, height: 50 },
+            Size { width: 50, height: 7 },
+            Size { width: 29, height: 1 },
+            Size { width: 1, height: 30 },
+            Size { width: 1, height: 1 },
+        ] {
             cases.push((size, depths[0], sweep(), 2e-3));
         }
         for (case, (size, depth, sweep, z_m)) in cases.into_iter().enumerate() {
             let frame = frame(size, depth);
-            let plan = SweepPlan::new(size.0, size.1, &small(), sweep, z_m).unwrap();
+            let plan = SweepPlan::new(size, &small(), sweep, z_m).unwrap();
             let field = on_gpu(&frame, &plan, &small(), case % 2 == 1);
             let expected = reference::field(&frame, &small(), sweep, z_m).unwrap();
             let worst = apart(&field, &expected);
@@ -461,17 +479,30 @@ mod tests {
         let default = Display::default();
         let fine = Display::from_toml("pitch_um = 3.74\nvolume_depth_mm = 2").unwrap();
         for (size, depth, display, z_m) in [
-            ((61, 47), scene as fn(usize, usize) -> f32, &default, 0.0),
-            ((61, 47), noise, &default, 0.0),
-            ((90, 7), scene, &default, 0.0),
-            ((61, 47), scene, &default, 3e-3),
-            ((61, 47), scene, &default, -3e-3),
-            ((61, 47), scene, &fine, 0.0),
-            ((384, 384), scene, &default, 0.0),
+            (
+                Size { width: 47, height: 61 },
+                scene as fn(usize, usize) -> f32,
+                &default,
+                0.0,
+            ),
+            (Size { width: 47, height: 61 }, noise, &default, 0.0),
+            (Size { width: 7, height: 90 }, scene, &default, 0.0),
+            (Size { width: 47, height: 61 }, scene, &default, 3e-3),
+            (Size { width: 47, height: 61 }, scene, &default, -3e-3),
+            (Size { width: 47, height: 61 }, scene, &fine, 0.0),
+            (
+                Size {
+                    width: 384,
+                    height: 384,
+                },
+                scene,
+                &default,
+                0.0,
+            ),
         ] {
             let frame = frame(size, depth);
             let sweep = Sweep::for_display(display);
-            let plan = SweepPlan::new(size.0, size.1, display, sweep, z_m).unwrap();
+            let plan = SweepPlan::new(size, display, sweep, z_m).unwrap();
             let field = on_gpu(&frame, &plan, display, false);
             let mut expected = vec![Complex32::ZERO; field.len()];
             plan.field(&frame, &mut expected, &mut plan.scratch()).unwrap();
@@ -492,7 +523,7 @@ mod tests {
             taps: 2 * MOST_RADIUS + 3,
             ..sweep()
         };
-        let plan = SweepPlan::new(9, 9, &small(), wide, 0.0).unwrap();
+        let plan = SweepPlan::new(Size { width: 9, height: 9 }, &small(), wide, 0.0).unwrap();
         let surfaces = device.buffer("surfaces", 16 * 81).unwrap();
         let refused = device.guarded(|| Sweeper::new(&device, &plan, &small(), &surfaces));
         assert!(refused.err().unwrap().to_string().contains("23 taps"));

@@ -37,10 +37,7 @@ impl OnCpu {
     }
 
     fn plan(options: &SessionOptions, quality_level: &QualityLevel) -> Result<Pipeline> {
-        let (shape, method) = (
-            (quality_level.height, quality_level.width),
-            quality_level.method.clone(),
-        );
+        let (shape, method) = (quality_level.size, quality_level.method.clone());
         Pipeline::new(shape, method, &options.target, quality_level.encoder(options))
     }
 

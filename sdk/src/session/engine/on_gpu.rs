@@ -59,11 +59,11 @@ impl OnGpu {
                 options.target.display.bits()
             )));
         }
-        let shape = (quality_level.height, quality_level.width);
+        let size = quality_level.size;
         let job = Job {
             encoder: quality_level.encoder(options).clone(),
             chain: options.gpu.chain,
-            ..Job::new(shape, quality_level.method.clone(), options.target.clone())
+            ..Job::new(size, quality_level.method.clone(), options.target.clone())
         };
         let renderer = Renderer::new(device, options.gpu.device.clone(), job).await?;
         Ok(OnGpu(renderer))
@@ -146,12 +146,10 @@ impl OnGpu {
         let colour = match input.camera {
             None => Colour::Planar,
             Some(camera) => {
-                let (height, width) = camera.colour.shape();
                 frame.colour = ColourData::Camera(camera.colour);
                 Colour::Camera {
                     format: camera.colour.format(),
-                    height,
-                    width,
+                    size: camera.colour.size(),
                     orientation: camera.orientation,
                 }
             }
@@ -160,9 +158,9 @@ impl OnGpu {
             None => Depth::F32,
             Some(stream) => {
                 let readings = stream.readings();
-                let (height, width) = readings.shape();
+                let size = readings.size();
                 frame.depth = DepthData::Readings(readings);
-                Depth::Readings { height, width }
+                Depth::Readings(size)
             }
         };
         (colour, depth, frame)

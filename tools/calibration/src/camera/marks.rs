@@ -8,6 +8,7 @@ use crate::camera::homography::Homography;
 use crate::camera::pattern::{CELLS, Pattern, decode};
 use crate::camera::photograph::Photograph;
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront_io::Result;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -122,7 +123,7 @@ impl Registration {
 
     /// Resamples `photograph` to the modulator's pixels, (H, W). Each value is the mean over a pixel, as a fraction of
     /// the sensor's range.
-    pub fn resample(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
+    pub fn resample(&self, photograph: &Photograph, Size { width, height }: Size) -> Array2<f32> {
         let n = self.zoom.ceil().clamp(1.0, 8.0) as usize;
         let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;
         let scale = 1.0 / (f32::from(photograph.full) * (n * n) as f32);
@@ -144,7 +145,7 @@ impl Registration {
 
     /// Returns the light of `photograph` at the middle of each pixel of the modulator, (H, W), as a fraction of the
     /// sensor's range.
-    pub fn centres(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
+    pub fn centres(&self, photograph: &Photograph, Size { width, height }: Size) -> Array2<f32> {
         let scale = 1.0 / f32::from(photograph.full);
         Array2::from_shape_fn((height, width), |(y, x)| {
             let [u, v] = self.map.map([x as f64 + 0.5, y as f64 + 0.5]);
@@ -154,7 +155,7 @@ impl Registration {
 
     /// Returns the median of the light around the modulator, as a fraction of the sensor's range. This is the ambient
     /// light.
-    pub fn surroundings(&self, photograph: &Photograph, (height, width): (usize, usize)) -> f32 {
+    pub fn surroundings(&self, photograph: &Photograph, Size { width, height }: Size) -> f32 {
         let (h, w) = (height as f64, width as f64);
         let out = 0.03 * h.min(w);
         let mut values = Vec::new();
@@ -183,16 +184,16 @@ struct Spot {
 
 /// Returns the centres of the four marks' dark squares with subpixel accuracy.
 fn find_marks(photograph: &Photograph, pattern: &Pattern) -> std::result::Result<[[f64; 2]; 4], NoMarks> {
-    let widest = photograph.width as f64 / pattern.shape().1 as f64;
+    let widest = photograph.width as f64 / pattern.size().width as f64;
     let side = widest * pattern.square() as f64;
     let factor = ((side / 14.0) as usize).max(1);
     let (height, width, small) = photograph.shrunk(factor);
     if height < 16 || width < 16 {
         return Err(NoMarks::Count(0));
     }
-    let small = blurred(&small, height, width);
+    let small = blurred(&small, Size { width, height });
     let side = side / factor as f64;
-    let most = local_maxima(&small, height, width, (1.5 * side).ceil() as usize);
+    let most = local_maxima(&small, Size { width, height }, (1.5 * side).ceil() as usize);
     let mut sorted = small.clone();
     sorted.sort_by(f32::total_cmp);
     let (floor, top) = (sorted[sorted.len() / 200], sorted[sorted.len() * 199 / 200]);
@@ -200,7 +201,7 @@ fn find_marks(photograph: &Photograph, pattern: &Pattern) -> std::result::Result
     let is_dark: Vec<bool> = (small.iter().zip(&most))
         .map(|(v, most)| *most < lit || v - floor < DARKER * (most - floor))
         .collect();
-    let spots: Vec<_> = spots(&is_dark, height, width)
+    let spots: Vec<_> = spots(&is_dark, Size { width, height })
         .into_iter()
         .filter(|spot| {
             let (w, h) = ((spot.x[1] + 1 - spot.x[0]) as f64, (spot.y[1] + 1 - spot.y[0]) as f64);
@@ -304,7 +305,8 @@ fn centre(photograph: &Photograph, spot: &Spot, factor: usize) -> [f64; 2] {
 }
 
 /// Returns the mean over 3×3 pixels, with the border pixels repeated outside.
-fn blurred(plane: &[f32], height: usize, width: usize) -> Vec<f32> {
+fn blurred(plane: &[f32], size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
     let mut out = vec![0.0; plane.len()];
     for y in 0..height {
         for x in 0..width {
@@ -321,7 +323,8 @@ fn blurred(plane: &[f32], height: usize, width: usize) -> Vec<f32> {
 }
 
 /// Returns the largest value within `radius` along both axes.
-fn local_maxima(plane: &[f32], height: usize, width: usize, radius: usize) -> Vec<f32> {
+fn local_maxima(plane: &[f32], size: Size, radius: usize) -> Vec<f32> {
+    let Size { width, height } = size;
     let along = |from: &[f32], length: usize, step: usize, start: usize, to: &mut [f32]| {
         for i in 0..length {
             let near = i.saturating_sub(radius)..(i + radius + 1).min(length);
@@ -336,7 +339,8 @@ fn local_maxima(plane: &[f32], height: usize, width: usize, radius: usize) -> Ve
 }
 
 /// Returns the connected regions of `is_dark`, with four neighbours per pixel.
-fn spots(is_dark: &[bool], height: usize, width: usize) -> Vec<Spot> {
+fn spots(is_dark: &[bool], size: Size) -> Vec<Spot> {
+    let Size { width, height } = size;
     let mut seen = vec![false; is_dark.len()];
     let mut spots = Vec::new();
     let mut open = Vec::new();
@@ -406,7 +410,7 @@ mod tests {
         .enumerate()
         .map(|(seed, (size, zoom))| {
             let display = Display::from_toml(size).unwrap();
-            let pattern = Pattern::new(display.height(), display.width()).unwrap();
+            let pattern = Pattern::new(display.size()).unwrap();
             (SimulatedDisplay::new(&display, zoom, seed as u64).unwrap(), pattern)
         })
         .collect()
@@ -417,7 +421,7 @@ mod tests {
     #[ignore = "slow: 12 seconds of a core"]
     fn marks_are_found_to_a_part_of_a_pixel_and_codes_are_read() {
         for (display, pattern) in displays() {
-            let (h, w) = pattern.shape();
+            let Size { width: w, height: h } = pattern.size();
             let (w, h) = (w as f64, h as f64);
             let panel = [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]];
             let truth = Homography::through(panel, display.camera().corners).unwrap();

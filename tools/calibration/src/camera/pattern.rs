@@ -9,6 +9,7 @@
 //! ranges from 0.8·2π to 1.5·2π. Other ranges need another dark level.
 
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront_io::{Error, Result};
 
 /// The number of patterns, one per level.
@@ -31,11 +32,12 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Creates the patterns for a modulator of (`height`, `width`) pixels.
+    /// Creates the patterns for a modulator of `size`.
     ///
     /// # Errors
     /// Returns an error if the modulator is too small for marks.
-    pub fn new(height: usize, width: usize) -> Result<Self> {
+    pub fn new(size: Size) -> Result<Self> {
+        let Size { width, height } = size;
         let mark = (height.min(width) / 10 / 8 * 8).clamp(16, 128);
         if width < 9 * mark || height < 4 * mark {
             return Err(Error::Input(format!(
@@ -56,8 +58,11 @@ impl Pattern {
     }
 
     /// Returns the height and width, (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    pub fn size(&self) -> Size {
+        Size {
+            width: self.width,
+            height: self.height,
+        }
     }
 
     /// Returns the side of a mark's dark square, in pixels.
@@ -166,7 +171,7 @@ mod tests {
     #[test]
     fn codes_stand_where_they_are_looked_for() {
         for (h, w) in [(64, 144), (96, 161), (1080, 1920)] {
-            let pattern = Pattern::new(h, w).unwrap();
+            let pattern = Pattern::new(Size { width: w, height: h }).unwrap();
             let (cells, between) = pattern.code();
             for k in [0, 1, 77, 255] {
                 let is_dark = |[x, y]: [f64; 2]| {
@@ -184,13 +189,19 @@ mod tests {
 
     #[test]
     fn cells_hold_two_pixels_at_nought() {
-        let pattern = Pattern::new(96, 144).unwrap();
+        let pattern = Pattern::new(Size { width: 144, height: 96 }).unwrap();
         for (y, x) in [(0, 0), (50, 70), (95, 143)] {
             assert!(pattern.measures(y, x));
             let expected = if (x + y) % 2 == 0 { 200 } else { 0 };
             assert_eq!(pattern.level(200, y, x), expected);
         }
         assert!(!pattern.measures(16, 16) && !pattern.measures(10, 60));
-        assert!(Pattern::new(100, 100).is_err());
+        assert!(
+            Pattern::new(Size {
+                width: 100,
+                height: 100
+            })
+            .is_err()
+        );
     }
 }

@@ -12,6 +12,7 @@ use crate::camera::photograph::{Photograph, SATURATED_SHARE};
 use crate::curves::curve::{self, Basis, COEFFICIENTS, LEVELS};
 use crate::curves::surface;
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
@@ -147,17 +148,17 @@ pub fn read_capture(folder: &Path, colour: usize, k: usize) -> std::result::Resu
 /// The light of each pixel in each pattern, stored on disk.
 struct Stack {
     file: File,
-    shape: (usize, usize),
+    size: Size,
     folder: PathBuf,
 }
 
 impl Stack {
-    fn new(folder: &Path, shape: (usize, usize)) -> Result<Self> {
+    fn new(folder: &Path, size: Size) -> Result<Self> {
         let file = tempfile::tempfile_in(folder)
             .map_err(|e| Error::file(folder, format!("cannot hold a temporary file: {e}")))?;
         Ok(Stack {
             file,
-            shape,
+            size,
             folder: folder.to_owned(),
         })
     }
@@ -175,7 +176,7 @@ impl Stack {
 
     /// Returns the light in all patterns for each pixel of `rows` rows, starting at row `y`.
     fn rows(&mut self, y: usize, rows: usize) -> Result<Vec<[f32; LEVELS]>> {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         let mut bytes = vec![0; 2 * rows * width];
         let mut light = vec![[0.0; LEVELS]; rows * width];
         for k in 0..PATTERNS {
@@ -224,10 +225,10 @@ pub fn measure(
     spool: &Path,
     progress: &dyn Fn(usize, usize),
 ) -> std::result::Result<Curves, Refusal> {
-    let (height, width) = pattern.shape();
+    let height = pattern.size().height;
     let work = PATTERNS + height;
     let mut problems = Vec::new();
-    let mut stack = Stack::new(spool, (height, width))?;
+    let mut stack = Stack::new(spool, pattern.size())?;
     let (mut checks, mut dark) = (Checks::default(), None);
     for k in 0..PATTERNS {
         let mut add = |what| {
@@ -242,9 +243,9 @@ pub fn measure(
             Ok(photograph) => match checks.check(&photograph, pattern, k) {
                 Err(what) => add(what),
                 Ok(registration) => {
-                    dark.get_or_insert_with(|| registration.surroundings(&photograph, (height, width)));
+                    dark.get_or_insert_with(|| registration.surroundings(&photograph, pattern.size()));
                     if problems.is_empty() {
-                        stack.push(&registration.resample(&photograph, (height, width)))?;
+                        stack.push(&registration.resample(&photograph, pattern.size()))?;
                     }
                 }
             },
@@ -319,7 +320,7 @@ fn fitted(
     dark: f32,
     progress: &dyn Fn(usize),
 ) -> Result<Curves> {
-    let (height, width) = pattern.shape();
+    let Size { width, height } = pattern.size();
     let basis = Basis::new();
     let none = [f32::NAN; COEFFICIENTS];
     let mut coefficients = Array2::from_elem((height, width), none);
@@ -401,9 +402,9 @@ fn fitted(
 }
 
 impl Curves {
-    /// Returns the height and width, (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.coefficients.dim()
+    /// Returns the size of the modulator.
+    pub fn size(&self) -> Size {
+        Size::from_shape(self.coefficients.dim())
     }
 
     /// Returns the curve of pixel (`x`, `y`), or `None` if it has none.
@@ -423,8 +424,9 @@ impl Curves {
     }
 }
 
-/// Returns the spacing of the table's nodes, in pixels, for a (`height`, `width`) modulator.
-pub fn spacing(height: usize, width: usize) -> usize {
+/// Returns the spacing of the table's nodes, in pixels, for a modulator of `size`.
+pub fn spacing(size: Size) -> usize {
+    let Size { width, height } = size;
     height.max(width).div_ceil(NODES)
 }
 
@@ -437,11 +439,11 @@ pub fn spacing(height: usize, width: usize) -> usize {
 /// # Panics
 /// Panics if `curves` is empty.
 pub fn compact(curves: &[Curves]) -> Result<PerPixel> {
-    let (height, width) = curves[0].shape();
-    if curves.iter().any(|c| c.shape() != (height, width)) {
+    let size = curves[0].size();
+    if curves.iter().any(|c| c.size() != size) {
         return Err(Error::Input("curves of modulators of different sizes".into()));
     }
-    let spacing = spacing(height, width);
+    let spacing = spacing(size);
     let basis = Basis::new();
     let (mut levels, mut turns) = (Vec::new(), Vec::new());
     for curves in curves {
@@ -459,7 +461,7 @@ pub fn compact(curves: &[Curves]) -> Result<PerPixel> {
             turns.push(turn);
         }
     }
-    Ok(PerPixel::new(height, width, spacing, INTERVALS, &levels, &turns)?)
+    Ok(PerPixel::new(size, spacing, INTERVALS, &levels, &turns)?)
 }
 
 /// Returns the levels at the knots' phases by a node's curve, and the phase above which 0 is nearer than the curve's
@@ -488,7 +490,7 @@ pub struct Errors {
 /// Computes the phase errors of the tables for the colour at `index` of the table, where its measured curves reach the
 /// phase. It tests every fourth of 256 phase steps.
 pub fn errors(curves: &Curves, index: usize, table: &PerPixel) -> Errors {
-    let (height, width) = curves.shape();
+    let Size { width, height } = curves.size();
     let basis = Basis::new();
     let plane = index * height * width;
     let apart = |a: f32, b: f32| {
@@ -564,7 +566,7 @@ pub fn errors(curves: &Curves, index: usize, table: &PerPixel) -> Errors {
 /// # Errors
 /// Returns an error if writing fails.
 pub fn write_full(curves: &Curves, index: usize, table: &PerPixel, file: &mut dyn Write) -> std::io::Result<()> {
-    let (height, width) = curves.shape();
+    let Size { width, height } = curves.size();
     let mut header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({height}, {width}, {LEVELS}), }}");
     // Magic, version and length take 10 bytes. The total length is a multiple of 64 and ends with a line break.
     let padding = (10 + header.len() + 1).next_multiple_of(64) - (10 + header.len() + 1);

@@ -4,6 +4,7 @@ use crate::curves::chart::{self, Curve, Map, Panel};
 use crate::curves::curve::{self, Basis, LEVELS};
 use crate::curves::lut::{self, Curves, Errors};
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_io::Result;
 use serde::Serialize;
@@ -67,7 +68,7 @@ pub fn report(curves: &[Curves], table: &PerPixel) -> LutReport {
             errors_rad: lut::errors(curves, index, table),
         }
     });
-    let (height, width) = table.shape();
+    let Size { width, height } = table.size();
     LutReport {
         colours: colours.collect(),
         table_bytes: table.to_bytes().len(),
@@ -156,7 +157,7 @@ pub fn draw(curves: &[Curves], folder: &Path) -> Result<()> {
         };
         fits.push(panel(format!("{name}: Eq. 12–13 (dots) and fits"), "phase, rad", lines));
         residuals.push(panel(format!("{name}: Eq. 12–13 less the fit"), "phase, rad", left));
-        let range = Array2::from_shape_fn(curves.shape(), |at| {
+        let range = Array2::from_shape_fn(curves.size().shape(), |at| {
             curves.coefficients[at].last().copied().unwrap_or(f32::NAN) / TAU
         });
         maps.push(Map {

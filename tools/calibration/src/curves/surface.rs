@@ -5,6 +5,7 @@
 //! slope around them.
 
 use ndarray::{Array2, Array3, ArrayView2};
+use phasefront::Size;
 use phasefront_core::display::response::per_pixel;
 use rayon::prelude::*;
 
@@ -18,7 +19,7 @@ const SOLVED: f64 = 1e-7;
 /// nodes every `spacing` pixels, or `None` if no pixel has values.
 pub fn fit<const N: usize>(seen: ArrayView2<'_, [f32; N]>, spacing: usize) -> Option<Array2<[f32; N]>> {
     let (height, width) = seen.dim();
-    let shape = per_pixel::nodes(height, width, spacing);
+    let shape = per_pixel::nodes(Size { width, height }, spacing);
     let system = System::of(seen, shape, spacing);
     if system.pixels == 0.0 {
         return None;

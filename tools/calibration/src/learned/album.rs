@@ -6,6 +6,7 @@ use crate::camera::marks::Registration;
 use crate::camera::pattern::Pattern;
 use crate::camera::photograph::Photograph;
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront::Target;
 use phasefront_core::display::model::ColourModel;
 
@@ -23,7 +24,7 @@ pub struct Album<'a> {
     target: &'a Target,
     colour: usize,
     marks: Registration,
-    size: (usize, usize),
+    size: Size,
     path: Option<(f64, Path)>,
     /// The phases of the hologram before.
     before: Option<Array2<f32>>,
@@ -36,13 +37,15 @@ impl<'a> Album<'a> {
     /// Returns the reason why it cannot be used.
     pub fn new(target: &'a Target, colour: usize, marks: &Photograph) -> std::result::Result<Self, String> {
         unsaturated(marks)?;
-        let (height, width) = target.modulator();
-        let pattern = Pattern::new(height, width).map_err(|e| e.to_string())?;
+        let pattern = Pattern::new(target.modulator()).map_err(|e| e.to_string())?;
         Ok(Album {
             target,
             colour,
             marks: Registration::find(marks, &pattern).map_err(|e| e.to_string())?,
-            size: (marks.height, marks.width),
+            size: Size {
+                width: marks.width,
+                height: marks.height,
+            },
             path: None,
             before: None,
         })
@@ -58,10 +61,14 @@ impl<'a> Album<'a> {
     /// # Errors
     /// Returns the reason why it cannot be used.
     pub fn check(&mut self, scene: &Scene, photograph: &Photograph) -> std::result::Result<(), String> {
-        if (photograph.height, photograph.width) != self.size {
+        let size = Size {
+            width: photograph.width,
+            height: photograph.height,
+        };
+        if size != self.size {
             return Err(format!(
-                "is {}×{}, the photograph of the marks is {}×{}; both must be of one size",
-                photograph.width, photograph.height, self.size.1, self.size.0
+                "is {size}, the photograph of the marks is {}; both must be of one size",
+                self.size
             ));
         }
         unsaturated(photograph)?;

@@ -9,6 +9,7 @@ use super::scenes::Scene;
 use crate::camera::marks::Registration;
 use crate::camera::photograph::Photograph;
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront::Target;
 use phasefront_core::display::model::{CURVE, ColourModel};
 use phasefront_io::dice::Dice;
@@ -53,7 +54,7 @@ pub struct Fitted {
 }
 
 /// Returns the number of rows and columns of nodes for a modulator of (H, W) pixels.
-pub fn nodes((height, width): (usize, usize)) -> (usize, usize) {
+pub fn nodes(Size { width, height }: Size) -> (usize, usize) {
     let nodes = |pixels: usize| (pixels / SPACING + 1).clamp(2, MOST_NODES);
     (nodes(height), nodes(width))
 }
@@ -143,10 +144,10 @@ impl<'a> Fit<'a> {
                 paths.push((z_m, Path::new(target, colour, z_m)?));
             }
         }
-        let shape = target.modulator();
-        let light = |sample: &Sample| sample.registration.centres(&sample.photograph, shape);
+        let size = target.modulator();
+        let light = |sample: &Sample| sample.registration.centres(&sample.photograph, size);
         Ok(Fit {
-            nodes: nodes(shape),
+            nodes: nodes(size),
             paths,
             samples,
             registrations: samples.iter().map(|sample| sample.registration).collect(),
@@ -172,7 +173,7 @@ impl<'a> Fit<'a> {
             let old = self.registrations[index];
             let map = register::refined(&old.map, light, &expected.light, BORDER)?;
             let new = Registration { map, ..old };
-            let light = new.centres(&self.samples[index].photograph, light.dim());
+            let light = new.centres(&self.samples[index].photograph, Size::from_shape(light.dim()));
             Ok((new, light))
         };
         let all: Result<Vec<_>> = (0..self.samples.len()).into_par_iter().map(one).collect();

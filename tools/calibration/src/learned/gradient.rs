@@ -3,6 +3,7 @@
 
 use ndarray::Array2;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::Target;
 use phasefront::target::Aberration;
 use phasefront_core::display::model::{CURVE, ColourModel, PUPIL, around, pupil_node};
@@ -17,8 +18,8 @@ pub(super) const BORDER: usize = 8;
 
 /// The path of one colour from the modulator to one z.
 pub(super) struct Path {
-    shape: (usize, usize),
-    padded: (usize, usize),
+    size: Size,
+    padded: Size,
     fft: Fft2,
     /// The factors of free space and the aperture, (W', H').
     factors: Vec<Complex32>,
@@ -47,15 +48,14 @@ struct Fields {
 
 impl Path {
     pub(super) fn new(target: &Target, colour: usize, z_m: f64) -> Result<Self> {
-        let shape @ (height, width) = target.modulator();
+        let size @ Size { width, height } = target.modulator();
         let display = &target.display;
         let distance_m = z_m - display.offset_m();
         let reversed = target.correction.as_ref().map(Aberration::reversed);
-        let ways = match target.propagators(shape, 1, distance_m, reversed.as_ref())? {
+        let ways = match target.propagators(size, 1, distance_m, reversed.as_ref())? {
             Some(ways) => ways,
             None => Propagator::for_colours(
-                height,
-                width,
+                Size { width, height },
                 display.pitch_m(),
                 display.wavelengths_m(),
                 distance_m,
@@ -63,15 +63,15 @@ impl Path {
             )?,
         };
         let free = &ways[colour];
-        let padded = free.padded_shape();
+        let padded = free.padded_size();
         let laser = |i: usize| {
             let light = target.illumination.as_ref();
-            light.map_or(1.0, |light| 1.0 / light.gain(colour, i / width, i % width, shape))
+            light.map_or(1.0, |light| 1.0 / light.gain(colour, i / width, i % width, size))
         };
         Ok(Path {
-            shape,
+            size,
             padded,
-            fft: Fft2::new(height, width, padded.0, padded.1),
+            fft: Fft2::new(Size { width, height }, padded),
             factors: way(free, display.aperture_radius(), |_, _| Complex32::ONE),
             laser: (0..height * width).map(laser).collect(),
         })
@@ -89,8 +89,8 @@ impl Path {
         let exposure = Exposure::of(&focus, light);
         Expected {
             misfit: exposure.misfit,
-            light: Array2::from_shape_fn(self.shape, |(y, x)| {
-                exposure.gain * focus[y * self.shape.1 + x].norm_sqr() + exposure.stray
+            light: Array2::from_shape_fn(self.size.shape(), |(y, x)| {
+                exposure.gain * focus[y * self.size.width + x].norm_sqr() + exposure.stray
             }),
         }
     }
@@ -132,7 +132,7 @@ impl Path {
     }
 
     fn fields(&self, model: &ColourModel, nodes: (usize, usize), phases: &[f32]) -> Fields {
-        let width = self.shape.1;
+        let width = self.size.width;
         let responses: Vec<f32> = phases.iter().map(|phase| model.response(*phase).0).collect();
         let mut psi = vec![0.0; phases.len()];
         for (y, row) in psi.chunks_exact_mut(width).enumerate() {
@@ -171,14 +171,14 @@ impl Path {
         let mut scratch = self.fft.scratch();
         self.fft.columns_inverse(columns, |_, _| {}, &mut scratch.work);
         self.fft.rows_inverse(columns, &mut scratch.rows, &mut scratch.work);
-        let mut plane = vec![Complex32::ZERO; self.shape.0 * self.shape.1];
+        let mut plane = vec![Complex32::ZERO; self.size.height * self.size.width];
         self.fft.crop(&scratch.rows, &mut plane);
         plane
     }
 
     /// Calls `then` with the index and the frequency, in cycles per pixel, of each value of a spectrum.
     fn by_frequency(&self, mut then: impl FnMut(usize, f64, f64)) {
-        let (height, width) = self.padded;
+        let Size { width, height } = self.padded;
         for kx in 0..width {
             for ky in 0..height {
                 then(kx * height + ky, frequency(kx, width), frequency(ky, height));
@@ -188,7 +188,7 @@ impl Path {
 
     /// Calls `then` with the index of each pixel and its four nodes with their weights.
     fn by_pixel(&self, nodes: (usize, usize), mut then: impl FnMut(usize, [(usize, f32); 4])) {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         for y in 0..height {
             let (i, fy) = around(y, height, nodes.0);
             for x in 0..width {
@@ -221,7 +221,7 @@ impl Path {
         phases: &[f32],
         slopes: &mut ColourModel,
     ) {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         let near = |at: usize, d: usize, n: usize| (at + d).saturating_sub(1).min(n - 1);
         let mut by_crosstalk = [0.0f64; 9];
         for (at, slope) in by_psi.iter().enumerate() {

@@ -4,6 +4,7 @@
 use crate::camera::pattern::Pattern;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Brightness, EncoderOptions, Encoding, Target};
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::dice::Dice;
@@ -34,7 +35,7 @@ pub fn z_m(target: &Target, index: usize, count: usize) -> f64 {
 
 /// Returns a random field at the middle of the volume, (H, W), with amplitudes from 0 to 1: soft clouds, sharp
 /// rectangles, and a smooth phase.
-pub fn field((height, width): (usize, usize), seed: u64) -> Array2<Complex32> {
+pub fn field(Size { width, height }: Size, seed: u64) -> Array2<Complex32> {
     let mut dice = Dice::new(seed ^ 0x5343_454e_4553);
     let clouds = |dice: &mut Dice, finest: f64, rough: f64| {
         let waves: Vec<[f64; 4]> = (0..24)
@@ -114,8 +115,8 @@ fn encoded(target: &Target, colour: usize, field: &Array2<Complex32>, turn: f32,
         brightness: Brightness::Fixed(1.0),
         ..Encoding::ANTI_ALIAS.into()
     };
-    let shape @ (height, width) = field.dim();
-    let plan = DisplayPlan::from_z(shape, 0.0, &target, &options)?;
+    let size @ Size { width, height } = Size::from_shape(field.dim());
+    let plan = DisplayPlan::from_z(size, 0.0, &target, &options)?;
     let (colours, area) = (target.display.colours(), height * width);
     let mut stack: Vec<_> = (0..colours).flat_map(|_| field.iter().copied()).collect();
     let mut phases = vec![0.0; colours * area];
@@ -128,15 +129,15 @@ fn encoded(target: &Target, colour: usize, field: &Array2<Complex32>, turn: f32,
     let phases: Vec<f32> = phases
         .map(|phase| (phase + PI + turn).rem_euclid(TAU).min(TAU.next_down()))
         .collect();
-    let response = target.response.clone().centred(height, width)?;
+    let response = target.response.clone().centred(Size { width, height })?;
     let levels = phases
         .iter()
         .enumerate()
         .map(|(i, phase)| response.level(*phase, first + i));
     let plane = |e| Error::Input(format!("a scene: {e}"));
     Ok(Scene {
-        levels: Array2::from_shape_vec(shape, levels.collect()).map_err(plane)?,
-        phases: Array2::from_shape_vec(shape, phases).map_err(plane)?,
+        levels: Array2::from_shape_vec(size.shape(), levels.collect()).map_err(plane)?,
+        phases: Array2::from_shape_vec(size.shape(), phases).map_err(plane)?,
         z_m,
     })
 }

@@ -6,6 +6,7 @@ use crate::camera::marks::Registration;
 use crate::camera::photograph::{Photograph, SATURATED_SHARE};
 use crate::cholesky;
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 
@@ -16,16 +17,12 @@ const HALF: usize = 2;
 /// The maximum number of Gaussians of a mixture.
 pub const MOST_GAUSSIANS: usize = 4;
 
-/// Computes the amplitude at the nodes of a map, (Gh, Gw), for a (`height`, `width`) modulator, from a photograph of
+/// Computes the amplitude at the nodes of a map, (Gh, Gw), for a modulator of `size`, from a photograph of
 /// the diffuser that `registration` locates. The brightest node is 1.
 ///
 /// # Errors
 /// Returns an error if the photograph is saturated or dark.
-pub fn map(
-    photograph: &Photograph,
-    registration: &Registration,
-    (height, width): (usize, usize),
-) -> Result<Array2<f32>> {
+pub fn map(photograph: &Photograph, registration: &Registration, Size { width, height }: Size) -> Result<Array2<f32>> {
     let share = photograph.saturated();
     if share > SATURATED_SHARE {
         return Err(Error::Input(format!(
@@ -34,8 +31,8 @@ pub fn map(
         )));
     }
     let clean = median(photograph);
-    let dark = registration.surroundings(&clean, (height, width));
-    let light = registration.resample(&clean, (height, width));
+    let dark = registration.surroundings(&clean, Size { width, height });
+    let light = registration.resample(&clean, Size { width, height });
     let nodes = |n: usize| (NODES * n / height.max(width)).max(2);
     let (rows, columns) = (nodes(height), nodes(width));
     let step = |n: usize, nodes: usize| ((n - 1) as f64 / (nodes - 1) as f64).max(1.0);
@@ -254,13 +251,25 @@ mod tests {
     #[test]
     fn the_beam_comes_back_from_dust_and_noise() {
         let display = Display::from_toml("width = 176\nheight = 120").unwrap();
-        let pattern = Pattern::new(120, 176).unwrap();
+        let pattern = Pattern::new(Size {
+            width: 176,
+            height: 120,
+        })
+        .unwrap();
         let simulated = SimulatedDisplay::new(&display, 2.5, 3).unwrap();
         for colour in 0..3 {
             let marked = simulated.photograph(pattern.frame(0).view(), colour, 0.0, 0).unwrap();
             let registration = marks::register(&marked, &pattern).unwrap();
             let photograph = simulated.photograph_diffuser(colour, 1).unwrap();
-            let measured = map(&photograph, &registration, (120, 176)).unwrap();
+            let measured = map(
+                &photograph,
+                &registration,
+                Size {
+                    width: 176,
+                    height: 120,
+                },
+            )
+            .unwrap();
             let (fitted, _, left) = mixture(&measured, 1).unwrap();
             assert!(left < 0.01, "{left}");
             let (rows, columns) = measured.dim();

@@ -9,6 +9,7 @@
 use crate::cholesky;
 use ndarray::Array2;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront_core::optics::fft::{Fft2, Scratch};
 use phasefront_core::optics::zernike::{self, Coefficients};
 use rayon::prelude::*;
@@ -67,7 +68,16 @@ impl Pupil {
             })
             .collect();
         let mut pupil = Pupil {
-            fft: Fft2::new(PUPIL, PUPIL, PLANE, PLANE),
+            fft: Fft2::new(
+                Size {
+                    width: PUPIL,
+                    height: PUPIL,
+                },
+                Size {
+                    width: PLANE,
+                    height: PLANE,
+                },
+            ),
             inside,
             sharpest: 1.0,
         };

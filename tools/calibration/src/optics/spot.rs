@@ -11,6 +11,7 @@ use crate::camera::photograph::{Photograph, SATURATED_SHARE};
 use crate::optics::pupil::{Pupil, Spot};
 use ndarray::Array2;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, Target};
 use phasefront_core::encode::double_phase;
 use phasefront_core::optics::sub_hologram;
@@ -123,19 +124,28 @@ pub const MIDDLE: [f64; 2] = [0.5, 0.5];
 /// Returns an error if z is at the modulator, or so far from it that the sub-hologram does not fit.
 pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coefficients) -> Result<Array2<u8>> {
     let display = &target.display;
-    let (height, width) = (display.height(), display.width());
+    let Size { width, height } = display.size();
     let (pitch_m, wavelength_m) = (display.pitch_m(), display.wavelengths_m()[colour]);
     let distance_m = z_m - display.offset_m();
     let radius_m = sub_hologram::sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
     let radius = (radius_m / pitch_m).ceil().min(65536.0) as usize;
     let side = 2 * radius + 1;
-    let part = sub_hologram::sub_hologram(side, side, pitch_m, wavelength_m, distance_m, a)?;
+    let part = sub_hologram::sub_hologram(
+        Size {
+            width: side,
+            height: side,
+        },
+        pitch_m,
+        wavelength_m,
+        distance_m,
+        a,
+    )?;
     let corner = |at: f64, n: usize| ((at * n as f64) as usize).checked_sub(radius);
     let (Some(left), Some(top)) = (corner(place[0], width), corner(place[1], height)) else {
-        return Err(outside(place, side, (width, height)));
+        return Err(outside(place, side, display.size()));
     };
     if left + side > width || top + side > height {
-        return Err(outside(place, side, (width, height)));
+        return Err(outside(place, side, display.size()));
     }
     let first = colour * height * width;
     let mut levels = Array2::zeros((height, width));
@@ -152,9 +162,9 @@ pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coe
     Ok(levels)
 }
 
-fn outside([x, y]: [f64; 2], side: usize, (width, height): (usize, usize)) -> Error {
+fn outside([x, y]: [f64; 2], side: usize, size: Size) -> Error {
     Error::Input(format!(
-        "a sub-hologram of {side} pixels does not fit around ({x}, {y}) of a frame of {width}×{height}; a larger frame, a z nearer to the modulator or a place nearer to the middle is needed"
+        "a sub-hologram of {side} pixels does not fit around ({x}, {y}) of a frame of {size}; a larger frame, a z nearer to the modulator or a place nearer to the middle is needed"
     ))
 }
 

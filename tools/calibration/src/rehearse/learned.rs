@@ -8,6 +8,7 @@ use crate::learned::scenes;
 use crate::simulated_display::SimulatedDisplay;
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Brightness, EncoderOptions, Encoding, Target};
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::display::model::Model;
@@ -42,8 +43,7 @@ pub struct Learned {
 /// # Errors
 /// Returns an error if the marks are not found or the path to a plane cannot be planned.
 pub fn photographs(simulated: &SimulatedDisplay, target: &Target, colour: usize, count: usize) -> Result<Vec<Sample>> {
-    let (height, width) = target.modulator();
-    let pattern = Pattern::new(height, width)?;
+    let pattern = Pattern::new(target.modulator())?;
     let shot = |index: usize| (1 << 23) + index as u64;
     let marks = scenes::marks(target, colour, &pattern, 0.0)?;
     let seen = simulated.photograph(marks.levels.view(), colour, 0.0, shot(0))?;
@@ -106,13 +106,13 @@ fn psnr(
     steps: usize,
     z_m: f64,
 ) -> Result<f64> {
-    let shape @ (height, width) = field.dim();
+    let size @ Size { width, height } = Size::from_shape(field.dim());
     let options = EncoderOptions {
         brightness: Brightness::Fixed(1.0),
         midpoint_steps: steps,
         ..Encoding::ANTI_ALIAS.into()
     };
-    let plan = DisplayPlan::new(shape, target, &options)?;
+    let plan = DisplayPlan::new(size, target, &options)?;
     let colours = target.display.colours();
     let mut stack: Vec<_> = (0..colours).flat_map(|_| field.iter().copied()).collect();
     let mut levels = Array3::zeros((colours, height, width));
@@ -123,7 +123,7 @@ fn psnr(
     let shown = simulated.intensity(levels.index_axis(Axis(0), colour), colour, z_m)?;
     let mut wanted = field.clone();
     let (pitch_m, wavelength_m) = (target.display.pitch_m(), target.display.wavelengths_m()[colour]);
-    let way = Propagator::new(height, width, pitch_m, wavelength_m, z_m, Padding::Reach)?;
+    let way = Propagator::new(Size { width, height }, pitch_m, wavelength_m, z_m, Padding::Reach)?;
     way.propagate(wanted.as_slice_mut().expect("standard layout"), &mut way.scratch());
     let inside = (BORDER..height - BORDER).flat_map(|y| (BORDER..width - BORDER).map(move |x| (y, x)));
     let pairs: Vec<(f64, f64)> = inside

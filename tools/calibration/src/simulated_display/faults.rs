@@ -6,6 +6,7 @@
 //! Express 27, 25046, 2019).
 
 use num_complex::{Complex32, Complex64};
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -73,11 +74,11 @@ impl Faults {
         Complex32::new(value.re as f32, value.im as f32)
     }
 
-    /// Returns the field of (H, W) = `shape` pixels on the grid of their parts, (PARTS·H, PARTS·W). `phase`(y, x) and
+    /// Returns the field of `size` on the grid of their parts, (PARTS·H, PARTS·W). `phase`(y, x) and
     /// `light`(y, x) are those of a pixel.
     pub(super) fn field(
         &self,
-        (height, width): (usize, usize),
+        Size { width, height }: Size,
         phase: impl Fn(usize, usize) -> f64 + Sync,
         light: impl Fn(usize, usize) -> f64 + Sync,
     ) -> Vec<Complex32> {
@@ -136,8 +137,8 @@ mod tests {
         let faults = Faults::new(1);
         let (height, width) = (4, 8);
         let field = |phase: &(dyn Fn(usize, usize) -> f64 + Sync)| {
-            let field = faults.field((height, width), phase, |_, _| 1.0);
-            let ghost = faults.field((height, width), |_, _| 0.0, |_, _| 0.0);
+            let field = faults.field(Size { width, height }, phase, |_, _| 1.0);
+            let ghost = faults.field(Size { width, height }, |_, _| 0.0, |_, _| 0.0);
             assert!(ghost.iter().all(|value| value.norm() == 0.0));
             field
         };

@@ -2,6 +2,7 @@
 //! measured in the same run.
 
 use super::{full_light, median, named};
+use phasefront::Size;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
 use phasefront::session::FrameTimes;
 use phasefront::{EncoderOptions, Method, Target};
@@ -20,7 +21,7 @@ pub struct GpuCase<'a> {
     /// The method that makes the hologram.
     pub method: &'a Method,
     /// The width and height in pixels.
-    pub size: (usize, usize),
+    pub size: Size,
     /// The encoding of the field into levels, at one brightness.
     pub encoder: &'a EncoderOptions,
     /// The options for computing a network.
@@ -73,31 +74,30 @@ pub struct GpuRow {
 /// # Errors
 /// Returns an error if the case cannot be planned on the device, or if the device's results differ from the CPU's.
 pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget: Duration) -> Result<GpuRow> {
-    let (width, height) = case.size;
+    let size = case.size;
     let (name, network) = named(case.method);
-    let mut job = Job::new((height, width), case.method.clone(), &target.display);
+    let mut job = Job::new(size, case.method.clone(), &target.display);
     job.encoder = full_light(case.encoder);
     job.chain = case.chain;
     probe(device, &job)?;
     let format = ColourFormat::Nv12(YuvEncoding::default());
     job.colour = Colour::Camera {
         format,
-        height,
-        width,
+        size,
         orientation: Orientation::default(),
     };
     job.depth = Depth::U16;
     let mut pipeline = GpuPipeline::new(device, &job)?;
-    let mut by_table = (target.response.shape())
+    let mut by_table = (target.response.size())
         .map(|_| {
             job.target = target.clone();
             GpuPipeline::new(device, &job)
         })
         .transpose()?;
-    let images = Images::new(width, height);
+    let images = Images::new(size);
     let planes = images.planes();
     let frame = Frame {
-        colour: ColourData::Camera(ColourImage::new(format, width, height, &planes)?),
+        colour: ColourData::Camera(ColourImage::new(format, size, &planes)?),
         depth: DepthData::U16(&images.depth),
     };
     let Alone {
@@ -119,15 +119,15 @@ pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget
     let alone = network.filter(|_| name == "network");
     let mac_per_s = method_s
         .zip(alone)
-        .map(|(s, network)| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
+        .map(|(s, network)| network.chain().macs_per_pixel() as f64 * size.pixels() as f64 / s);
     Ok(GpuRow {
         method: name,
         layers: network.map_or(0, |network| network.layers()),
         precision: pipeline.numbers().to_owned(),
         backend: "gpu",
         kernels: pipeline.describe(),
-        width,
-        height,
+        width: size.width,
+        height: size.height,
         stage_ms,
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],
@@ -164,7 +164,7 @@ impl Alone {
         budget: Duration,
     ) -> Result<Self> {
         let mut alone = Alone::default();
-        let (height, width) = pipeline.shape();
+        let Size { width, height } = pipeline.size();
         let mut levels = vec![0; 3 * height * width];
         pipeline.process(frame, &mut levels)?;
         let start = Instant::now();
@@ -232,7 +232,8 @@ struct Images {
 }
 
 impl Images {
-    fn new(width: usize, height: usize) -> Self {
+    fn new(size: Size) -> Self {
+        let Size { width, height } = size;
         let bytes = |n: usize| (0..n).map(|i| (i * 7 % 256) as u8).collect();
         Images {
             width,

@@ -161,13 +161,14 @@ fn onnx(layers: usize) -> Vec<u8> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use phasefront::Size;
 
     #[test]
     fn any_number_of_layers_is_a_chain_that_the_kernels_run() {
         for layers in [2, 5, 8, 30] {
             let network = network(layers).unwrap();
             assert_eq!((network.layers(), network.filters()), (layers, FILTERS));
-            let plan = network.plan(9, 14).unwrap();
+            let plan = network.plan(Size { width: 14, height: 9 }).unwrap();
             assert!(plan.engine().isa.is_some(), "{:?}", plan.engine());
             let input: Vec<f32> = (0..4 * 9 * 14).map(|i| (i % 7) as f32 / 6.0 - 0.5).collect();
             let mut output = vec![0.0; 6 * 9 * 14];

@@ -3,6 +3,7 @@
 use crate::flags::backend::BackendFlags;
 use crate::flags::encoder::{Encoder, EncoderFlags};
 use clap::{Args, ValueEnum};
+use phasefront::Size;
 use phasefront::{Method, Network, Sweep, Target};
 use phasefront_cli::bench::gpu::{GpuCase, GpuRow};
 use phasefront_cli::bench::{self, Case, Machine, Row};
@@ -36,7 +37,7 @@ pub(crate) struct Bench {
     network: Option<String>,
     /// Width and height [default: 384x384, 960x540 and 1920x1080]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<(usize, usize)>,
+    size: Option<Size>,
     /// Seconds for each combination, with at least five frames
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
@@ -60,6 +61,22 @@ pub(crate) struct Bench {
 
 /// The number of layers of the deepest network that GPUs are measured with.
 const DEEPEST: usize = 30;
+
+/// The sizes of frames that are timed where none is given.
+const SIZES: [Size; 3] = [
+    Size {
+        width: 384,
+        height: 384,
+    },
+    Size {
+        width: 960,
+        height: 540,
+    },
+    Size {
+        width: 1920,
+        height: 1080,
+    },
+];
 
 /// The number of layers that a GPU dispatch computes.
 #[derive(Clone, Copy, ValueEnum)]
@@ -97,9 +114,7 @@ impl Bench {
         let encoder = self.encoder.read()?;
         let device = self.backend.device()?;
         let methods = self.methods(&target, device.is_some())?;
-        let sizes = self
-            .size
-            .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| vec![size]);
+        let sizes = self.size.map_or_else(|| SIZES.to_vec(), |size| vec![size]);
         match device {
             Some(options) => self.on_gpu(&methods, &sizes, (&target, &encoder), &options, budget, json),
             None => self.on_cpu(&methods, &sizes, (&target, &encoder), threads, budget, json),
@@ -139,7 +154,7 @@ impl Bench {
     fn on_cpu(
         &self,
         methods: &[Method],
-        sizes: &[(usize, usize)],
+        sizes: &[Size],
         (target, encoder): (&Target, &Encoder),
         threads: Option<usize>,
         budget: Duration,
@@ -196,7 +211,7 @@ impl Bench {
     fn on_gpu(
         &self,
         methods: &[Method],
-        sizes: &[(usize, usize)],
+        sizes: &[Size],
         (target, encoder): (&Target, &Encoder),
         options: &DeviceOptions,
         budget: Duration,

@@ -55,7 +55,7 @@ fn packing(device: &ModulatorSpec) -> &'static str {
 
 fn row(name: &str, device: &ModulatorSpec) -> String {
     let display = &device.display;
-    let size = format!("{}x{}", display.width(), display.height());
+    let size = format!("{}x{}", display.size().width, display.size().height);
     let unconfirmed = match device.unconfirmed.len() {
         0 => String::new(),
         count => format!("; {count} figures unconfirmed"),
@@ -78,7 +78,7 @@ fn calibrated(file: &DisplayFile) -> Vec<&'static str> {
     let target = &file.target;
     let keys = [
         ("lut", file.lut.is_some()),
-        ("per_pixel", target.response.shape().is_some()),
+        ("per_pixel", target.response.size().is_some()),
         ("laser", target.illumination.is_some()),
         ("aberration", file.aberration.is_some()),
         ("model", target.model.is_some()),
@@ -135,7 +135,7 @@ fn object(name: &str, device: &ModulatorSpec) -> serde_json::Value {
     let display = &device.display;
     json!({
         "name": Path::new(name).file_stem().and_then(|stem| stem.to_str()), "title": device.name,
-        "width": display.width(), "height": display.height(), "pitch_um": display.pitch_m() * 1e6,
+        "width": display.size().width, "height": display.size().height, "pitch_um": display.pitch_m() * 1e6,
         "bits": display.bits(), "packing": packing(device), "flip_x": device.flip_x, "flip_y": device.flip_y,
         "levels_turns": device.levels_turns, "rate_hz": device.rate_hz,
         "sources": device.sources, "unconfirmed": device.unconfirmed,

@@ -2,6 +2,7 @@
 
 use crate::flags::encoder::EncoderFlags;
 use clap::Args;
+use phasefront::Size;
 use phasefront::{Display, Method};
 use phasefront_cli::doctor::{self, Check, Machine};
 use phasefront_cli::gpu;
@@ -56,7 +57,7 @@ impl Doctor {
 
 impl Chosen {
     fn of(display: &Display) -> Result<Self> {
-        let (height, width) = (display.height(), display.width());
+        let Size { width, height } = display.size();
         let network = default_network(display);
         let method = match &network {
             Some(network) => format!(
@@ -71,7 +72,7 @@ impl Chosen {
         };
         let kernels = match network {
             Some(network) => {
-                let plan = phasefront_core::method::MethodPlan::new(height, width, Method::Network(network), display)?;
+                let plan = phasefront_core::method::MethodPlan::new(display.size(), Method::Network(network), display)?;
                 plan.engine().map(|engine| format!("{}: {}", engine.name, engine.why))
             }
             None => None,

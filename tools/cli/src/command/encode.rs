@@ -6,6 +6,7 @@ use crate::make::field::{self, Stage};
 use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Brightness, EncoderOptions};
 use phasefront_command::flags::DisplayFlags;
 use phasefront_core::pipeline;
@@ -58,7 +59,7 @@ impl Encode {
         let target = display.corrected()?;
         let (_, height, width) = field.dim();
         let values = field.as_slice().expect("standard layout");
-        pipeline::field::check(values, (height, width), &target).map_err(|e| Error::file(&self.field, e))?;
+        pipeline::field::check(values, Size { width, height }, &target).map_err(|e| Error::file(&self.field, e))?;
         let stage = Stage {
             name: "field",
             time: start.elapsed(),
@@ -72,7 +73,7 @@ impl Encode {
             brightness: self.scale.map_or(Brightness::FrameMax, Brightness::Fixed),
             ..encoder.options.clone()
         };
-        let plan = DisplayPlan::from_z((height, width), z_m, &target, &options)?;
+        let plan = DisplayPlan::from_z(Size { width, height }, z_m, &target, &options)?;
         if let Some(path) = &self.phases {
             hologram::write_phases(path, phases(&plan, field.clone(), is_at_modulator).view())?;
         }

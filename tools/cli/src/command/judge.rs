@@ -8,6 +8,7 @@ use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::EncoderOptions;
+use phasefront::Size;
 use phasefront_cli::viewer::{self, Depth, Scene};
 use phasefront_command::flags::{DisplayFlags, EncoderName};
 use phasefront_command::networks;
@@ -93,7 +94,7 @@ impl Judge {
             Some(ldi) => (truth::visible_frame(ldi, display)?, None),
             None => self.frame.read(display, self.display.is_given())?,
         };
-        let (height, width) = frame.shape();
+        let Size { width, height } = frame.size();
         if 2 * self.margin >= height.min(width) {
             return Err(Error::Input(format!(
                 "--margin {} leaves nothing of {width}×{height} pixels",
@@ -322,7 +323,7 @@ fn write_page(
     };
     let depth = Depth::known(&frame.depth().to_owned(), |d| (f64::from(d) * last).round() as u8);
     let scene = |title: String, hologram: &Hologram, figures: Vec<(String, String)>| -> Result<Scene> {
-        let (height, width) = hologram.shape();
+        let Size { width, height } = hologram.size();
         let views = hologram.views_on(file, &z_m)?;
         let views: Vec<_> = (views.iter()).map(|view| viewer::picture(view.view())).collect();
         Ok(Scene {

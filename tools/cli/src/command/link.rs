@@ -1,6 +1,7 @@
 //! `phasefront link`: checks whether pixels reach the modulator unchanged.
 
 use clap::{Args, Subcommand};
+use phasefront::Size;
 use phasefront_cli::modulator::link;
 use phasefront_command::flags::parse_size;
 use phasefront_command::terminal;
@@ -21,7 +22,7 @@ pub(crate) enum Link {
 pub(crate) struct Pattern {
     /// Size of the screen
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1920x1080")]
-    size: (usize, usize),
+    size: Size,
     /// Output pattern
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
@@ -36,7 +37,7 @@ pub(crate) struct Read {
     capture: PathBuf,
     /// Size of the pattern that was shown
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1920x1080")]
-    size: (usize, usize),
+    size: Size,
 }
 
 impl Link {
@@ -48,12 +49,12 @@ impl Link {
     }
 }
 
-fn checked((width, height): (usize, usize)) -> Result<(usize, usize)> {
-    if width >= 512 && height >= 24 {
-        Ok((height, width))
+fn checked(size: Size) -> Result<Size> {
+    if size.width >= 512 && size.height >= 24 {
+        Ok(size)
     } else {
         Err(Error::Input(format!(
-            "a pattern of {width}×{height}; its 256 steps and six bands need at least 512×24"
+            "a pattern of {size}; its 256 steps and six bands need at least 512×24"
         )))
     }
 }
@@ -61,12 +62,12 @@ fn checked((width, height): (usize, usize)) -> Result<(usize, usize)> {
 impl Pattern {
     fn run(self, json: bool) -> Result<()> {
         output::file(&self.output, &["png"])?;
-        let (height, width) = checked(self.size)?;
-        link::pattern((height, width)).write(&self.output)?;
-        let text = format!("{}: {width}×{height}", terminal::name(&self.output));
+        let size = checked(self.size)?;
+        link::pattern(size).write(&self.output)?;
+        let text = format!("{}: {size}", terminal::name(&self.output));
         terminal::print(
             json,
-            &json!({ "output": self.output, "width": width, "height": height }),
+            &json!({ "output": self.output, "width": size.width, "height": size.height }),
             text,
         );
         Ok(())
@@ -76,8 +77,7 @@ impl Pattern {
 impl Read {
     fn run(self, json: bool) -> Result<()> {
         let capture = packed::Image::read(&self.capture)?;
-        let (height, width) = capture.shape;
-        checked((width, height)).map_err(|e| Error::file(&self.capture, e))?;
+        checked(capture.size).map_err(|e| Error::file(&self.capture, e))?;
         let reading = link::read(&capture, checked(self.size)?);
         let text = if reading.faults.is_empty() {
             "every pixel arrives as it is".into()

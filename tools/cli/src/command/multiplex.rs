@@ -7,6 +7,7 @@ use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Pipeline;
+use phasefront::Size;
 use phasefront::output::Packing;
 use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, sweep_for};
@@ -87,12 +88,12 @@ impl MultiplexCommand {
             sweep: sweep_for(&target.display, None, None),
             encoder: &self.encoder,
         })?;
-        let pipeline = Pipeline::new(frame.shape(), method, &target, &encoder.options)?;
-        let (height, width) = frame.shape();
+        let pipeline = Pipeline::new(frame.size(), method, &target, &encoder.options)?;
+        let Size { width, height } = frame.size();
         let mut wave = Array3::from_elem((pipeline.colours(), height, width), Complex32::ZERO);
         let values = wave.as_slice_mut().expect("standard layout");
         pipeline.field(&frame, values, &mut pipeline.scratch())?;
-        let plan = Multiplex::new(frame.shape(), &target, &encoder.options)?;
+        let plan = Multiplex::new(frame.size(), &target, &encoder.options)?;
         let differ = Differ {
             start: true,
             feedback: !self.no_feedback,
@@ -175,7 +176,7 @@ impl MultiplexCommand {
             None => (0..count).collect(),
             Some(name) => vec![packed::colour(name, count)?],
         };
-        let plan = packed::bit_planes(display, (height, width), cells)?;
+        let plan = packed::bit_planes(display, Size { width, height }, cells)?;
         let planes: Vec<&[u8]> = (colours.iter())
             .flat_map(|colour| {
                 maps.iter().map(move |map| {

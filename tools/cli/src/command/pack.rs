@@ -1,6 +1,7 @@
 //! `phasefront pack` and `phasefront unpack`: convert holograms to frames for a modulator's input, and back.
 
 use clap::Args;
+use phasefront::Size;
 use phasefront::output::Packing;
 use phasefront_command::flags::{DisplayFlags, parse_size};
 use phasefront_command::terminal;
@@ -47,7 +48,7 @@ impl Pack {
         };
         let written = packed::write(&self.output, &images)?;
         let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
-        let (height, width) = images[0].shape;
+        let Size { width, height } = images[0].size;
         let text: Vec<_> = written.iter().map(|path| terminal::name(path)).collect();
         let text = format!("{}: {width}×{height}", text.join(", "));
         terminal::print(
@@ -75,13 +76,10 @@ impl Pack {
             };
             maps.push(levels.index_axis(ndarray::Axis(0), colour).to_owned());
         }
-        let plan = packed::bit_planes(display, maps[0].dim(), cells)?;
+        let plan = packed::bit_planes(display, Size::from_shape(maps[0].dim()), cells)?;
         if let Some((path, map)) = (self.holograms.iter().zip(&maps)).find(|(_, map)| map.dim() != maps[0].dim()) {
-            let (height, width) = map.dim();
-            return Err(Error::file(
-                path,
-                format!("is {width}×{height}; the first has another size"),
-            ));
+            let size = Size::from_shape(map.dim());
+            return Err(Error::file(path, format!("is {size}; the first has another size")));
         }
         let maps: Vec<&[u8]> = maps
             .iter()
@@ -101,7 +99,7 @@ pub(crate) struct Unpack {
     display: DisplayFlags,
     /// Size of the hologram in the modulator's middle [default: the modulator's size]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<(usize, usize)>,
+    size: Option<Size>,
     /// Output hologram: a PNG of modulator levels
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
@@ -112,9 +110,9 @@ impl Unpack {
         output::file(&self.output, &["png"])?;
         let display = self.display.read()?;
         let modulator = &display.target.display;
-        let (width, height) = self.size.unwrap_or((modulator.width(), modulator.height()));
+        let size = self.size.unwrap_or(modulator.size());
         let images = self.frames.iter().map(|path| packed::Image::read(path));
-        let levels = packed::unpack(&images.collect::<Result<Vec<_>>>()?, &display, (height, width))?;
+        let levels = packed::unpack(&images.collect::<Result<Vec<_>>>()?, &display, size)?;
         let info = HologramInfo {
             display: modulator.clone(),
             encoder: None,
@@ -128,10 +126,10 @@ impl Unpack {
             _ => Levels::Words(levels),
         };
         hologram::write_hologram(&self.output, &Hologram::Levels(levels, info))?;
-        let text = format!("{}: {width}×{height}", terminal::name(&self.output));
+        let text = format!("{}: {size}", terminal::name(&self.output));
         terminal::print(
             json,
-            &json!({ "output": self.output, "width": width, "height": height }),
+            &json!({ "output": self.output, "width": size.width, "height": size.height }),
             text,
         );
         Ok(())

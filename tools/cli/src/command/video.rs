@@ -10,7 +10,9 @@ use crate::flags::frame::{SeenDepthFlags, warn_of_size};
 use crate::flags::method::{CoreMethod, Parts};
 use crate::given::Flag;
 use crate::record::{Before, RunRecord};
+use clap::{Args, ValueEnum};
 use clap::{Args, ValueEnum, ValueHint};
+use phasefront::Size;
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, SessionHandle, Statistics};
 use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
@@ -48,10 +50,10 @@ pub(crate) struct Video {
     seen: SeenDepthFlags,
     /// Size of the colour of raw frames on stdin, rows of RGB bytes
     #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Input")]
-    raw: Option<(usize, usize)>,
+    raw: Option<Size>,
     /// Size of the depth of raw frames on stdin, rows of 16-bit little-endian numbers [default: the colour's]
     #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "raw", help_heading = "Input")]
-    raw_depth: Option<(usize, usize)>,
+    raw_depth: Option<Size>,
     #[command(flatten)]
     depth: DepthFlags,
     /// Method for the holograms [default: auto; network with --network or --encoder deep]
@@ -67,7 +69,7 @@ pub(crate) struct Video {
     encoder: EncoderFlags,
     /// Size of the holograms [default: the size of the first frame's colour]
     #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Display")]
-    size: Option<(usize, usize)>,
+    size: Option<Size>,
     #[command(flatten)]
     display: DisplayFlags,
     #[command(flatten)]
@@ -140,10 +142,10 @@ impl Video {
         }
         check_rate(self.rate)?;
         let before = Before::of_flags(self.resume, self.overwrite);
-        let (mut source, (height, width)) = Source::open(&mut self)?;
+        let (mut source, size) = Source::open(&mut self)?;
         let rate = self.rate.or(source.rate_hz()).unwrap_or(30.0);
         check_rate(Some(rate))?;
-        let (options, info) = self.options(height, width, threads, rate)?;
+        let (options, info) = self.options(size, threads, rate)?;
         let preview_mm = self.preview_mm();
         if let Some(mm) = preview_mm {
             hologram::check_z(&info.display, mm / 1e3)?;
@@ -194,35 +196,34 @@ impl Video {
 
     fn options(
         &self,
-        height: usize,
-        width: usize,
+        colour: Size,
         threads: Option<NonZeroUsize>,
         rate: f64,
     ) -> Result<(SessionOptions, HologramInfo)> {
         let file = self.display.read()?;
         let modulator = &file.target.display;
         if self.size.is_none() {
-            let size = format!("--size {}x{}", modulator.width(), modulator.height());
-            warn_of_size((height, width), modulator, self.display.is_given(), &size);
+            let Size { width, height } = modulator.size();
+            let flag = format!("--size {width}x{height}");
+            warn_of_size(colour, modulator, self.display.is_given(), &flag);
         }
-        let (width, height) = self.size.unwrap_or((width, height));
+        let size = self.size.unwrap_or(colour);
         if let Some(light) = &file.target.illumination
-            && (height, width) != (modulator.height(), modulator.width())
+            && size != modulator.size()
         {
             let (rows, columns) = light.nodes();
             return Err(Error::Input(format!(
-                "the display's laser map ({columns}×{rows} nodes) is for {}×{} pixels, the frames are {width}×{height}; give --size or leave the map out",
-                modulator.width(),
-                modulator.height()
+                "the display's laser map ({columns}×{rows} nodes) is for {} pixels, the frames are {size}; give --size or leave the map out",
+                modulator.size()
             )));
         }
         let target = file.corrected()?;
         let target = Target {
-            display: target.display.with_size(height, width)?,
-            response: target.response.centred(height, width)?,
+            display: target.display.with_size(size)?,
+            response: target.response.centred(size)?,
             panel: Panel {
                 flatness: (target.panel.flatness.as_ref())
-                    .map(|map| map.centred(height, width))
+                    .map(|map| map.centred(size))
                     .transpose()?,
                 ..target.panel
             },
@@ -248,7 +249,7 @@ impl Video {
             None => DepthRange::Percentiles,
             Some((near_m, far_m)) => DepthRange::Fixed { near_m, far_m },
         };
-        options.depth_network = self.seen.open((height, width))?.map(Arc::new);
+        options.depth_network = self.seen.open(size)?.map(Arc::new);
         if let Some(device) = self.backend.device()? {
             options.backend = Backend::Gpu;
             options.gpu.device = device;
@@ -260,8 +261,10 @@ impl Video {
             options.target_rate_hz = Some(rate);
             for part in [2, 4] {
                 let mut quality_level = options.quality_levels[0].clone();
-                quality_level.height = (height / part).max(1);
-                quality_level.width = (width / part).max(1);
+                quality_level.size = Size {
+                    width: (size.width / part).max(1),
+                    height: (size.height / part).max(1),
+                };
                 options.quality_levels.push(quality_level);
             }
         }

@@ -7,6 +7,7 @@ use image::RgbImage;
 use indicatif::ProgressBar;
 use ndarray::Array2;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_cli::viewer::{self, Depth, Phase, Scene};
 use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{self, progress_bar};
@@ -67,7 +68,7 @@ struct Parts {
     phase: Option<Phase>,
     depth: Option<Array2<f32>>,
     z_m: Vec<f64>,
-    shape: (usize, usize),
+    size: Size,
     figures: Vec<(String, String)>,
 }
 
@@ -181,7 +182,13 @@ impl View {
         let (levels, field) = infos(&file, &made);
         let z_m = self.z_m(&file.target.display, STILL_VIEWS);
         let bar = progress_bar(2 * z_m.len() as u64, "views");
-        let mut figures = figures(&levels, (made.levels.dim().1, made.levels.dim().2));
+        let mut figures = figures(
+            &levels,
+            Size {
+                width: made.levels.dim().2,
+                height: made.levels.dim().1,
+            },
+        );
         figures.retain(|(name, _)| name != "Encoder");
         figures.insert(
             0,
@@ -200,7 +207,7 @@ impl View {
                 Image::Rgbd(frame) => frame.depth().to_owned(),
                 Image::Layers(ldi) => ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d }),
             }),
-            shape: shown.shape(),
+            size: shown.size(),
             shown: vec![views(&shown, &file, &z_m, &bar)?],
             field: views(&wave, &file, &z_m, &bar)?,
             z_m,
@@ -234,8 +241,8 @@ impl View {
             phase,
             depth: None,
             z_m,
-            shape: hologram.shape(),
-            figures: figures(hologram.info(), hologram.shape()),
+            size: hologram.size(),
+            figures: figures(hologram.info(), hologram.size()),
         })
     }
 
@@ -269,13 +276,13 @@ impl View {
         let shown = (chosen.iter())
             .map(|path| {
                 let hologram = hologram::read_hologram(path)?;
-                if hologram.shape() != first.shape() {
+                if hologram.size() != first.size() {
                     return Err(Error::file(*path, "is of another size than the first frame"));
                 }
                 views(&hologram, &file, &z_m, &bar).map_err(|e| Error::file(*path, e))
             })
             .collect::<Result<Vec<_>>>()?;
-        let mut figures = figures(info, first.shape());
+        let mut figures = figures(info, first.size());
         figures.push(("Frames".into(), format!("{count} of {}", all.len())));
         Ok(Parts {
             title: self.title(dir),
@@ -284,7 +291,7 @@ impl View {
             phase: Some(Phase::new(levels.upper(info.display.bits()).view())?),
             depth: None,
             z_m,
-            shape: first.shape(),
+            size: first.size(),
             figures,
         })
     }
@@ -302,8 +309,8 @@ impl Parts {
         let frames = self.shown.len();
         Ok(Scene {
             title: self.title,
-            width: self.shape.1,
-            height: self.shape.0,
+            width: self.size.width,
+            height: self.size.height,
             z_mm: self.z_m.iter().map(|z| z * 1e3).collect(),
             frames,
             shown: viewer::pack(&self.shown.concat(), budget / stacks)?,
@@ -326,7 +333,7 @@ fn views(hologram: &Hologram, file: &DisplayFile, z_m: &[f64], bar: &ProgressBar
     Ok(all)
 }
 
-fn figures(info: &HologramInfo, (height, width): (usize, usize)) -> Vec<(String, String)> {
+fn figures(info: &HologramInfo, Size { width, height }: Size) -> Vec<(String, String)> {
     let display = &info.display;
     let nm = display.wavelengths_m().iter().map(|m| format!("{:.0}", m * 1e9));
     let nm = nm.collect::<Vec<_>>().join(", ");

@@ -4,6 +4,7 @@
 use crate::flags::depth::DepthFlags;
 use clap::{Args, ValueEnum, ValueHint};
 use ndarray::{Array2, Array3};
+use phasefront::Size;
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront::{Display, RgbdFrame};
 use phasefront_core::stage;
@@ -72,8 +73,8 @@ impl SeenDepthFlags {
         self.invert
     }
 
-    /// Opens the network that the flags name, if there is one, and plans it for pictures of (H, W) = `shape`.
-    pub(crate) fn open(&self, shape: (usize, usize)) -> Result<Option<DepthNetwork>> {
+    /// Opens the network that the flags name, if there is one, and plans it for pictures of `size`.
+    pub(crate) fn open(&self, size: Size) -> Result<Option<DepthNetwork>> {
         let Some(path) = self.network() else {
             return Ok(None);
         };
@@ -89,7 +90,7 @@ impl SeenDepthFlags {
             let mut network = DepthNetwork::open(path)?;
             network.colours = self.depth_network_colours.scale();
             network.gives_distance = self.invert;
-            network.estimator(shape).map(|_| network)
+            network.estimator(size).map(|_| network)
         });
         let network = opened.map_err(|why| Error::file(path, why))?;
         network.map(Some).map_err(|why| Error::file(path, why))
@@ -172,15 +173,15 @@ fn of_two_folders(colour: &Path, depth: &Path) -> Result<Vec<Picture>> {
     Ok(pairs.chain(alone).collect())
 }
 
-/// Warns if a hologram of (H, W) pixels does not have the size of its modulator, and suggests `flag`. If no display was
+/// Warns if a hologram of `size` does not have the size of its modulator, and suggests `flag`. If no display was
 /// `named`, the default display stands in, and any smaller hologram may lie in its middle.
-pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, named: bool, flag: &str) {
-    let (rows, columns) = (display.height(), display.width());
-    let larger = height > rows || width > columns;
-    if larger || named && (height, width) != (rows, columns) {
+pub(crate) fn warn_of_size(size: Size, display: &Display, named: bool, flag: &str) {
+    let modulator = display.size();
+    let larger = size.height > modulator.height || size.width > modulator.width;
+    if larger || named && size != modulator {
         let whose = if named { "modulator" } else { "default modulator" };
         log::warn!(
-            "the hologram is {width}×{height} as the image is, the {whose} {columns}×{rows}: {flag} makes the whole modulator's"
+            "the hologram is {size} as the image is, the {whose} {modulator}: {flag} makes the whole modulator's"
         );
     }
 }
@@ -267,14 +268,14 @@ impl FrameFlags {
                 "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
             )),
         }?;
-        warn_of_size(frame.shape(), display, named, "--fit contain, cover or centre");
+        warn_of_size(frame.size(), display, named, "--fit contain, cover or centre");
         Ok((frame.for_display(display), shown))
     }
 
-    fn placement(&self, picture: (usize, usize), display: &Display) -> Placement {
+    fn placement(&self, picture: Size, display: &Display) -> Placement {
         let default = self.photo.is_some().then_some(Fit::Contain);
         match self.fit.map(FitName::fit).or(default) {
-            Some(fit) => Placement::new(picture, (display.height(), display.width()), fit),
+            Some(fit) => Placement::new(picture, display.size(), fit),
             None => Placement::as_is(picture),
         }
     }
@@ -286,7 +287,7 @@ impl FrameFlags {
         }
         let (_, height, width) = rgb.dim();
         let _stage = stage!("depth");
-        frame::conditioned(rgb, &depth, &self.placement((height, width), display))
+        frame::conditioned(rgb, &depth, &self.placement(Size { width, height }, display))
     }
 
     /// Makes the frame of a photo: from its distances if --near or --far is given, else from d_n unchanged.
@@ -308,20 +309,20 @@ impl FrameFlags {
 
     fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
         let (_, height, width) = rgb.dim();
-        let (Some(path), Some(network)) = (self.seen.network(), self.seen.open((height, width))?) else {
+        let (Some(path), Some(network)) = (self.seen.network(), self.seen.open(Size { width, height })?) else {
             return Err(Error::Input(
                 "--rgb needs --depth, or --depth-network that estimates it".into(),
             ));
         };
         let colours = rgb.as_standard_layout();
         let nearer = quiet::caught(|| {
-            let estimator = network.estimator((height, width))?;
+            let estimator = network.estimator(Size { width, height })?;
             estimator.estimate(colours.as_slice().expect("standard layout"))
         });
         let nearer = nearer
             .map_err(|why| Error::file(path, why))?
             .map_err(|why| Error::file(path, why))?;
         let depth = frame::relative(nearer.mapv(|v| -v).view(), None, None).map_err(|e| Error::file(path, e))?;
-        frame::conditioned(rgb, &depth, &self.placement((height, width), display))
+        frame::conditioned(rgb, &depth, &self.placement(Size { width, height }, display))
     }
 }

@@ -4,6 +4,7 @@ use super::{HologramRequest, HologramResult, described, name, stack};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Pipeline, RgbdFrame};
 use phasefront_io::Result;
 use phasefront_io::display::DisplayFile;
@@ -17,10 +18,10 @@ impl HologramRequest {
         display: &DisplayFile,
         encoder: Encoder,
     ) -> Result<HologramResult> {
-        let (height, width) = frame.shape();
+        let Size { width, height } = frame.size();
         let target = display.corrected()?;
         let options = self.encoder_options(&encoder.options);
-        let pipeline = Pipeline::new((height, width), method, &target, &options)?;
+        let pipeline = Pipeline::new(frame.size(), method, &target, &options)?;
         let mut scratch = pipeline.scratch();
         let mut field = Array3::from_elem((pipeline.colours(), height, width), Complex32::ZERO);
         let shape = field.dim();
@@ -28,7 +29,7 @@ impl HologramRequest {
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
         // The encoder filters the field in place, so keep a copy if it is requested.
         let kept = self.keeps_field.then(|| values.to_vec());
-        let mut levels = Levels::zeros(&target.display, (height, width));
+        let mut levels = Levels::zeros(&target.display, frame.size());
         let modulation = pipeline.modulate(None, values, levels.view_mut(), &mut scratch);
         let stage = name(scratch.is_swept());
         let engine = pipeline.method().engine().filter(|_| !scratch.is_swept());

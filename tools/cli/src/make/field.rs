@@ -5,6 +5,7 @@ use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::hologram::Levels;
 use std::time::{Duration, Instant};
@@ -38,7 +39,7 @@ impl Encoding<'_> {
         }
         let propagate = start.elapsed();
         let kept = self.keeps_field.then(|| values.to_vec());
-        let mut levels = Levels::zeros(self.display, (height, width));
+        let mut levels = Levels::zeros(self.display, Size { width, height });
         let modulation = self.plan.modulate(None, values, levels.view_mut(), &mut scratch);
         HologramResult {
             method: stage.name,

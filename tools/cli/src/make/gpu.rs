@@ -4,6 +4,7 @@ use super::{HologramRequest, HologramResult, name};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use phasefront::RgbdFrame;
+use phasefront::Size;
 use phasefront_cli::gpu;
 use phasefront_gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
 use phasefront_io::display::DisplayFile;
@@ -26,8 +27,8 @@ impl HologramRequest {
                 "--backend gpu makes levels of up to 8 bits; those of over 8 are the CPU's".into(),
             ));
         }
-        let (height, width) = frame.shape();
-        let mut job = Job::new((height, width), method, display.corrected()?);
+        let Size { width, height } = frame.size();
+        let mut job = Job::new(frame.size(), method, display.corrected()?);
         job.encoder = self.encoder_options(&encoder.options);
         let device = Arc::new(Device::open(options)?);
         probe(&device, &job)?;

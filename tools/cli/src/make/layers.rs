@@ -5,6 +5,7 @@ use super::{HologramRequest, HologramResult, Method, described};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, Network};
 use phasefront_command::flags::PrecisionName;
 use phasefront_command::networks;
@@ -39,7 +40,6 @@ impl HologramRequest {
         file: &DisplayFile,
         encoder: Encoder,
     ) -> Result<HologramResult> {
-        let (height, width) = ldi.shape();
         // A correction that is the same for all depths is part of the offset. Only SM-LBM handles others.
         let (target, varying) = match (method, file.corrected()) {
             (_, Ok(target)) => (target, None),
@@ -48,7 +48,7 @@ impl HologramRequest {
         };
         let display = &target.display;
         let options = self.encoder_options(&encoder.options);
-        let modulator = DisplayPlan::new((height, width), &target, &options)?;
+        let modulator = DisplayPlan::new(ldi.size(), &target, &options)?;
         let start = Instant::now();
         let wave = self.wave(method, ldi, display, varying)?;
         let made = Stage {
@@ -70,7 +70,7 @@ impl HologramRequest {
 
     /// Computes the field of `ldi` with `method`, corrected for an aberration that varies over depth or over the frame.
     fn wave(&self, method: Method, ldi: &Ldi, display: &Display, varying: Option<&AberrationFile>) -> Result<Wave> {
-        let (height, width) = ldi.shape();
+        let Size { width, height } = ldi.size();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let bar = progress_bar(0, "");
         let progress = |done: usize, total: usize| {
@@ -80,7 +80,7 @@ impl HologramRequest {
         let mut engine = None;
         let (stage, field) = match method {
             Method::Core(_) => {
-                let plan = self.network_for_layers(display)?.plan_for(height, width, display)?;
+                let plan = self.network_for_layers(display)?.plan_for(ldi.size(), display)?;
                 let mut field = Array3::zeros((display.colours(), height, width));
                 let values = field.as_slice_mut().expect("standard layout");
                 plan.field(ldi, values, &mut plan.scratch())?;
@@ -98,7 +98,7 @@ impl HologramRequest {
                 let field = match varying {
                     None => sm_lbm::hologram(ldi, display, planes, &progress)?,
                     Some(AberrationFile::Uniform(all)) => {
-                        let correction = Correction::of_aberrations(all, (height, width), planes, display)?;
+                        let correction = Correction::of_aberrations(all, ldi.size(), planes, display)?;
                         corrected::hologram(ldi, display, planes, &correction, &progress)?
                     }
                     Some(AberrationFile::Spatial(all)) => spatial::hologram(ldi, display, planes, all, &progress)?,

@@ -4,6 +4,7 @@
 //! The pattern has six bands of equal height. From top to bottom, they are ramps of grey, red, green and blue with 256
 //! steps from left to right, then one-pixel columns of black and white, then one-pixel columns of red and green.
 
+use phasefront::Size;
 use phasefront_io::hologram::packed::{Image, Kind};
 use serde::Serialize;
 
@@ -45,21 +46,21 @@ pub enum Range {
 }
 
 /// Makes the pattern of (H, W) pixels.
-pub fn pattern((height, width): (usize, usize)) -> Image {
+pub fn pattern(Size { width, height }: Size) -> Image {
     let mut bytes = Vec::with_capacity(3 * height * width);
     for y in 0..height {
         for x in 0..width {
-            bytes.extend(pixel((y, x), (height, width)));
+            bytes.extend(pixel((y, x), Size { width, height }));
         }
     }
     Image {
-        shape: (height, width),
+        size: Size { width, height },
         bytes,
         kind: Kind::Rgb,
     }
 }
 
-fn pixel((y, x): (usize, usize), (height, width): (usize, usize)) -> [u8; 3] {
+fn pixel((y, x): (usize, usize), Size { width, height }: Size) -> [u8; 3] {
     let step = (x * STEPS / width) as u8;
     match y * BANDS / height {
         0 => [step; 3],
@@ -72,15 +73,15 @@ fn pixel((y, x): (usize, usize), (height, width): (usize, usize)) -> [u8; 3] {
     }
 }
 
-/// Reads a capture of the pattern of (H, W) = `sent` pixels. A capture of another size is read and reported as scaled.
-pub fn read(capture: &Image, sent: (usize, usize)) -> Reading {
+/// Reads a capture of the pattern of the size `sent`. A capture of another size is read and reported as scaled.
+pub fn read(capture: &Image, sent: Size) -> Reading {
     let seen = Seen { capture };
     let ramps: [Vec<[f64; 3]>; 4] = std::array::from_fn(|band| seen.ramp(band));
     let grey: Vec<f64> = ramps[0].iter().map(|rgb| rgb.iter().sum::<f64>() / 3.0).collect();
     let (range, grey_error) = range(&grey);
     let colour_error = colour_error(&ramps, range);
     let (fine_grey, fine_colour) = seen.fine(range);
-    let scaled = (capture.shape != sent).then_some([capture.shape.1, capture.shape.0, sent.1, sent.0]);
+    let scaled = (capture.size != sent).then_some([capture.size.width, capture.size.height, sent.width, sent.height]);
     let mut reading = Reading {
         size: scaled,
         range,
@@ -150,7 +151,7 @@ struct Seen<'a> {
 
 impl Seen<'_> {
     fn rgb(&self, y: usize, x: usize) -> [f64; 3] {
-        let at = y * self.capture.shape.1 + x;
+        let at = y * self.capture.size.width + x;
         match self.capture.kind {
             Kind::Rgb => std::array::from_fn(|c| f64::from(self.capture.bytes[3 * at + c])),
             Kind::Grey => [f64::from(self.capture.bytes[at]); 3],
@@ -163,7 +164,7 @@ impl Seen<'_> {
 
     /// Returns the rows in the middle of a band, away from its neighbours.
     fn rows(&self, band: usize) -> std::ops::Range<usize> {
-        let height = self.capture.shape.0;
+        let height = self.capture.size.height;
         let (first, last) = (band * height / BANDS, (band + 1) * height / BANDS);
         let margin = (last - first) / 4;
         first + margin..(last - margin).max(first + margin + 1).min(height)
@@ -171,7 +172,7 @@ impl Seen<'_> {
 
     /// Returns the mean colour of each step of a ramp, from the step's middle column.
     fn ramp(&self, band: usize) -> Vec<[f64; 3]> {
-        let width = self.capture.shape.1;
+        let width = self.capture.size.width;
         (0..STEPS)
             .map(|step| {
                 let x = ((2 * step + 1) * width / (2 * STEPS)).min(width - 1);
@@ -192,7 +193,7 @@ impl Seen<'_> {
         let contrast = |band: usize, value: fn([f64; 3]) -> f64| {
             let (mut sum, mut count) = (0.0, 0.0);
             for y in self.rows(band) {
-                for x in (0..self.capture.shape.1.saturating_sub(1)).step_by(2) {
+                for x in (0..self.capture.size.width.saturating_sub(1)).step_by(2) {
                     sum += value(self.rgb(y, x + 1)) - value(self.rgb(y, x));
                     count += 1.0;
                 }
@@ -263,7 +264,7 @@ fn colour_error(ramps: &[Vec<[f64; 3]>; 4], range: Range) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    const SIZE: (usize, usize) = (96, 640);
+    const SIZE: Size = Size { width: 640, height: 96 };
 
     /// Makes the pattern as it arrives through `link`.
     fn through(link: impl Fn([f64; 3]) -> [f64; 3]) -> Image {
@@ -350,11 +351,14 @@ mod tests {
     fn scaled_pixels_are_found() {
         let whole = pattern(SIZE);
         // A capture of another size.
-        let larger = pattern((SIZE.0, SIZE.1 + 64));
+        let larger = pattern(Size {
+            width: SIZE.width + 64,
+            height: SIZE.height,
+        });
         assert!(faults(&larger).contains("704×96 arrive of 640×96"));
         // Scaled to 90 % and back on the way, as by a screen that is not at its own resolution.
         let mut blurred = whole.clone();
-        let width = SIZE.1;
+        let width = SIZE.width;
         let at = |row: &[u8], x: f64, c: usize| {
             let (left, part) = (x.floor() as usize, x.fract());
             let value = |x: usize| f64::from(row[3 * x.min(width - 1) + c]);

@@ -7,6 +7,7 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{EncoderOptions, Target};
 use phasefront_core::encode::Encoder;
 use phasefront_core::optics::aperture::Opening;
@@ -27,7 +28,7 @@ pub struct Differ {
 
 /// Makes several maps of one wave.
 pub struct Multiplex<'a> {
-    shape: (usize, usize),
+    size: Size,
     target: &'a Target,
     encoder: Encoder,
     /// The propagation from the modulator to the midpoint through the aperture, and back.
@@ -47,20 +48,20 @@ pub struct Map {
 const MOST: f32 = 4.0;
 
 impl<'a> Multiplex<'a> {
-    /// Plans maps of waves of (H, W) = `shape` for `target`.
+    /// Plans maps of waves of `size` for `target`.
     ///
     /// # Errors
     /// Returns an error if the encoder refuses its options or the offset is too large.
-    pub fn new(shape: (usize, usize), target: &'a Target, options: &EncoderOptions) -> Result<Self> {
+    pub fn new(size: Size, target: &'a Target, options: &EncoderOptions) -> Result<Self> {
         let display = &target.display;
         let way = |distance_m: f64| {
             let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
-            Propagator::for_colours(shape.0, shape.1, pitch_m, wavelengths_m, distance_m, Padding::Reach)
+            Propagator::for_colours(size, pitch_m, wavelengths_m, distance_m, Padding::Reach)
         };
         Ok(Multiplex {
-            shape,
+            size,
             target,
-            encoder: Encoder::new(shape, target, options)?,
+            encoder: Encoder::new(size, target, options)?,
             ways: [way(-display.offset_m())?, way(display.offset_m())?],
         })
     }
@@ -103,7 +104,7 @@ impl<'a> Multiplex<'a> {
             let used = self.encoder.encode(&mut field, scale, &mut phases, &mut scratch);
             scale = Some(used);
             let response = &self.target.response;
-            let mut levels = Array3::zeros((there.len(), self.shape.0, self.shape.1));
+            let mut levels = Array3::zeros((there.len(), self.size.height, self.size.width));
             for (at, (level, phase)) in levels.iter_mut().zip(&phases).enumerate() {
                 let phase = if odd { -phase } else { *phase };
                 *level = response.level((phase + turn).rem_euclid(TAU).min(TAU.next_down()), at);
@@ -131,7 +132,10 @@ impl<'a> Multiplex<'a> {
 
     fn pass(&self, way: &[Propagator], field: &mut [Complex32]) {
         let (mut scratch, radius) = (way[0].scratch(), self.target.display.aperture_radius());
-        for (way, plane) in way.iter().zip(field.chunks_exact_mut(self.shape.0 * self.shape.1)) {
+        for (way, plane) in way
+            .iter()
+            .zip(field.chunks_exact_mut(self.size.height * self.size.width))
+        {
             way.propagate_through(plane, radius, &mut scratch);
         }
     }
@@ -142,11 +146,11 @@ impl<'a> Multiplex<'a> {
     /// # Errors
     /// Returns an error if a depth is too far away.
     pub fn judge(&self, wave: &Array3<Complex32>, maps: &[Map], counts: &[usize]) -> Result<Vec<Figures>> {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         let display = &self.target.display;
         let z_m = truth::judged_z_m(display);
         let opening = Opening::centred(display.aperture_radius());
-        let plan = Refocus::new(height, width, display, &z_m, Some(opening))?;
+        let plan = Refocus::new(self.size, display, &z_m, Some(opening))?;
         let stack = |plan: &Refocus, field: &[Complex32]| -> Result<Vec<Array3<f32>>> {
             let views = plan.focal_stack(field, &z_m)?.into_iter();
             Ok(views
@@ -156,7 +160,7 @@ impl<'a> Multiplex<'a> {
                 })
                 .collect())
         };
-        let free = Refocus::new(height, width, display, &z_m, None)?;
+        let free = Refocus::new(self.size, display, &z_m, None)?;
         let truth = stack(&free, wave.as_slice().expect("standard layout"))?;
         let mut sums = vec![Array3::<f32>::zeros(wave.dim()); z_m.len()];
         let mut figures = Vec::new();
@@ -187,7 +191,7 @@ mod tests {
     use phasefront::{Display, Encoding};
 
     /// Makes a wave of smooth light with edges.
-    fn wave((height, width): (usize, usize)) -> Array3<Complex32> {
+    fn wave(Size { width, height }: Size) -> Array3<Complex32> {
         Array3::from_shape_fn((3, height, width), |(c, y, x)| {
             let edge = if (x / 16 + y / 12 + c) % 2 == 0 { 0.8 } else { 0.25 };
             let ripple = 0.1 * (x as f32 * 0.21 + c as f32).sin();
@@ -201,8 +205,8 @@ mod tests {
         let display = Display::from_toml("width = 64\nheight = 48\nbits = 4").unwrap();
         let target = Target::from(display);
         let options = EncoderOptions::from(Encoding::ANTI_ALIAS);
-        let plan = Multiplex::new((height, width), &target, &options).unwrap();
-        let wave = wave((height, width));
+        let plan = Multiplex::new(Size { width, height }, &target, &options).unwrap();
+        let wave = wave(Size { width, height });
         let alone = Differ {
             start: false,
             feedback: false,

@@ -3,6 +3,7 @@
 //! A modulator is a screen to the computer. The link between the two can still change pixels; `phasefront link` detects
 //! this.
 
+use phasefront::Size;
 use phasefront_io::hologram::packed::{Image, Kind};
 use phasefront_io::{Error, Result};
 use softbuffer::{Context, Surface};
@@ -79,16 +80,16 @@ pub fn show(frames: &[Image], showing: &Showing) -> Result<Shown> {
     let first = frames
         .first()
         .ok_or_else(|| Error::Input("there is no frame to show".into()))?;
-    if let Some(other) = frames.iter().find(|frame| frame.shape != first.shape) {
+    if let Some(other) = frames.iter().find(|frame| frame.size != first.size) {
         return Err(Error::Input(format!(
             "frames of {}×{} and {}×{} in one sequence; all must be of one size",
-            first.shape.1, first.shape.0, other.shape.1, other.shape.0
+            first.size.width, first.size.height, other.size.width, other.size.height
         )));
     }
     let frames = frames.iter().map(pixels).collect::<Result<Vec<_>>>()?;
     let mut player = Player {
         frames,
-        shape: first.shape,
+        size: first.size,
         showing: showing.clone(),
         window: None,
         start: Instant::now(),
@@ -160,7 +161,7 @@ const DEFAULT_RATE_HZ: f64 = 60.0;
 struct Player {
     frames: Vec<Vec<u32>>,
     /// (H, W) of a frame.
-    shape: (usize, usize),
+    size: Size,
     showing: Showing,
     window: Option<Open>,
     start: Instant,
@@ -186,7 +187,7 @@ impl Player {
             ))
         })?;
         let screen = screen(number, monitor);
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         if width > screen.width as usize || height > screen.height as usize {
             return Err(Error::Input(format!(
                 "frames of {width}×{height} do not fit screen {number} of {}×{}; they are not scaled",
@@ -239,9 +240,12 @@ impl Player {
         let frame = &self.frames[(due % self.frames.len() as u64) as usize];
         place(
             frame,
-            self.shape,
+            self.size,
             &mut buffer,
-            (size.height as usize, size.width as usize),
+            Size {
+                width: size.width as usize,
+                height: size.height as usize,
+            },
         );
         buffer.present().map_err(refuse)?;
         if open.current != Some(due) {
@@ -260,9 +264,13 @@ impl Player {
     }
 }
 
-/// Draws a `frame` of (`height`, `width`) pixels in the middle of a window, with black around it. Cuts off what does
+/// Draws a `frame` of that size in the middle of a window, with black around it. Cuts off what does
 /// not fit.
-fn place(frame: &[u32], (height, width): (usize, usize), window: &mut [u32], (rows, columns): (usize, usize)) {
+fn place(frame: &[u32], Size { width, height }: Size, window: &mut [u32], window_size: Size) {
+    let Size {
+        width: columns,
+        height: rows,
+    } = window_size;
     window.fill(0);
     let (top, left) = (rows.saturating_sub(height) / 2, columns.saturating_sub(width) / 2);
     let (lines, run) = (height.min(rows), width.min(columns));
@@ -318,17 +326,27 @@ mod tests {
     #[test]
     fn frames_stand_in_the_middle_unscaled() {
         let mut window = vec![9; 5 * 4];
-        place(&[1, 2, 3, 4], (2, 2), &mut window, (4, 5));
+        place(
+            &[1, 2, 3, 4],
+            Size { width: 2, height: 2 },
+            &mut window,
+            Size { width: 5, height: 4 },
+        );
         assert_eq!(window, [0, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 3, 4, 0, 0, 0, 0, 0, 0, 0]);
         let mut small = vec![9; 2];
-        place(&[1, 2, 3, 4], (2, 2), &mut small, (2, 1));
+        place(
+            &[1, 2, 3, 4],
+            Size { width: 2, height: 2 },
+            &mut small,
+            Size { width: 1, height: 2 },
+        );
         assert_eq!(small, [1, 3]);
     }
 
     #[test]
     fn pixels_are_words_and_deep_grey_is_refused() {
         let image = |kind, bytes: &[u8]| Image {
-            shape: (1, 1),
+            size: Size { width: 1, height: 1 },
             bytes: bytes.to_vec(),
             kind,
         };

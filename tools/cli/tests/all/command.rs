@@ -3,6 +3,7 @@ use crate::driver;
 use crate::folder;
 use crate::ldi;
 use crate::skip;
+use phasefront::Size;
 
 use folder::Folder;
 use ndarray::{Array2, Array3, s};
@@ -145,7 +146,7 @@ fn json_is_one_object_on_stdout() {
 #[test]
 fn layered_depth_images_become_holograms_and_stacks() {
     let folder = Folder::new();
-    ldi::write(&folder.path("a"), 5, (61, 47), 3);
+    ldi::write(&folder.path("a"), 5, Size { width: 61, height: 47 }, 3);
     folder.succeeds(&["hologram", "--ldi", "a", "--planes", "20", "-o", "h.png"]);
     folder.succeeds(&["refocus", "h.png", "--stack", "3", "-o", "stack"]);
     assert_eq!(fs::read_dir(folder.path("stack")).unwrap().count(), 3);
@@ -210,15 +211,15 @@ fn an_image_is_fitted_to_the_modulator() {
     let warned = folder.run(&call);
     assert!(String::from_utf8(warned.stderr).unwrap().contains("--fit"));
     assert_eq!(
-        hologram::read_hologram(&folder.path("h.png")).unwrap().shape(),
-        (32, 48)
+        hologram::read_hologram(&folder.path("h.png")).unwrap().size(),
+        Size { width: 48, height: 32 }
     );
     for fit in ["contain", "cover", "centre"] {
         let output = folder.run(&[&call[..], &["--fit", fit]].concat());
         assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
         assert_eq!(
-            hologram::read_hologram(&folder.path("h.png")).unwrap().shape(),
-            (96, 96)
+            hologram::read_hologram(&folder.path("h.png")).unwrap().size(),
+            Size { width: 96, height: 96 }
         );
         folder.succeeds(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"]);
         let view = picture::read_rgb(&folder.path("v.png")).unwrap();
@@ -704,7 +705,7 @@ fn a_flag_that_would_change_nothing_is_refused() {
 #[test]
 fn a_flag_of_other_calls_is_refused() {
     let folder = Folder::new().with_frame();
-    ldi::write(&folder.path("ldi"), 5, (48, 32), 1);
+    ldi::write(&folder.path("ldi"), 5, Size { width: 48, height: 32 }, 1);
     folder.succeeds(&made(&["--method", "sweep", "--planes", "4"]));
     fs::rename(folder.path("h.png"), folder.path("there.png")).unwrap();
     let sweep = "multiplex --rgb rgb.png --depth depth.png --method sweep --network 8 -o maps";
@@ -964,7 +965,7 @@ fn auto_sweeps_clean_depth_and_leaves_noisy_depth_to_a_network() {
 #[test]
 fn a_network_for_layers_takes_a_layered_depth_image() {
     let folder = Folder::new();
-    ldi::write(&folder.path("a"), 5, (61, 47), 2);
+    ldi::write(&folder.path("a"), 5, Size { width: 61, height: 47 }, 2);
     let network = format!("{MODELS}/ldi3-15.onnx");
     let call = ["hologram", "--ldi", "a", "--network", &network, "-o", "h.png"];
     let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&[&call[..], &["--json"]].concat())).unwrap();
@@ -1108,7 +1109,7 @@ fn a_calibrated_display_is_packed_for_an_app() {
     let pack = ["calibrate", "pack", "-o", "app.pfc", "--display"];
     folder.succeeds(&[&pack[..], &["display.toml"]].concat());
     let packed = phasefront::Target::from_bytes(&fs::read(folder.path("app.pfc")).unwrap()).unwrap();
-    assert_eq!((packed.display.width(), packed.display.offset_m()), (64, 2e-3));
+    assert_eq!((packed.display.size().width, packed.display.offset_m()), (64, 2e-3));
     assert_eq!(
         packed.response,
         phasefront::target::Response::lut(lut.try_into().unwrap())

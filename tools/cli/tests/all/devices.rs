@@ -1,6 +1,7 @@
 //! Tests the conversion from an image to the input of each modulator and back, and the one-line error for each wrong
 //! input.
 use crate::folder;
+use phasefront::Size;
 
 use folder::{Folder, SMALL_HOLOGRAM};
 use phasefront::output::{ModulatorSpec, Packing};
@@ -11,12 +12,16 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+const SMALL: Size = Size { width: 48, height: 32 };
+
 /// Writes `rgb.png` and `depth.png`.
-fn frame(folder: &Folder, (width, height): (u32, u32)) {
-    let rgb = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([(x * 5) as u8, (y * 7) as u8, 90]));
+fn frame(folder: &Folder, Size { width, height }: Size) {
+    let rgb = image::RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        image::Rgb([(x * 5) as u8, (y * 7) as u8, 90])
+    });
     rgb.save(folder.path("rgb.png")).unwrap();
-    let depth = image::GrayImage::from_fn(width, height, |x, _| {
-        image::Luma([if x < width / 2 { 30 } else { 220 }])
+    let depth = image::GrayImage::from_fn(width as u32, height as u32, |x, _| {
+        image::Luma([if x < width as u32 / 2 { 30 } else { 220 }])
     });
     depth.save(folder.path("depth.png")).unwrap();
 }
@@ -36,14 +41,11 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
         let folder = Folder::new();
         // Bit-plane cells need every pixel. Elsewhere a small hologram is centred.
         let (size, fit) = match device.packing {
-            Packing::BitPlanes(_) => (
-                (device.display.width(), device.display.height()),
-                &["--fit", "cover"][..],
-            ),
-            _ => ((48, 32), &[][..]),
+            Packing::BitPlanes(_) => (device.display.size(), &["--fit", "cover"][..]),
+            _ => (SMALL, &[][..]),
         };
-        frame(&folder, (48, 32));
-        let size = format!("{}x{}", size.0, size.1);
+        frame(&folder, SMALL);
+        let size = format!("{}x{}", size.width, size.height);
         let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
         let told = folder.succeeds(&[&SMALL_HOLOGRAM[..], fit, &to, &["--json"]].concat());
         let told: serde_json::Value = serde_json::from_str(&told).unwrap();
@@ -72,7 +74,7 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
 #[test]
 fn a_view_is_not_turned_by_what_the_panel_adds() {
     let folder = Folder::new();
-    frame(&folder, (64, 48));
+    frame(&folder, Size { width: 64, height: 48 });
     let flat = image::GrayImage::from_fn(64, 48, |x, y| image::Luma([(x * 3 + y * y) as u8]));
     flat.save(folder.path("flat.bmp")).unwrap();
     let plain = "width = 64\nheight = 48\n";
@@ -117,7 +119,7 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
 #[test]
 fn maps_of_one_image_become_bit_planes() {
     let folder = Folder::new();
-    frame(&folder, (64, 48));
+    frame(&folder, Size { width: 64, height: 48 });
     let cells = "{ memory = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12], layout = [[2, 3], [0, 1]] }";
     let toml = format!("width = 64\nheight = 48\nbits = 4\npacking = {cells}\n");
     fs::write(folder.path("plm.toml"), toml).unwrap();
@@ -154,7 +156,10 @@ fn maps_of_one_image_become_bit_planes() {
     let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
     let green = ["--colour", "green", "--display", "plm.toml", "-o", "green.png"];
     folder.succeeds(&[&["pack"], &maps[..], &green].concat());
-    assert_eq!(Image::read(&folder.path("green.png")).unwrap().shape, (96, 128));
+    assert_eq!(
+        Image::read(&folder.path("green.png")).unwrap().size,
+        Size { width: 128, height: 96 }
+    );
     let errors = folder.fails(&[&["pack"], &maps[..5], &green].concat(), 1);
     assert!(errors.contains("24"), "{errors}");
 }
@@ -162,7 +167,7 @@ fn maps_of_one_image_become_bit_planes() {
 #[test]
 fn what_is_wrong_is_one_line() {
     let folder = Folder::new();
-    frame(&folder, (48, 32));
+    frame(&folder, Size { width: 48, height: 32 });
     let files = [
         ("key.toml", "widht = 48"),
         ("bits.toml", "bits = 12"),
@@ -258,7 +263,7 @@ fn write_displays(folder: &Folder) {
 #[test]
 fn a_hologram_is_for_the_display_that_it_was_made_for() {
     let folder = Folder::new();
-    frame(&folder, (64, 48));
+    frame(&folder, Size { width: 64, height: 48 });
     write_displays(&folder);
     let make = "hologram --rgb rgb.png --depth depth.png --method sweep --planes 4 --display own.toml";
     let call = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();

@@ -1,5 +1,6 @@
 //! Tests common pictures and depth maps in all supported formats, and files that must be refused.
 use crate::folder;
+use phasefront::Size;
 
 use exr::prelude::WritableImage;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec};
@@ -24,6 +25,11 @@ use tiff::tags::Tag;
 
 const WIDTH: u32 = 24;
 const HEIGHT: u32 = 16;
+/// The size of the scene's pictures.
+const WHOLE: Size = Size {
+    width: WIDTH as usize,
+    height: HEIGHT as usize,
+};
 
 fn colour() -> image::RgbImage {
     image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| image::Rgb([10 * x as u8, 15 * y as u8, 90]))
@@ -50,13 +56,13 @@ fn metres() -> Array2<f32> {
     })
 }
 
-/// Writes a TIFF of `sides`, with an orientation unless it is 0.
-fn tiff<C: ColorType>(path: &Path, (width, height): (u32, u32), values: &[C::Inner], orientation: u16)
+/// Writes a TIFF of `size`, with an orientation unless it is 0.
+fn tiff<C: ColorType>(path: &Path, size: Size, values: &[C::Inner], orientation: u16)
 where
     [C::Inner]: TiffValue,
 {
     let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
-    let mut image = encoder.new_image::<C>(width, height).unwrap();
+    let mut image = encoder.new_image::<C>(size.width as u32, size.height as u32).unwrap();
     if orientation > 0 {
         image.encoder().write_tag(Tag::Orientation, orientation).unwrap();
     }
@@ -112,7 +118,7 @@ fn colour_is_the_same_from_every_format() {
         bytes.save(folder.path(name)).unwrap();
     }
     words.save(folder.path("w.png")).unwrap();
-    let sides = (WIDTH, HEIGHT);
+    let sides = WHOLE;
     tiff::<colortype::RGB8>(&folder.path("c.tif"), sides, bytes.as_raw(), 0);
     tiff::<colortype::RGB16>(&folder.path("w.tiff"), sides, words.as_raw(), 0);
     let rgba = DynamicImage::from(words.clone()).into_rgba16();
@@ -135,7 +141,7 @@ fn depth_is_the_same_from_every_format() {
     let want = Array2::from_shape_fn((HEIGHT as usize, WIDTH as usize), |(y, x)| {
         f32::from(depth(x as u32, y as u32)) / 65535.0
     });
-    let sides = (WIDTH, HEIGHT);
+    let sides = WHOLE;
     words.save(folder.path("grey.png")).unwrap();
     let all = DynamicImage::from(words.clone());
     all.to_rgb16().save(folder.path("rgb.png")).unwrap();
@@ -217,7 +223,7 @@ fn a_unit_means_the_same_for_every_format() {
     colour().save(folder.path("c.png")).unwrap();
     write_npy(folder.path("m.npy"), &metres()).unwrap();
     let values: Vec<f32> = metres().iter().copied().collect();
-    tiff::<colortype::Gray32Float>(&folder.path("m.tif"), (WIDTH, HEIGHT), &values, 0);
+    tiff::<colortype::Gray32Float>(&folder.path("m.tif"), WHOLE, &values, 0);
     exr(&folder.path("m.exr"), vec![("Z", FlatSamples::F32(values))]);
     let millimetres = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(WIDTH, HEIGHT, |x, y| {
         image::Luma([(metres()[(y as usize, x as usize)] * 1000.0).round() as u16])
@@ -319,7 +325,10 @@ fn pictures_are_upright_as_their_exif_says() {
     }
     // Depth with the same stored orientation and tag is turned too. Depth without the tag is refused.
     let turned = DynamicImage::from(depth16()).rotate270().into_luma16();
-    let sides = turned.dimensions();
+    let sides = Size {
+        width: turned.width() as usize,
+        height: turned.height() as usize,
+    };
     tiff::<colortype::Gray16>(&folder.path("turned.tif"), sides, turned.as_raw(), 6);
     tiff::<colortype::Gray16>(&folder.path("stored.tif"), sides, turned.as_raw(), 0);
     let real: Vec<f32> = turned.iter().map(|v| f32::from(*v) / 65535.0).collect();
@@ -708,12 +717,12 @@ fn cut_and_damaged_files_of_every_format_are_read_or_refused() {
     grey.save(folder.path("g.png")).unwrap();
     tiff::<colortype::RGB16>(
         &folder.path("a.tif"),
-        (6, 4),
+        Size { width: 6, height: 4 },
         DynamicImage::from(small).into_rgb16().as_raw(),
         6,
     );
     let real: Vec<f32> = grey.iter().map(|v| f32::from(*v)).collect();
-    tiff::<colortype::Gray32Float>(&folder.path("f.tif"), (6, 4), &real, 0);
+    tiff::<colortype::Gray32Float>(&folder.path("f.tif"), Size { width: 6, height: 4 }, &real, 0);
     exr(
         &folder.path("z.exr"),
         vec![("Z", FlatSamples::F32(vec![1.5; (WIDTH * HEIGHT) as usize]))],

@@ -1,6 +1,7 @@
 //! Tests the command on a display with one laser: from a picture to a hologram, to its view, to the modulator's input
 //! and back, and the one-line error for unsuitable input.
 use crate::folder;
+use phasefront::Size;
 
 use folder::Folder;
 use ndarray::{Array3, s};
@@ -98,7 +99,7 @@ fn every_method_goes_from_a_picture_to_a_view_and_to_the_modulator_and_back() {
         assert!(alike.psnr_overall > 20.0, "{method}: {}", alike.psnr_overall);
         // The frame is one grey image that contains the levels.
         let frame = Image::read(&folder.path("frame.png")).unwrap();
-        assert_eq!((frame.shape, frame.kind), ((H, W), Kind::Grey));
+        assert_eq!((frame.size, frame.kind), (Size { width: W, height: H }, Kind::Grey));
         assert!(
             frame
                 .bytes

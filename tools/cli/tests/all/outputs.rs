@@ -1,6 +1,7 @@
 //! Tests that a command never destroys an input or an unrelated file, whatever names its outputs have.
 use crate::folder;
 use crate::ldi;
+use phasefront::Size;
 
 use folder::{Folder, SMALL_HOLOGRAM};
 use std::collections::BTreeMap;
@@ -130,7 +131,7 @@ fn an_input_is_never_an_output() {
     fs::write(folder.path("lut.toml"), "lut = \"lut.txt\"").unwrap();
     folder.succeeds(&["view", "h.png", "--views", "2", "-o", "page.html"]);
     folder.succeeds(&["pack", "h.png", "-o", "frame.png"]);
-    ldi::write(&folder.path("ldi"), 1, (48, 32), 2);
+    ldi::write(&folder.path("ldi"), 1, Size { width: 48, height: 32 }, 2);
     fs::write(folder.path("model.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     fs::create_dir_all(folder.path("captures/blue")).unwrap();
     fs::copy(folder.path("rgb.png"), folder.path("captures/blue/diffuser.png")).unwrap();

@@ -1,6 +1,7 @@
 //! Tests photos with embedded depth, built byte by byte from the specifications, and depth from the user's own network.
 use crate::depth_models;
 use crate::folder;
+use phasefront::Size;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -159,8 +160,8 @@ fn each_kind_of_photo_gives_its_depth_and_becomes_a_hologram() {
         let call = ["hologram", "--photo", name, "--display", "display.toml", "-o", "h.png"];
         folder.succeeds(&call);
         assert_eq!(
-            hologram::read_hologram(&folder.path("h.png")).unwrap().shape(),
-            (64, 64)
+            hologram::read_hologram(&folder.path("h.png")).unwrap().size(),
+            Size { width: 64, height: 64 }
         );
         folder.succeeds(&[&call[..], &["--near", "0.52", "--far", "2", "--fit", "cover"]].concat());
     }
@@ -298,7 +299,7 @@ fn a_network_that_the_user_brings_sees_depth() {
         let mut network = DepthNetwork::open(&path).unwrap();
         network.colours = ColourScale::Signed;
         let seen = network
-            .estimator((32, 48))
+            .estimator(Size { width: 48, height: 32 })
             .unwrap()
             .estimate(rgb.as_slice().unwrap())
             .unwrap();
@@ -315,14 +316,14 @@ fn a_network_that_the_user_brings_sees_depth() {
     let mut network = DepthNetwork::open(&folder.path("open.onnx")).unwrap();
     network.gives_distance = true;
     let seen = network
-        .estimator((32, 48))
+        .estimator(Size { width: 48, height: 32 })
         .unwrap()
         .estimate(rgb.as_slice().unwrap())
         .unwrap();
     assert_eq!(seen.dim(), (448, 672));
     network.gives_distance = false;
     let nearer = network
-        .estimator((32, 48))
+        .estimator(Size { width: 48, height: 32 })
         .unwrap()
         .estimate(rgb.as_slice().unwrap())
         .unwrap();

@@ -1,5 +1,6 @@
 //! Tests `phasefront show` and `screens` on virtual X servers, whose pixels are read back.
 use crate::folder;
+use phasefront::Size;
 
 use folder::Folder;
 use phasefront_io::hologram::packed::{Image, Kind};
@@ -12,19 +13,19 @@ use std::time::{Duration, Instant};
 struct Server {
     process: Child,
     display: String,
-    /// The size of all its screens together, (W, H).
-    size: (usize, usize),
+    /// The size of all its screens together.
+    size: Size,
     folder: tempfile::TempDir,
 }
 
 impl Server {
     /// Starts Xvfb with one screen, which stores the displayed image in a file.
-    fn with_one_screen((width, height): (usize, usize)) -> Self {
+    fn with_one_screen(size: Size) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new("Xvfb");
-        let depth = format!("{width}x{height}x24");
+        let depth = format!("{}x{}x24", size.width, size.height);
         command.args(["-screen", "0", &depth, "-fbdir"]).arg(folder.path());
-        Server::start(command, (width, height), folder, "xvfb")
+        Server::start(command, size, folder, "xvfb")
     }
 
     /// Starts Xorg with a screen of 640×480 and one of 640×400 to its right. Xvfb never reports more than one screen.
@@ -37,7 +38,10 @@ impl Server {
         command.arg(config).arg("-logfile").arg(folder.path().join("log"));
         let server = Server::start(
             command,
-            (1280, 480),
+            Size {
+                width: 1280,
+                height: 480,
+            },
             folder,
             "xserver-xorg-core xserver-xorg-video-dummy",
         );
@@ -47,7 +51,7 @@ impl Server {
         server
     }
 
-    fn start(mut command: Command, size: (usize, usize), folder: tempfile::TempDir, packages: &str) -> Self {
+    fn start(mut command: Command, size: Size, folder: tempfile::TempDir, packages: &str) -> Self {
         let mut process = command
             .args(["-displayfd", "1"])
             .stdout(Stdio::piped())
@@ -127,7 +131,7 @@ impl Server {
         let number = |n: usize| u32::from_be_bytes([0, 1, 2, 3].map(|i| dump[4 * n + i])) as usize;
         // The dump has a header, a colour map with 12 bytes per entry, and rows of words with blue first.
         let (header, colours, line) = (number(0), number(19), number(12));
-        let (width, height) = self.size;
+        let Size { width, height } = self.size;
         assert_eq!((number(4), number(5), number(11)), (width, height, 32));
         let image = &dump[header + 12 * colours..];
         let rows = image.chunks(line).take(height);
@@ -191,19 +195,19 @@ EndSection
 "#;
 
 /// Creates a frame whose neighbouring pixels differ.
-fn noise(seed: u32, (width, height): (usize, usize)) -> Image {
+fn noise(seed: u32, Size { width, height }: Size) -> Image {
     let byte = |i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(seed * 977) >> 13) as u8;
     Image {
-        shape: (height, width),
+        size: Size { width, height },
         bytes: (0..3 * (width * height) as u32).map(byte).collect(),
         kind: Kind::Rgb,
     }
 }
 
-/// Creates a black desktop of (`width`, `height`) pixels with a frame at (`left`, `top`).
-fn amid_black(frame: &Image, (width, height): (usize, usize), (left, top): (usize, usize)) -> Vec<u8> {
+/// Creates a black desktop of `size` with a frame at (`left`, `top`).
+fn amid_black(frame: &Image, Size { width, height }: Size, (left, top): (usize, usize)) -> Vec<u8> {
     let mut desktop = vec![0; 3 * width * height];
-    for (y, row) in frame.bytes.chunks(3 * frame.shape.1).enumerate() {
+    for (y, row) in frame.bytes.chunks(3 * frame.size.width).enumerate() {
         desktop[3 * ((top + y) * width + left)..][..row.len()].copy_from_slice(row);
     }
     desktop
@@ -217,7 +221,10 @@ fn say(line: &str) {
 
 #[test]
 fn a_screen_shows_exactly_what_it_is_given() {
-    let size = (640, 480);
+    let size = Size {
+        width: 640,
+        height: 480,
+    };
     let server = Server::with_one_screen(size);
     let folder = Folder::new();
     let frames = [1, 2].map(|seed| noise(seed, size));
@@ -239,7 +246,13 @@ fn a_screen_shows_exactly_what_it_is_given() {
     ));
 
     // A smaller frame is centred on black.
-    let small = noise(3, (200, 100));
+    let small = noise(
+        3,
+        Size {
+            width: 200,
+            height: 100,
+        },
+    );
     small.write(&folder.path("small.png")).unwrap();
     server.displays(&folder, &["small.png"], &[&amid_black(&small, size, (220, 190))]);
 
@@ -267,7 +280,13 @@ fn the_second_screen_shows_exactly_what_it_is_given() {
     };
     assert_eq!(told(0), [1, 640, 480, 0]);
     assert_eq!(told(1), [2, 640, 400, 640]);
-    let frame = noise(1, (640, 400));
+    let frame = noise(
+        1,
+        Size {
+            width: 640,
+            height: 400,
+        },
+    );
     frame.write(&folder.path("frame.png")).unwrap();
     let desktop = amid_black(&frame, server.size, (640, 0));
     server.displays(&folder, &["frame.png", "--screen", "2"], &[&desktop]);
@@ -282,12 +301,33 @@ fn the_second_screen_shows_exactly_what_it_is_given() {
 
 #[test]
 fn what_a_screen_cannot_show_is_refused() {
-    let server = Server::with_one_screen((320, 240));
+    let server = Server::with_one_screen(Size {
+        width: 320,
+        height: 240,
+    });
     let folder = Folder::new();
     let frames = [
-        ("fits.png", (320, 240)),
-        ("wide.png", (321, 240)),
-        ("high.png", (320, 241)),
+        (
+            "fits.png",
+            Size {
+                width: 320,
+                height: 240,
+            },
+        ),
+        (
+            "wide.png",
+            Size {
+                width: 321,
+                height: 240,
+            },
+        ),
+        (
+            "high.png",
+            Size {
+                width: 320,
+                height: 241,
+            },
+        ),
     ];
     for (name, size) in frames {
         noise(1, size).write(&folder.path(name)).unwrap();

@@ -1,4 +1,5 @@
 //! Tests `phasefront hologram` on folders of pictures. Each picture is processed separately under its own name.
+use phasefront::Size;
 use phasefront_io::hologram;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,13 @@ fn each_picture_of_a_folder_is_what_it_is_by_itself() {
         json(&["hologram", "--rgb", &rgb, "--depth", &depth, "-o", &one]);
         let alone = hologram::read_hologram(one.as_ref()).unwrap();
         let among = hologram::read_hologram(&folder.path(&format!("out/{name}.png"))).unwrap();
-        assert_eq!(alone.shape(), (height as usize, width as usize));
+        assert_eq!(
+            alone.size(),
+            Size {
+                width: width as usize,
+                height: height as usize
+            }
+        );
         assert_eq!(alone, among, "{name}");
     }
 }

@@ -1,6 +1,7 @@
 //! Tests `phasefront video` with folders and pipes, frame by frame and live. Every frame is processed or reported
 //! dropped.
 use crate::skip;
+use phasefront::Size;
 
 use phasefront_io::hologram::{self, Hologram};
 use serde_json::Value;
@@ -459,7 +460,13 @@ fn films_go_in_and_come_out() {
     ]);
     assert_eq!(report["processed"], 5);
     let first = hologram::read_hologram(&at("b").join("phase_000000.png")).unwrap();
-    assert_eq!(first.shape(), (HEIGHT as usize, WIDTH as usize));
+    assert_eq!(
+        first.size(),
+        Size {
+            width: WIDTH as usize,
+            height: HEIGHT as usize
+        }
+    );
     assert!(refusal(&["video", &colour, "-o", &text(&at("c"))]).contains("--depth-network"));
     std::fs::write(at("no.mp4"), "no film").unwrap();
     let no = refusal(&["video", &text(&at("no.mp4")), "--depth-beside", "-o", &text(&at("c"))]);

@@ -2,6 +2,7 @@
 //! the pages in a browser.
 use crate::folder;
 use crate::ldi;
+use phasefront::Size;
 
 use folder::Folder;
 use phasefront_cli::viewer;
@@ -168,7 +169,7 @@ fn ways_are_judged_by_the_best_wave_at_hand() {
     }
     assert!(rows.iter().all(|row| row["wave_ms"].as_f64().unwrap() > 0.0));
     assert_eq!(viewer::read(&folder.path("j.html")).unwrap().len(), 8);
-    ldi::write(&folder.path("ldi"), 5, (64, 48), 2);
+    ldi::write(&folder.path("ldi"), 5, Size { width: 64, height: 48 }, 2);
     let said = judged(&["--ldi", "ldi", "--method", "sweep", "--encoder", "double,band-limit"]);
     assert!(
         said["truth"].as_str().unwrap().contains("2 layers: the truth"),

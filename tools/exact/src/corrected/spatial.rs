@@ -13,11 +13,12 @@
 //! propagates on its own: through the silhouettes in front of it, back to its plane, through the convolution and on to
 //! z = 0. This takes N²/2 propagations for N planes.
 
-use super::{MAX_PROPAGATIONS, padded_shape_with};
+use super::{MAX_PROPAGATIONS, padded_size_with};
 use crate::sm_lbm::{Planes, check_planes, crop, cross, place, plane_z_m};
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront::target::Aberration;
 use phasefront_core::optics::asm::Transfer;
 use phasefront_core::optics::fft::{ConvolveScratch, Fft2, Scratch, fast_size};
@@ -44,15 +45,15 @@ pub struct Place<'a> {
     pub colour: usize,
     /// z of the field, in metres.
     pub z_m: f64,
-    /// The shape, (H, W), of the frame that contains the calibrated points.
-    pub frame: (usize, usize),
+    /// The size of the frame that contains the calibrated points.
+    pub frame: Size,
 }
 
 impl Place<'_> {
     /// Returns the correction of node (i, j).
     fn node(&self, i: usize, j: usize) -> Aberration {
         let part = |node: usize, n: usize| ((node * NODE) as f64 + 0.5) / n as f64;
-        let (x, y) = (part(j, self.frame.1), part(i, self.frame.0));
+        let (x, y) = (part(j, self.frame.width), part(i, self.frame.height));
         self.aberrations.at(x, y, self.z_m)
     }
 
@@ -89,7 +90,8 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
     let (height, width) = field.dim();
     let nodes = |n: usize| (n - 1) / NODE + 2;
     let (side, reach) = (place.side(), place.reach());
-    let fft = Fft2::new(side, side, side, side);
+    let square = Size::from_shape((side, side));
+    let fft = Fft2::new(square, square);
     let scale = 1.0 / (side * side) as f32;
     // Returns the spectrum of a node's point spread function after the cut, divided by side² because the transforms are
     // unnormalized.
@@ -230,10 +232,13 @@ pub fn hologram(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
     check_planes(planes)?;
-    let frame @ (height, width) = ldi.shape();
+    let frame @ Size { width, height } = ldi.size();
     let pitch_m = display.pitch_m();
-    let shape = padded_shape_with(height, width, display, aberrations.reach_m(pitch_m))?;
-    let (padded_height, padded_width) = shape;
+    let padded = padded_size_with(frame, display, aberrations.reach_m(pitch_m))?;
+    let Size {
+        width: padded_width,
+        height: padded_height,
+    } = padded;
     let colours = display.colours();
     let scene = Planes::of(&ldi.for_display(display), planes);
     let z = |k: usize| plane_z_m(k, planes, display);
@@ -247,7 +252,7 @@ pub fn hologram(
             "{propagations} propagations a colour for {planes} planes; at most {MAX_PROPAGATIONS} are done: fewer planes are needed"
         )));
     }
-    let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
+    let fft = Fft2::new(padded, padded);
     let mut scratch = fft.scratch();
     let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
     let mut sum = plane.clone();
@@ -255,7 +260,7 @@ pub fn hologram(
     let step_m = display.volume_depth_m() / planes as f64;
     let mut done = 0;
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
-        let transfer = |distance_m| Transfer::new(shape, pitch_m, wavelength_m, distance_m, |_, _| true);
+        let transfer = |distance_m| Transfer::new(padded, pitch_m, wavelength_m, distance_m, |_, _| true);
         sum.fill(Complex32::ZERO);
         for first in 0..count {
             let (k, points) = &scene.occupied[first];
@@ -309,7 +314,8 @@ fn spread(fft: &Fft2, scratch: &mut Scratch, back: &Transfer, here: Place<'_>) {
         &mut scratch.work,
     );
     fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
-    let field = Array2::from_shape_vec(fft.padded_shape(), scratch.rows.clone()).expect("a plane of the padded shape");
+    let field =
+        Array2::from_shape_vec(fft.padded_size().shape(), scratch.rows.clone()).expect("a plane of the padded shape");
     let field = convolve(&field, here);
     let field = field.as_slice().expect("standard layout");
     fft.rows_forward(field, &mut scratch.rows, &mut scratch.work);
@@ -363,7 +369,7 @@ mod tests {
             display: &display,
             colour: 1,
             z_m: 0.0,
-            frame: (37, 45),
+            frame: Size { width: 45, height: 37 },
         };
         let field = Array2::from_shape_fn((37, 45), |(y, x)| {
             let t = (y * 45 + x) as f32;

@@ -6,6 +6,7 @@ use crate::sm_lbm::{check_planes, plane_of_depth, plane_z_m};
 use ndarray::Array3;
 use num_complex::Complex64;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_io::Result;
 use phasefront_io::ldi::Ldi;
 
@@ -18,7 +19,7 @@ type Point = ([i64; 2], usize, [f32; 3]);
 /// Returns an error if there are no planes.
 pub fn hologram(ldi: &Ldi, display: &Display, planes: usize, occlusion: Occlusion) -> Result<Array3<Complex64>> {
     check_planes(planes)?;
-    let (height, width) = ldi.shape();
+    let Size { width, height } = ldi.size();
     let ldi = ldi.for_display(display);
     let mut points: Vec<Point> = Vec::new();
     let layers = match occlusion {

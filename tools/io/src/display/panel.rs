@@ -16,6 +16,7 @@ use crate::output::has_extension;
 use crate::picture::open_image;
 use crate::{Error, Result};
 use image::DynamicImage;
+use phasefront::Size;
 use phasefront::Target;
 use phasefront_core::display::panel::Flatness;
 use phasefront_core::display::registration::Registration;
@@ -66,7 +67,7 @@ impl PanelToml {
         let panel = &mut target.panel;
         panel.carrier_rad = self.carrier_mrad.unwrap_or_default().map(|mrad| mrad / 1e3);
         panel.lens_m = self.lens_mm.map(|mm| mm / 1e3);
-        let modulator = (target.display.height(), target.display.width());
+        let modulator = target.display.size();
         let names = match self.flatness {
             None => vec![],
             Some(FlatnessToml::One(name)) => vec![name],
@@ -87,31 +88,31 @@ impl PanelToml {
     }
 }
 
-/// Reads a manufacturer's flatness map for a modulator of (H, W) pixels, in units of 2π/65536.
+/// Reads a manufacturer's flatness map for a modulator of `size`, in units of 2π/65536.
 ///
 /// # Errors
 /// Returns an error if the file is missing or has another format or size.
-fn read_flatness(path: &Path, (height, width): (usize, usize)) -> Result<Vec<u16>> {
-    let (shape, turns) = if has_extension(path, "csv") {
+fn read_flatness(path: &Path, size: Size) -> Result<Vec<u16>> {
+    let (found, turns) = if has_extension(path, "csv") {
         read_csv(path)?
     } else {
         read_image(path)?
     };
-    if shape != (height, width) {
+    if found != size {
         return Err(Error::file(
             path,
-            format!(
-                "is a map of {}×{} pixels, the display has {width}×{height}; both must be of one size",
-                shape.1, shape.0
-            ),
+            format!("is a map of {found} pixels, the display has {size}; both must be of one size"),
         ));
     }
     Ok(turns)
 }
 
-fn read_image(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
+fn read_image(path: &Path) -> Result<(Size, Vec<u16>)> {
     let image = open_image(path)?;
-    let shape = (image.height() as usize, image.width() as usize);
+    let size = Size {
+        width: image.width() as usize,
+        height: image.height() as usize,
+    };
     let turns = match image {
         DynamicImage::ImageLuma16(grey) => grey.into_raw(),
         DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(|v| u16::from(v) << 8).collect(),
@@ -129,10 +130,10 @@ fn read_image(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
             ));
         }
     };
-    Ok((shape, turns))
+    Ok((size, turns))
 }
 
-fn read_csv(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
+fn read_csv(path: &Path) -> Result<(Size, Vec<u16>)> {
     let text =
         String::from_utf8(input::bytes(path, MOST_PICTURE)?).map_err(|_| Error::file(path, "is not text in UTF-8"))?;
     let mut turns = Vec::new();
@@ -167,7 +168,11 @@ fn read_csv(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
             "holds no levels; there must be a row of coordinates, then rows of levels 0 to 1023",
         )
     })?;
-    Ok(((turns.len() / width, width), turns))
+    let size = Size {
+        width,
+        height: turns.len() / width,
+    };
+    Ok((size, turns))
 }
 
 #[cfg(test)]
@@ -187,14 +192,18 @@ mod tests {
             .unwrap();
         let want: Vec<u16> = [0, 1, 2, 10, 11, 12].map(|v| v << 8).into();
         for name in ["grey.bmp", "rgb.bmp"] {
-            assert_eq!(read_flatness(&path(name), (2, 3)).unwrap(), want, "{name}");
+            assert_eq!(
+                read_flatness(&path(name), Size { width: 3, height: 2 }).unwrap(),
+                want,
+                "{name}"
+            );
         }
         let deep = image::ImageBuffer::from_fn(3, 2, |x, y| image::Luma([(1000 * y + x) as u16]));
         deep.save(path("deep.png")).unwrap();
-        let read = read_flatness(&path("deep.png"), (2, 3)).unwrap();
+        let read = read_flatness(&path("deep.png"), Size { width: 3, height: 2 }).unwrap();
         assert_eq!(read, [0, 1, 2, 1000, 1001, 1002]);
         std::fs::write(path("santec.csv"), "Y/X,0,1,2\n0,5,6,7\n1,1021,1022,1023\n").unwrap();
-        let read = read_flatness(&path("santec.csv"), (2, 3)).unwrap();
+        let read = read_flatness(&path("santec.csv"), Size { width: 3, height: 2 }).unwrap();
         assert_eq!(read, [5, 6, 7, 1021, 1022, 1023].map(|v| v << 6));
 
         image::RgbImage::from_pixel(3, 2, image::Rgb([1, 2, 3]))
@@ -216,7 +225,9 @@ mod tests {
             ("uneven.csv", "line 3"),
             ("empty.csv", "no levels"),
         ] {
-            let error = read_flatness(&path(name), (2, 4)).unwrap_err().to_string();
+            let error = read_flatness(&path(name), Size { width: 4, height: 2 })
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(word), "{name}: {error}");
         }
     }

@@ -4,6 +4,7 @@ use crate::fingerprint::Fingerprint;
 use crate::frame::{self, DepthOptions, Doubt, Stored};
 use crate::{Error, Result};
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront_core::depth::DepthUnit;
 use std::io::Read;
@@ -13,7 +14,7 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoFrame {
     colour: Vec<u8>,
-    colour_shape: (usize, usize),
+    colour_size: Size,
     depth: Option<VideoDepth>,
 }
 
@@ -21,7 +22,7 @@ pub struct VideoFrame {
 #[derive(Debug, Clone, PartialEq)]
 struct VideoDepth {
     bytes: Vec<u8>,
-    shape: (usize, usize),
+    size: Size,
     format: DepthFormat,
 }
 
@@ -34,58 +35,53 @@ impl VideoDepth {
 }
 
 impl VideoFrame {
-    /// Returns the height and width of the colour image, (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        self.colour_shape
+    /// Returns the size of the colour image.
+    pub fn size(&self) -> Size {
+        self.colour_size
     }
 
-    /// Returns the height and width of the depth image, (h, w), if there is one.
-    pub fn depth_shape(&self) -> Option<(usize, usize)> {
-        self.depth.as_ref().map(|depth| depth.shape)
+    /// Returns the size of the depth image, if there is one.
+    pub fn depth_size(&self) -> Option<Size> {
+        self.depth.as_ref().map(|depth| depth.size)
     }
 
     /// Adds the frame to the fingerprint in `hasher`.
     pub fn fingerprint(&self, hasher: &mut Fingerprint) {
-        hasher.numbers(&[self.colour_shape.0, self.colour_shape.1]);
+        hasher.numbers(&[self.colour_size.height, self.colour_size.width]);
         hasher.bytes(&self.colour);
-        if let Some(VideoDepth { bytes, shape, format }) = &self.depth {
-            hasher.numbers(&[shape.0, shape.1]);
+        if let Some(VideoDepth { bytes, size, format }) = &self.depth {
+            hasher.numbers(&[size.height, size.width]);
             hasher.bytes(format!("{format:?}").as_bytes());
             hasher.bytes(bytes);
         }
     }
 
-    /// Creates a frame from rows of RGB bytes, (H, W) = `colour_shape`, and big-endian 16-bit depth values of `unit`,
-    /// (h, w) = `depth_shape`.
-    pub fn of_big_endian(
-        colour_shape: (usize, usize),
-        colour: Vec<u8>,
-        depth_shape: (usize, usize),
-        depth: &[u8],
-        unit: DepthUnit,
-    ) -> Self {
+    /// Creates a frame from rows of RGB bytes, an image of `colour_size`, and big-endian 16-bit depth values of `unit`,
+    /// an image of `depth_size`.
+    pub fn of_big_endian(colour_size: Size, colour: Vec<u8>, depth_size: Size, depth: &[u8], unit: DepthUnit) -> Self {
         let little = depth.as_chunks::<2>().0.iter().flat_map(|[high, low]| [*low, *high]);
         let (format, bytes) = of_numbers(little.collect(), unit);
         VideoFrame {
             colour,
-            colour_shape,
+            colour_size,
             depth: Some(VideoDepth {
                 bytes,
-                shape: depth_shape,
+                size: depth_size,
                 format,
             }),
         }
     }
 
-    /// Creates a frame from a picture of (H, W) RGB bytes with colour at its left and normalized grey depth at its
+    /// Creates a frame from a picture of `size`, rows of RGB bytes, with colour at its left and normalized grey depth at its
     /// right, each `side` columns wide.
     ///
     /// # Errors
     /// Returns an error if the picture is narrower.
-    pub fn of_sides((height, width): (usize, usize), picture: &[u8], side: usize) -> Result<Self> {
+    pub fn of_sides(size: Size, picture: &[u8], side: usize) -> Result<Self> {
+        let Size { width, height } = size;
         let Some(right) = width.checked_sub(side).filter(|right| *right >= side) else {
             return Err(Error::Input(format!(
-                "a picture of {width}×{height} has no two sides of {side} columns"
+                "a picture of {size} has no two sides of {side} columns"
             )));
         };
         let rows = || picture.chunks_exact(3 * width);
@@ -96,20 +92,20 @@ impl VideoFrame {
         });
         Ok(VideoFrame {
             colour,
-            colour_shape: (height, side),
+            colour_size: Size { width: side, height },
             depth: Some(VideoDepth {
                 bytes: depth.flat_map(u16::to_le_bytes).collect(),
-                shape: (height, side),
+                size: Size { width: side, height },
                 format: DepthFormat::NormalizedU16,
             }),
         })
     }
 
-    /// Creates a frame without depth from rows of RGB bytes, (H, W) = `colour_shape`.
-    pub fn without_depth(colour_shape: (usize, usize), colour: Vec<u8>) -> Self {
+    /// Creates a frame without depth from rows of RGB bytes, an image of `colour_size`.
+    pub fn without_depth(colour_size: Size, colour: Vec<u8>) -> Self {
         VideoFrame {
             colour,
-            colour_shape,
+            colour_size,
             depth: None,
         }
     }
@@ -137,7 +133,7 @@ impl VideoFrame {
     /// Returns an error if their aspect ratios differ.
     pub fn check(&self, inverted: bool) -> Result<Option<Doubt>> {
         let Some(depth) = &self.depth else { return Ok(None) };
-        frame::check_aspect(depth.shape, self.colour_shape).map_err(Error::Input)?;
+        frame::check_aspect(depth.size, self.colour_size).map_err(Error::Input)?;
         let normalized = depth.format == DepthFormat::NormalizedU16;
         Ok(normalized
             .then(|| Doubt::of_normalized(depth.readings(), inverted))
@@ -160,16 +156,16 @@ impl VideoFrame {
     /// # Errors
     /// Returns an error if the images are too large.
     pub fn camera_frame(&self, timestamp_ns: u64) -> Result<CameraFrame<'_>> {
-        let (height, width) = self.colour_shape;
+        let width = self.colour_size.width;
         let plane = Plane::new(&self.colour, 3 * width, 3);
-        let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[plane])?;
+        let colour = ColourImage::new(ColourFormat::Rgb, self.colour_size, &[plane])?;
         let Some(depth) = &self.depth else {
             return Ok(CameraFrame::without_depth(timestamp_ns, colour));
         };
-        let (height, width) = depth.shape;
+        let width = depth.size.width;
         let pixel = depth.format.pixel_bytes();
         let plane = Plane::new(&depth.bytes, width * pixel, pixel);
-        let depth = DepthImage::new(depth.format, width, height, plane)?;
+        let depth = DepthImage::new(depth.format, depth.size, plane)?;
         Ok(CameraFrame::new(timestamp_ns, colour, depth))
     }
 }
@@ -185,7 +181,10 @@ pub fn read_frame(
     told: &mut dyn FnMut(Doubt),
 ) -> Result<VideoFrame> {
     let Stored { image, readings } = frame::stored(colour, depth, options, told)?;
-    let colour_shape = (image.height() as usize, image.width() as usize);
+    let colour_size = Size {
+        width: image.width() as usize,
+        height: image.height() as usize,
+    };
     let unit = options.unit;
     if unit == DepthUnit::Normalized
         && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d))
@@ -198,10 +197,10 @@ pub fn read_frame(
     let (format, bytes) = depth_bytes(&readings, unit);
     Ok(VideoFrame {
         colour: image.into_rgb8().into_raw(),
-        colour_shape,
+        colour_size,
         depth: Some(VideoDepth {
             bytes,
-            shape: readings.dim(),
+            size: Size::from_shape(readings.dim()),
             format,
         }),
     })
@@ -244,10 +243,10 @@ fn of_numbers(depth: Vec<u8>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
 /// The layout of raw frames in a pipe: rows of RGB bytes, then rows of 16-bit little-endian depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RawVideo {
-    /// The height and width of the colour image, (H, W).
-    pub colour: (usize, usize),
-    /// The height and width of the depth image, (H, W).
-    pub depth: (usize, usize),
+    /// The size of the colour image.
+    pub colour: Size,
+    /// The size of the depth image.
+    pub depth: Size,
     /// The unit of the depth values.
     pub unit: DepthUnit,
 }
@@ -258,8 +257,8 @@ impl RawVideo {
     /// # Errors
     /// Returns an error if the pipe breaks or ends within a frame.
     pub fn read(&self, from: &mut dyn Read) -> Result<Option<VideoFrame>> {
-        let mut colour = vec![0; 3 * self.colour.0 * self.colour.1];
-        let mut depth = vec![0; 2 * self.depth.0 * self.depth.1];
+        let mut colour = vec![0; 3 * self.colour.pixels()];
+        let mut depth = vec![0; 2 * self.depth.pixels()];
         let got = fill(from, &mut colour)?;
         if got == 0 {
             return Ok(None);
@@ -279,10 +278,10 @@ impl RawVideo {
         let (format, bytes) = of_numbers(depth, self.unit);
         Ok(Some(VideoFrame {
             colour,
-            colour_shape: self.colour,
+            colour_size: self.colour,
             depth: Some(VideoDepth {
                 bytes,
-                shape: self.depth,
+                size: self.depth,
                 format,
             }),
         }))
@@ -311,15 +310,18 @@ mod tests {
     #[test]
     fn raw_video_is_cut_into_frames_and_a_cut_frame_is_named() {
         let raw = RawVideo {
-            colour: (2, 3),
-            depth: (1, 2),
+            colour: Size { width: 3, height: 2 },
+            depth: Size { width: 2, height: 1 },
             unit: DepthUnit::Millimetres,
         };
         let bytes: Vec<u8> = (0..44).collect();
         let mut pipe = &bytes[..];
         let first = raw.read(&mut pipe).unwrap().unwrap();
         let depth = |frame: VideoFrame| frame.depth.unwrap().bytes;
-        assert_eq!((first.shape(), first.colour[17], depth(first)[0]), ((2, 3), 17, 18));
+        assert_eq!(
+            (first.size(), first.colour[17], depth(first)[0]),
+            (Size { width: 3, height: 2 }, 17, 18)
+        );
         assert_eq!(depth(raw.read(&mut pipe).unwrap().unwrap()), [40, 41, 42, 43]);
         assert_eq!(raw.read(&mut pipe).unwrap(), None);
         let cut = raw.read(&mut &bytes[..30]).and_then(|_| raw.read(&mut &bytes[22..40]));

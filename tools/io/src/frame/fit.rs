@@ -5,6 +5,7 @@ use image::imageops::{self, FilterType};
 use image::{Rgb, Rgb32FImage};
 use ndarray::{Array2, Array3, ArrayView3, s};
 use phasefront::RgbdFrame;
+use phasefront::Size;
 use phasefront_core::frame::Crop;
 
 /// How a picture is placed on a modulator.
@@ -23,17 +24,17 @@ pub enum Fit {
 pub struct Placement {
     /// The visible part of the picture, in its pixels.
     crop: Crop,
-    /// The size of that part on the modulator, (H, W).
-    inner: (usize, usize),
+    /// The size of that part on the modulator.
+    inner: Size,
     /// The top left corner of that part on the modulator, (row, column).
     at: (usize, usize),
-    /// The size of the output, (H, W).
-    out: (usize, usize),
+    /// The size of the output.
+    out: Size,
 }
 
 impl Placement {
     /// Creates a placement that leaves the picture unchanged.
-    pub fn as_is(picture: (usize, usize)) -> Self {
+    pub fn as_is(picture: Size) -> Self {
         Placement {
             crop: Crop::cover(picture, picture),
             inner: picture,
@@ -42,24 +43,31 @@ impl Placement {
         }
     }
 
-    /// Places a picture of (H, W) = `picture` on a modulator of (H, W) = `modulator`.
-    pub fn new(picture: (usize, usize), modulator: (usize, usize), fit: Fit) -> Self {
+    /// Places a picture of the size `picture` on a modulator of the size `modulator`.
+    pub fn new(picture: Size, modulator: Size, fit: Fit) -> Self {
         let whole = Crop::cover(picture, picture);
-        let (h, w) = (picture.0 as f64, picture.1 as f64);
+        let (w, h) = (picture.width as f64, picture.height as f64);
         let (crop, inner) = match fit {
             Fit::Cover => (Crop::cover(picture, modulator), modulator),
             Fit::Contain => {
-                let scale = (modulator.0 as f64 / h).min(modulator.1 as f64 / w);
+                let scale = (modulator.height as f64 / h).min(modulator.width as f64 / w);
                 let side = |n: f64, most: usize| ((n * scale).round() as usize).clamp(1, most);
-                (whole, (side(h, modulator.0), side(w, modulator.1)))
+                let inner = Size {
+                    width: side(w, modulator.width),
+                    height: side(h, modulator.height),
+                };
+                (whole, inner)
             }
             Fit::Centre => {
-                let inner = (picture.0.min(modulator.0), picture.1.min(modulator.1));
+                let inner = Size {
+                    width: picture.width.min(modulator.width),
+                    height: picture.height.min(modulator.height),
+                };
                 let crop = Crop {
-                    x: ((picture.1 - inner.1) / 2) as f64,
-                    y: ((picture.0 - inner.0) / 2) as f64,
-                    width: inner.1 as f64,
-                    height: inner.0 as f64,
+                    x: ((picture.width - inner.width) / 2) as f64,
+                    y: ((picture.height - inner.height) / 2) as f64,
+                    width: inner.width as f64,
+                    height: inner.height as f64,
                 };
                 (crop, inner)
             }
@@ -67,26 +75,32 @@ impl Placement {
         Placement {
             crop,
             inner,
-            at: ((modulator.0 - inner.0) / 2, (modulator.1 - inner.1) / 2),
+            at: (
+                (modulator.height - inner.height) / 2,
+                (modulator.width - inner.width) / 2,
+            ),
             out: modulator,
         }
     }
 
-    /// Returns the size of the picture's part on the modulator, (H, W).
-    pub fn inner(&self) -> (usize, usize) {
+    /// Returns the size of the picture's part on the modulator.
+    pub fn inner(&self) -> Size {
         self.inner
     }
 
-    /// Returns the part of a depth image, (H, W) = `depth`, that corresponds to the visible part of a picture, (H, W) =
-    /// `picture`, with the same field of view.
-    pub fn depth_crop(&self, depth: (usize, usize), picture: (usize, usize)) -> Crop {
-        (self.crop).scaled(depth.1 as f64 / picture.1 as f64, depth.0 as f64 / picture.0 as f64)
+    /// Returns the part of a depth image of the size `depth` that corresponds to the visible part of a picture of the
+    /// size `picture`, with the same field of view.
+    pub fn depth_crop(&self, depth: Size, picture: Size) -> Crop {
+        (self.crop).scaled(
+            depth.width as f64 / picture.width as f64,
+            depth.height as f64 / picture.height as f64,
+        )
     }
 
     /// Resamples the visible part of `rgb`, (3, H, W), to its size on the modulator. Shrinking averages pixels.
     pub fn colour(&self, rgb: ArrayView3<'_, f32>) -> Array3<f32> {
         let (_, height, width) = rgb.dim();
-        if *self == Self::as_is((height, width)) {
+        if *self == Self::as_is(Size { width, height }) {
             return rgb.to_owned();
         }
         let [x, y, w, h] = [self.crop.x, self.crop.y, self.crop.width, self.crop.height].map(|v| v.round() as u32);
@@ -94,8 +108,8 @@ impl Placement {
             let (row, column) = ((y + j) as usize, (x + i) as usize);
             Rgb([0, 1, 2].map(|c| rgb[(c, row.min(height - 1), column.min(width - 1))]))
         });
-        let (height, width) = self.inner;
-        let sized = if (h as usize, w as usize) == self.inner {
+        let Size { width, height } = self.inner;
+        let sized = if (w as usize, h as usize) == (width, height) {
             part
         } else {
             imageops::resize(&part, width as u32, height as u32, FilterType::Triangle)
@@ -105,7 +119,7 @@ impl Placement {
         })
     }
 
-    /// Creates the frame of the modulator's shape. Both `rgb`, (3, h, w), and `depth`, (h, w), have the shape of
+    /// Creates the frame of the modulator's size. Both `rgb`, (3, h, w), and `depth`, (h, w), have the shape of
     /// [`Self::inner`]. Black surrounds `rgb`, and the depth of the nearest pixel surrounds `depth`.
     ///
     /// # Errors
@@ -114,11 +128,11 @@ impl Placement {
         if self.inner == self.out {
             return Ok(RgbdFrame::new(rgb, depth)?);
         }
-        let ((top, left), (height, width)) = (self.at, self.inner);
-        let mut wide = Array3::zeros((3, self.out.0, self.out.1));
+        let ((top, left), Size { width, height }) = (self.at, self.inner);
+        let mut wide = Array3::zeros((3, self.out.height, self.out.width));
         wide.slice_mut(s![.., top..top + height, left..left + width])
             .assign(&rgb);
-        let deep = Array2::from_shape_fn(self.out, |(y, x)| {
+        let deep = Array2::from_shape_fn(self.out.shape(), |(y, x)| {
             let row = y.clamp(top, top + height - 1) - top;
             let column = x.clamp(left, left + width - 1) - left;
             depth[(row, column)]
@@ -132,7 +146,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn picture(height: usize, width: usize) -> (Array3<f32>, Array2<f32>) {
+    fn picture(size: Size) -> (Array3<f32>, Array2<f32>) {
+        let Size { width, height } = size;
         let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| (c + y + x) as f32 / 100.0);
         let depth = Array2::from_shape_fn((height, width), |(y, x)| (y * width + x) as f32 / 1000.0);
         (rgb, depth)
@@ -140,8 +155,9 @@ mod tests {
 
     /// Returns the nearest samples of the visible part of `depth`, which has the picture's shape.
     fn sampled(placement: &Placement, depth: &Array2<f32>) -> Array2<f32> {
-        let crop = placement.depth_crop(depth.dim(), depth.dim());
-        let (height, width) = placement.inner();
+        let size = Size::from_shape(depth.dim());
+        let crop = placement.depth_crop(size, size);
+        let Size { width, height } = placement.inner();
         Array2::from_shape_fn((height, width), |(y, x)| {
             let row = crop.y + (y as f64 + 0.5) * crop.height / height as f64;
             let column = crop.x + (x as f64 + 0.5) * crop.width / width as f64;
@@ -149,47 +165,51 @@ mod tests {
         })
     }
 
-    fn placed(shape: (usize, usize), modulator: (usize, usize), fit: Fit) -> RgbdFrame {
-        let (rgb, depth) = picture(shape.0, shape.1);
-        let placement = Placement::new(shape, modulator, fit);
+    fn placed(size: Size, modulator: Size, fit: Fit) -> RgbdFrame {
+        let (rgb, depth) = picture(size);
+        let placement = Placement::new(size, modulator, fit);
         let frame = placement
             .frame(placement.colour(rgb.view()), sampled(&placement, &depth))
             .unwrap();
-        assert_eq!(frame.shape(), modulator);
+        assert_eq!(frame.size(), modulator);
         frame
     }
 
     #[test]
     fn a_picture_pixel_for_pixel_lies_in_the_middle_or_is_cut() {
-        let (rgb, depth) = picture(4, 6);
-        let frame = placed((4, 6), (8, 8), Fit::Centre);
+        let (rgb, depth) = picture(Size { width: 6, height: 4 });
+        let frame = placed(Size { width: 6, height: 4 }, Size { width: 8, height: 8 }, Fit::Centre);
         assert_eq!(frame.rgb().slice(s![.., 2..6, 1..7]), rgb);
         assert_eq!(frame.depth().slice(s![2..6, 1..7]), depth);
         assert_eq!(frame.rgb()[(0, 1, 3)], 0.0);
         assert_eq!(frame.depth()[(0, 0)], depth[(0, 0)]);
         assert_eq!(frame.depth()[(7, 7)], depth[(3, 5)]);
-        let cut = placed((4, 6), (2, 2), Fit::Centre);
+        let cut = placed(Size { width: 6, height: 4 }, Size { width: 2, height: 2 }, Fit::Centre);
         assert_eq!(cut.rgb(), rgb.slice(s![.., 1..3, 2..4]));
         assert_eq!(cut.depth(), depth.slice(s![1..3, 2..4]));
     }
 
     #[test]
     fn a_picture_is_shown_whole_or_fills_the_modulator() {
-        let whole = placed((4, 6), (16, 12), Fit::Contain);
+        let whole = placed(
+            Size { width: 6, height: 4 },
+            Size { width: 12, height: 16 },
+            Fit::Contain,
+        );
         assert!(whole.rgb().slice(s![.., ..4, ..]).iter().all(|v| *v == 0.0));
         assert!(whole.rgb().slice(s![1.., 4..12, ..]).iter().all(|v| *v > 0.0));
-        let full = placed((4, 6), (8, 8), Fit::Cover);
+        let full = placed(Size { width: 6, height: 4 }, Size { width: 8, height: 8 }, Fit::Cover);
         assert!(full.rgb().slice(s![1.., .., ..]).iter().all(|v| *v > 0.0));
         // The middle four of six columns are visible, each twice.
-        let (_, depth) = picture(4, 6);
+        let (_, depth) = picture(Size { width: 6, height: 4 });
         assert_eq!(full.depth()[(0, 0)], depth[(0, 1)]);
         assert_eq!(full.depth()[(7, 7)], depth[(3, 4)]);
     }
 
     #[test]
     fn a_picture_as_it_is_stays() {
-        let (rgb, depth) = picture(5, 7);
-        let placement = Placement::as_is((5, 7));
+        let (rgb, depth) = picture(Size { width: 7, height: 5 });
+        let placement = Placement::as_is(Size { width: 7, height: 5 });
         let frame = placement
             .frame(placement.colour(rgb.view()), sampled(&placement, &depth))
             .unwrap();

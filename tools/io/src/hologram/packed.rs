@@ -10,6 +10,7 @@ use crate::picture::{PngShape, open_image, pending_png};
 use crate::{Error, Result};
 use image::DynamicImage;
 use ndarray::Array3;
+use phasefront::Size;
 use phasefront::output::Packing;
 use phasefront::output::{BitPlanes, Layout, Levels, Output, Placement};
 use std::path::{Path, PathBuf};
@@ -34,7 +35,7 @@ pub fn colour(name: &str, colours: usize) -> Result<usize> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
     /// The height and width, (H, W).
-    pub shape: (usize, usize),
+    pub size: Size,
     /// The rows of pixels, with 16-bit values big-endian.
     pub bytes: Vec<u8>,
     /// The pixel format.
@@ -67,13 +68,13 @@ impl Image {
             Kind::Grey => (png::ColorType::Grayscale, png::BitDepth::Eight),
             Kind::Grey16 => (png::ColorType::Grayscale, png::BitDepth::Sixteen),
         };
-        let shape = PngShape {
-            width: self.shape.1,
-            height: self.shape.0,
+        let size = PngShape {
+            width: self.size.width,
+            height: self.size.height,
             color,
             depth,
         };
-        pending_png(path, shape, &self.bytes, &[])
+        pending_png(path, size, &self.bytes, &[])
     }
 
     /// Reads a PNG or BMP.
@@ -82,7 +83,10 @@ impl Image {
     /// Returns an error if the file is missing, truncated, or of another kind.
     pub fn read(path: &Path) -> Result<Self> {
         let image = open_image(path)?;
-        let shape = (image.height() as usize, image.width() as usize);
+        let size = Size {
+            width: image.width() as usize,
+            height: image.height() as usize,
+        };
         let (bytes, kind) = match image {
             DynamicImage::ImageRgb8(rgb) => (rgb.into_raw(), Kind::Rgb),
             DynamicImage::ImageLuma8(grey) => (grey.into_raw(), Kind::Grey),
@@ -100,7 +104,7 @@ impl Image {
                 ));
             }
         };
-        Ok(Image { shape, bytes, kind })
+        Ok(Image { size, bytes, kind })
     }
 }
 
@@ -119,33 +123,29 @@ fn swap(kind: Kind, bytes: &mut [u8]) {
     }
 }
 
-fn output(display: &DisplayFile, shape: (usize, usize), layout: Layout) -> Result<Output> {
+fn output(display: &DisplayFile, size: Size, layout: Layout) -> Result<Output> {
     let placement = Placement {
         flip_x: display.device.flip_x,
         flip_y: display.device.flip_y,
         ..Placement::centred(layout)
     };
-    Ok(Output::new(&display.target, shape, placement)?)
+    Ok(Output::new(&display.target, size, placement)?)
 }
 
 /// Plans the bit planes of a modulator of `cells` for a hologram of (H, W) that covers every pixel.
 ///
 /// # Errors
 /// Returns an error if the hologram has another size.
-pub fn bit_planes(
-    display: &DisplayFile,
-    shape: (usize, usize),
-    cells: &phasefront::output::Cells,
-) -> Result<BitPlanes> {
-    let modulator = (display.device.display.height(), display.device.display.width());
-    if shape != modulator {
+pub fn bit_planes(display: &DisplayFile, size: Size, cells: &phasefront::output::Cells) -> Result<BitPlanes> {
+    let modulator = display.device.display.size();
+    if size != modulator {
         return Err(Error::Input(format!(
             "a hologram of {}×{} for a modulator of {}×{} pixels; for bit planes both must be of one size",
-            shape.1, shape.0, modulator.1, modulator.0
+            size.width, size.height, modulator.width, modulator.height
         )));
     }
     let device = &display.device;
-    Ok(BitPlanes::new(cells, shape, device.flip_x, device.flip_y))
+    Ok(BitPlanes::new(cells, size, device.flip_x, device.flip_y))
 }
 
 /// Packs a phase-only hologram into one image, or one image for each colour.
@@ -154,7 +154,7 @@ pub fn bit_planes(
 /// Returns an error if the hologram is complex, is larger than the modulator, or was made for another display.
 pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     hologram.check_display(display)?;
-    let shape = hologram.shape();
+    let size = hologram.size();
     let colours = display.device.display.colours();
     let Hologram::Levels(levels, _) = hologram else {
         return Err(Error::Input(
@@ -163,14 +163,14 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     };
     match (&display.device.packing, levels.view()) {
         (Packing::Images(layout), levels) => {
-            let output = output(display, shape, *layout)?;
+            let output = output(display, size, *layout)?;
             (0..layout.images(colours))
                 .map(|image| {
                     let mut bytes = vec![0; output.image_bytes()];
                     output.write(levels, image, &mut bytes, output.row_bytes())?;
                     swap(kind(*layout), &mut bytes);
                     Ok(Image {
-                        shape: output.shape(),
+                        size: output.size(),
                         bytes,
                         kind: kind(*layout),
                     })
@@ -178,8 +178,8 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
                 .collect()
         }
         (Packing::BitPlanes(cells), Levels::Bytes(levels)) => {
-            let plan = bit_planes(display, shape, cells)?;
-            let maps: Vec<&[u8]> = levels.chunks_exact(shape.0 * shape.1).collect();
+            let plan = bit_planes(display, size, cells)?;
+            let maps: Vec<&[u8]> = levels.chunks_exact(size.height * size.width).collect();
             Ok(vec![pack_maps(&plan, &maps)?])
         }
         _ => Err(Error::Input("levels of over 8 bits have no bit planes".into())),
@@ -192,42 +192,42 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
 /// Returns an error if the number of maps does not divide 24.
 pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
     let mut bytes = vec![0; plan.frame_bytes()];
-    plan.pack(maps, &mut bytes, 3 * plan.frame_shape().1)?;
+    plan.pack(maps, &mut bytes, 3 * plan.frame_size().width)?;
     Ok(Image {
-        shape: plan.frame_shape(),
+        size: plan.frame_size(),
         bytes,
         kind: Kind::Rgb,
     })
 }
 
-/// Extracts the levels, (C, H, W) = (C, `shape`), from the centre of the modulator in `images`.
+/// Extracts the levels, (C, H, W), of `size`, from the centre of the modulator in `images`.
 ///
 /// # Errors
 /// Returns an error if the images have another number, size or kind.
-pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) -> Result<Array3<u16>> {
+pub fn unpack(images: &[Image], display: &DisplayFile, size: Size) -> Result<Array3<u16>> {
     let colours = display.device.display.colours();
-    let mut levels = Array3::zeros((colours, shape.0, shape.1));
+    let mut levels = Array3::zeros((colours, size.height, size.width));
     let values = levels.as_slice_mut().expect("standard layout");
-    let fits = |count: usize, shape: (usize, usize), kind: Kind| match images {
+    let fits = |count: usize, size: Size, kind: Kind| match images {
         all if all.len() != count => Err(Error::Input(format!(
             "{} images; the display's packing has {count}",
             all.len()
         ))),
         all => all
             .iter()
-            .find(|image| (image.shape, image.kind) != (shape, kind))
+            .find(|image| (image.size, image.kind) != (size, kind))
             .map_or(Ok(()), |image| {
                 Err(Error::Input(format!(
                     "a frame of {}×{} {:?}; the display's are {}×{} {kind:?}",
-                    image.shape.1, image.shape.0, image.kind, shape.1, shape.0
+                    image.size.width, image.size.height, image.kind, size.width, size.height
                 )))
             }),
     };
     match &display.device.packing {
         Packing::BitPlanes(cells) => {
-            let plan = bit_planes(display, shape, cells)?;
-            fits(1, plan.frame_shape(), Kind::Rgb)?;
-            let mut plane = vec![0; shape.0 * shape.1];
+            let plan = bit_planes(display, size, cells)?;
+            fits(1, plan.frame_size(), Kind::Rgb)?;
+            let mut plane = vec![0; size.height * size.width];
             for (colour, values) in values.chunks_exact_mut(plane.len()).enumerate() {
                 plan.unpack(&images[0].bytes, 8 * colour, &mut plane)?;
                 values
@@ -237,8 +237,8 @@ pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) ->
             }
         }
         Packing::Images(layout) => {
-            let output = output(display, shape, *layout)?;
-            fits(layout.images(colours), output.shape(), kind(*layout))?;
+            let output = output(display, size, *layout)?;
+            fits(layout.images(colours), output.size(), kind(*layout))?;
             for (n, image) in images.iter().enumerate() {
                 let mut bytes = image.bytes.clone();
                 swap(image.kind, &mut bytes);

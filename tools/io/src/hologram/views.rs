@@ -7,6 +7,7 @@ use crate::{Error, Result};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront::target::Aberration;
 use phasefront_core::optics::aperture::Opening;
 use phasefront_core::optics::asm::Propagator;
@@ -20,11 +21,10 @@ impl AberratedOptics {
     ///
     /// # Errors
     /// Returns an error if the shape is empty or the correction has another number of colours.
-    pub fn new((height, width): (usize, usize), display: &Display, correction: &Aberration) -> Result<Self> {
+    pub fn new(Size { width, height }: Size, display: &Display, correction: &Aberration) -> Result<Self> {
         let pitch_m = display.pitch_m();
         let plans = Propagator::for_colours_corrected(
-            height,
-            width,
+            Size { width, height },
             pitch_m,
             display.wavelengths_m(),
             0.0,
@@ -46,12 +46,12 @@ impl AberratedOptics {
 
 impl Hologram {
     /// Returns the height and width, (H, W).
-    pub fn shape(&self) -> (usize, usize) {
+    pub fn size(&self) -> Size {
         let (_, height, width) = match self {
             Hologram::Levels(levels, _) => levels.dim(),
             Hologram::Complex(field, _) => field.dim(),
         };
-        (height, width)
+        Size { width, height }
     }
 
     /// Returns the info stored with the hologram.
@@ -116,8 +116,8 @@ impl Hologram {
     /// Returns the errors of [`Self::views`], and an error if the hologram was made for another display, if a table is
     /// for fewer pixels, or if the aberration changes over depth or over the frame.
     pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
-        let shape = self.shape();
-        let (height, width) = shape;
+        let size = self.size();
+        let Size { width, height } = size;
         let info = self.info();
         self.check_display(file)?;
         z_m.iter().try_for_each(|z| check_z(&info.display, *z))?;
@@ -125,7 +125,7 @@ impl Hologram {
             Hologram::Complex(field, _) => (field.clone(), None),
             Hologram::Levels(levels, _) => {
                 let opening = Opening::centred(file.target.display.aperture_radius());
-                let field = shown_field(levels.view(), info.scale.unwrap_or(1.0), &file.target, shape)?;
+                let field = shown_field(levels.view(), info.scale.unwrap_or(1.0), &file.target, size)?;
                 let field = Array3::from_shape_vec(levels.dim(), field).expect("a value for each level");
                 (field, Some(opening))
             }
@@ -133,14 +133,14 @@ impl Hologram {
         if let Some(AberrationFile::Uniform(all)) = &file.aberration
             && let Some(correction) = all.constant()
         {
-            let optics = AberratedOptics::new(shape, &info.display, &correction)?;
+            let optics = AberratedOptics::new(size, &info.display, &correction)?;
             optics.pass(field.as_slice_mut().expect("standard layout"));
         } else if file.aberration.is_some() {
             return Err(Error::Input(
                 "the display's aberration changes over depth or over the frame; such views cannot be made yet, leave the aberration out of the display's file".into(),
             ));
         }
-        let plan = Refocus::new(height, width, &info.display, z_m, aperture)?;
+        let plan = Refocus::new(size, &info.display, z_m, aperture)?;
         let views = plan.focal_stack(field.as_slice().expect("standard layout"), z_m)?;
         Ok(views
             .into_iter()

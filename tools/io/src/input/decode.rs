@@ -7,6 +7,7 @@ use image::codecs::png::PngDecoder;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
 use ndarray::{Array2, Axis};
+use phasefront::Size;
 use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 use tiff::ColorType;
@@ -253,6 +254,10 @@ fn tiff<R: BufRead + Seek>(from: R, how: Reading) -> Said<Decoded> {
     let mut decoder = Decoder::new(from).map_err(broken)?.with_limits(limits);
     let (width, height) = decoder.dimensions().map_err(broken)?;
     check(width.into(), height.into(), how.most_pixels)?;
+    let size = Size {
+        width: width as usize,
+        height: height as usize,
+    };
     let colours = decoder.colortype().map_err(broken)?;
     let number = |decoder: &mut Decoder<R>, tag| decoder.find_tag_unsigned::<u16>(tag).map_err(broken);
     let orientation = number(&mut decoder, Tag::Orientation)?
@@ -262,14 +267,15 @@ fn tiff<R: BufRead + Seek>(from: R, how: Reading) -> Said<Decoded> {
         return Err("is a TIFF that holds its colours one after the other; save it with interleaved colours".into());
     }
     let values = decoder.read_image().map_err(broken)?;
-    let pixels = tiff_pixels(values, colours, width, height).ok_or_else(|| {
+    let pixels = tiff_pixels(values, colours, size).ok_or_else(|| {
         format!("is a TIFF of {colours:?}; grey of 8 to 64 bits is read, grey with alpha, RGB and RGBA of 8 and 16")
     })?;
     Ok(Decoded { pixels, orientation })
 }
 
 /// Returns the pixels of a TIFF if their type is supported.
-fn tiff_pixels(values: DecodingResult, colours: ColorType, width: u32, height: u32) -> Option<Pixels> {
+fn tiff_pixels(values: DecodingResult, colours: ColorType, size: Size) -> Option<Pixels> {
+    let (width, height) = (size.width as u32, size.height as u32);
     use DecodingResult::{U8, U16};
     let image = match (values, colours) {
         (U8(v), ColorType::Gray(8)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageLuma8),
@@ -280,7 +286,7 @@ fn tiff_pixels(values: DecodingResult, colours: ColorType, width: u32, height: u
         (U16(v), ColorType::GrayA(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageLumaA16),
         (U16(v), ColorType::RGB(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageRgb16),
         (U16(v), ColorType::RGBA(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageRgba16),
-        (values, ColorType::Gray(_)) => return tiff_plane(values, (height as usize, width as usize)),
+        (values, ColorType::Gray(_)) => return tiff_plane(values, size.shape()),
         _ => None,
     };
     image.map(Pixels::Image)

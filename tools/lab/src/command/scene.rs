@@ -1,6 +1,7 @@
 //! `phasefront-lab scene` renders a random scene, or a model from a file, as a layered depth image.
 
 use clap::Args;
+use phasefront::Size;
 use phasefront_command::flags::{OverwriteFlag, parse_size};
 use phasefront_command::terminal;
 use phasefront_io::{Result, output};
@@ -21,7 +22,7 @@ pub(crate) struct Scene {
     model: Option<PathBuf>,
     /// Width and height, pixels
     #[arg(long, value_name = "WxH", default_value = "384x384", value_parser = parse_size)]
-    size: (usize, usize),
+    size: Size,
     /// Layers: the number of hits kept along a line of sight
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=64))]
     layers: u8,
@@ -44,15 +45,14 @@ const LIGHT: Light = Light {
 impl Scene {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         output::folder(&self.output, self.overwrite.holding())?;
-        let (width, height) = self.size;
         let layers = self.layers.into();
         let scene = match &self.model {
-            Some(path) => scene::read_model(path, height, width, Some(LIGHT))?,
-            None => scene::random_scene(self.seed.unwrap_or(0), height, width),
+            Some(path) => scene::read_model(path, self.size, Some(LIGHT))?,
+            None => scene::random_scene(self.seed.unwrap_or(0), self.size),
         };
         let ldi = match self.gpu {
-            true => scene::DepthPeeler::new()?.render(&scene, height, width, layers)?,
-            false => scene::render_ldi_reference(&scene, height, width, layers)?,
+            true => scene::DepthPeeler::new()?.render(&scene, self.size, layers)?,
+            false => scene::render_ldi_reference(&scene, self.size, layers)?,
         };
         output::make_folder(&self.output)?;
         ldi.write(&self.output)?;

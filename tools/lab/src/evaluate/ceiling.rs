@@ -8,6 +8,7 @@
 
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_io::Result;
 use phasefront_io::dice::Dice;
@@ -38,7 +39,16 @@ impl Ceiling {
     pub(crate) fn new(size: usize, display: &Display) -> Result<Self> {
         let ways = |distance_m: f64| {
             let (pitch_m, colours) = (display.pitch_m(), display.wavelengths_m());
-            Propagator::for_colours(size, size, pitch_m, colours, distance_m, Padding::Reach)
+            Propagator::for_colours(
+                Size {
+                    width: size,
+                    height: size,
+                },
+                pitch_m,
+                colours,
+                distance_m,
+                Padding::Reach,
+            )
         };
         let depths = (0..PLANES).map(|i| (i as f64 + 0.5) / PLANES as f64);
         let z_m = std::iter::once(0.0).chain(depths.map(|depth| display.z_of_depth(depth)));

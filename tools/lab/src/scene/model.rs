@@ -7,6 +7,7 @@ mod obj_file;
 mod part;
 
 pub use part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES};
+use phasefront::Size;
 
 use crate::scene::model::part::Part;
 use crate::scene::shapes::Light;
@@ -20,7 +21,7 @@ const FILL: f64 = 0.9;
 /// The fraction of the volume's depth that a model fills.
 const DEPTH_FILL: f64 = 0.96;
 
-/// Reads a model from a `.gltf`, `.glb` or `.obj` file as a scene for a frame of `height` x `width` pixels. The model
+/// Reads a model from a `.gltf`, `.glb` or `.obj` file as a scene for a frame of `size`. The model
 /// is upright, seen along its −z axis, in the middle of the frame and as large as fits. Its depth is stretched or
 /// compressed to the volume. With a light, the vertex colours contain Lambert's shading.
 ///
@@ -31,7 +32,8 @@ const DEPTH_FILL: f64 = 0.96;
 /// The error names the file. Reading fails if the file does not exist, is not a model of its format, has no triangles,
 /// has numbers that are not finite, has no height and width, exceeds [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or
 /// names a picture that cannot be read.
-pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
+pub fn read_model(path: &Path, size: Size, light: Option<Light>) -> Result<Scene> {
+    let Size { width, height } = size;
     output::reading(path)?;
     let fail = |reason: String| Error::file(path, reason);
     let about = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?;
@@ -55,7 +57,7 @@ pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>
         _ => Err("not a model file by its name; .gltf, .glb and .obj are read".into()),
     };
     let parts = parts.map_err(fail)?;
-    let frame = Frame::around(&parts, height, width).map_err(fail)?;
+    let frame = Frame::around(&parts, Size { width, height }).map_err(fail)?;
     let scene = Scene {
         meshes: parts.into_iter().flat_map(|part| sides(part, &frame, light)).collect(),
     };
@@ -73,7 +75,8 @@ struct Frame {
 }
 
 impl Frame {
-    fn around(parts: &[Part], height: usize, width: usize) -> std::result::Result<Self, String> {
+    fn around(parts: &[Part], size: Size) -> std::result::Result<Self, String> {
+        let Size { width, height } = size;
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         // Only vertices of triangles are visible.
         let corners = parts

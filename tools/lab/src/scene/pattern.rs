@@ -2,36 +2,37 @@
 //! [`Texture`]. Most patterns repeat without a seam; the documentation of the others says so.
 
 use crate::scene::Texture;
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 
 /// One value in [0, 1] per texel, row by row.
 #[derive(Debug, Clone)]
 pub struct Pattern {
-    width: usize,
-    height: usize,
+    size: Size,
     values: Vec<f32>,
 }
 
 impl Pattern {
     /// Makes the pattern whose texel at (x, y), in texels, is `value(x, y)`, clamped to [0, 1]. Neither size may be
     /// zero.
-    pub fn from_fn((width, height): (usize, usize), mut value: impl FnMut(usize, usize) -> f32) -> Self {
+    pub fn from_fn(size: Size, mut value: impl FnMut(usize, usize) -> f32) -> Self {
+        let Size { width, height } = size;
         let mut values = Vec::with_capacity(width * height);
         for y in 0..height {
             values.extend((0..width).map(|x| value(x, y).clamp(0.0, 1.0)));
         }
-        Self { width, height, values }
+        Self { size, values }
     }
 
     /// Returns the value at column `x` and row `y`.
     pub fn at(&self, x: usize, y: usize) -> f32 {
-        self.values[y * self.width + x]
+        self.values[y * self.size.width + x]
     }
 
     /// Makes value noise of several octaves, stretched to [0, 1]. The first octave has `cells` lattice cells across and
     /// down. Each further octave has twice as many, with a weight of `roughness` times the weight before.
-    pub fn noise(size: (usize, usize), cells: (usize, usize), octaves: u32, roughness: f32, dice: &mut Dice) -> Self {
-        let (width, height) = size;
+    pub fn noise(size: Size, cells: (usize, usize), octaves: u32, roughness: f32, dice: &mut Dice) -> Self {
+        let Size { width, height } = size;
         let mut values = vec![0.0f32; width * height];
         let mut weight = 1.0;
         let mut blended = Vec::new();
@@ -61,30 +62,33 @@ impl Pattern {
             .fold((f32::MAX, f32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
         let span = (high - low).max(1e-6);
         values.iter_mut().for_each(|v| *v = (*v - low) / span);
-        Self { width, height, values }
+        Self { size, values }
     }
 
     /// Makes `waves` stripes across and down, bent by noise of amplitude `bend` stripes. `softness` in (0, 1] is the
     /// fraction of a stripe that its edge takes.
-    pub fn stripes(size: (usize, usize), waves: (i32, i32), bend: f32, softness: f32, dice: &mut Dice) -> Self {
+    pub fn stripes(size: Size, waves: (i32, i32), bend: f32, softness: f32, dice: &mut Dice) -> Self {
         let noise = (bend > 0.0).then(|| Self::noise(size, (3, 3), 3, 0.5, dice));
         Self::from_fn(size, |x, y| {
-            let (u, v) = ((x as f32 + 0.5) / size.0 as f32, (y as f32 + 0.5) / size.1 as f32);
+            let (u, v) = (
+                (x as f32 + 0.5) / size.width as f32,
+                (y as f32 + 0.5) / size.height as f32,
+            );
             let bent = noise.as_ref().map_or(0.0, |noise| bend * noise.at(x, y));
             wave(u * waves.0 as f32 + v * waves.1 as f32 + bent, softness)
         })
     }
 
     /// Makes a checkerboard of `fields` across and down. Even numbers repeat without a seam.
-    pub fn checks(size: (usize, usize), fields: (usize, usize)) -> Self {
+    pub fn checks(size: Size, fields: (usize, usize)) -> Self {
         Self::from_fn(size, |x, y| {
-            ((x * fields.0 / size.0 + y * fields.1 / size.1) % 2) as f32
+            ((x * fields.0 / size.width + y * fields.1 / size.height) % 2) as f32
         })
     }
 
     /// Makes stripes of any `period`, in texels, whose waves run at `angle` (radians) to the rows. `softness` is as in
     /// [`stripes`](Self::stripes). The pattern repeats with a seam.
-    pub fn slanted_stripes(size: (usize, usize), period: f64, angle: f64, softness: f32) -> Self {
+    pub fn slanted_stripes(size: Size, period: f64, angle: f64, softness: f32) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self::from_fn(size, |x, y| {
             wave(((cos * x as f64 + sin * y as f64) / period) as f32, softness)
@@ -93,7 +97,7 @@ impl Pattern {
 
     /// Makes a checkerboard whose fields are `side` texels wide and turned by `angle`, in radians. The pattern repeats
     /// with a seam.
-    pub fn slanted_checks(size: (usize, usize), side: f64, angle: f64) -> Self {
+    pub fn slanted_checks(size: Size, side: f64, angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self::from_fn(size, |x, y| {
             let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
@@ -103,10 +107,10 @@ impl Pattern {
     }
 
     /// Draws `count` points of value 1 on 0 at random positions, with a radius of `radius` texels.
-    pub fn points(size: (usize, usize), count: usize, radius: f32, dice: &mut Dice) -> Self {
+    pub fn points(size: Size, count: usize, radius: f32, dice: &mut Dice) -> Self {
         let mut pattern = Self::from_fn(size, |_, _| 0.0);
         for _ in 0..count {
-            let at = [size.0, size.1].map(|n| dice.range(0.0, n as f64) as f32);
+            let at = [size.width, size.height].map(|n| dice.range(0.0, n as f64) as f32);
             pattern.stroke(at, at, radius);
         }
         pattern
@@ -114,14 +118,14 @@ impl Pattern {
 
     /// Makes a wall: `courses` rows of `bricks`, with every second row shifted by half a brick. Each brick has its own
     /// tone in [0.35, 1]. Joints have value 0 and a width of `joint` times a course.
-    pub fn bricks(size: (usize, usize), bricks: usize, courses: usize, joint: f32, dice: &mut Dice) -> Self {
+    pub fn bricks(size: Size, bricks: usize, courses: usize, joint: f32, dice: &mut Dice) -> Self {
         let tones: Vec<f32> = (0..bricks * courses).map(|_| dice.range(0.35, 1.0) as f32).collect();
         // Makes joints as wide across as down.
-        let aspect = (size.0 as f32 / bricks as f32) / (size.1 as f32 / courses as f32);
+        let aspect = (size.width as f32 / bricks as f32) / (size.height as f32 / courses as f32);
         Self::from_fn(size, |x, y| {
-            let v = (y as f32 + 0.5) / size.1 as f32 * courses as f32;
+            let v = (y as f32 + 0.5) / size.height as f32 * courses as f32;
             let row = (v as usize).min(courses - 1);
-            let u = (x as f32 + 0.5) / size.0 as f32 * bricks as f32 + 0.5 * (row % 2) as f32;
+            let u = (x as f32 + 0.5) / size.width as f32 * bricks as f32 + 0.5 * (row % 2) as f32;
             let (in_u, in_v) = (u.fract(), v.fract());
             if in_v < joint || in_u * aspect < joint {
                 0.0
@@ -133,11 +137,11 @@ impl Pattern {
 
     /// Makes discs of value 1 on 0 on a jittered grid of `count` per side. The mean radius is `radius` times a grid
     /// cell, and single radii differ from it by up to half.
-    pub fn spots(size: (usize, usize), count: usize, radius: f32, dice: &mut Dice) -> Self {
+    pub fn spots(size: Size, count: usize, radius: f32, dice: &mut Dice) -> Self {
         let points = jittered(dice, count);
         let radii: Vec<f32> = points.iter().map(|_| radius * dice.range(0.5, 1.5) as f32).collect();
         // The width of a texel in cells. The discs' edges are one texel soft.
-        let soft = count as f32 / size.0.min(size.1) as f32;
+        let soft = count as f32 / size.width.min(size.height) as f32;
         Self::from_fn(size, |x, y| {
             let mut value = 0.0f32;
             around(size, count, x, y, &points, |index, distance| {
@@ -149,7 +153,7 @@ impl Pattern {
 
     /// Makes cells around the points of a jittered grid of `count` per side. Each cell has its own tone, and borders
     /// have value 0.
-    pub fn cells(size: (usize, usize), count: usize, border: f32, dice: &mut Dice) -> Self {
+    pub fn cells(size: Size, count: usize, border: f32, dice: &mut Dice) -> Self {
         let points = jittered(dice, count);
         let tones: Vec<f32> = points.iter().map(|_| dice.range(0.2, 1.0) as f32).collect();
         Self::from_fn(size, |x, y| {
@@ -167,35 +171,35 @@ impl Pattern {
 
     /// Makes rings around the middle, `count` of them to the edge, bent by noise of amplitude `bend` rings, like wood
     /// or targets.
-    pub fn rings(size: (usize, usize), count: f32, bend: f32, softness: f32, dice: &mut Dice) -> Self {
+    pub fn rings(size: Size, count: f32, bend: f32, softness: f32, dice: &mut Dice) -> Self {
         let noise = (bend > 0.0).then(|| Self::noise(size, (3, 3), 3, 0.5, dice));
         Self::from_fn(size, |x, y| {
-            let u = 2.0 * (x as f32 + 0.5) / size.0 as f32 - 1.0;
-            let v = 2.0 * (y as f32 + 0.5) / size.1 as f32 - 1.0;
+            let u = 2.0 * (x as f32 + 0.5) / size.width as f32 - 1.0;
+            let v = 2.0 * (y as f32 + 0.5) / size.height as f32 - 1.0;
             let bent = noise.as_ref().map_or(0.0, |noise| bend * noise.at(x, y));
             wave((u * u + v * v).sqrt() * count + bent, softness)
         })
     }
 
     /// Makes a linear gradient from 1 to 0 and back, `turns` (across, down) times.
-    pub fn gradient(size: (usize, usize), turns: (i32, i32)) -> Self {
+    pub fn gradient(size: Size, turns: (i32, i32)) -> Self {
         Self::from_fn(size, |x, y| {
-            let t =
-                (x as f32 + 0.5) / size.0 as f32 * turns.0 as f32 + (y as f32 + 0.5) / size.1 as f32 * turns.1 as f32;
+            let t = (x as f32 + 0.5) / size.width as f32 * turns.0 as f32
+                + (y as f32 + 0.5) / size.height as f32 * turns.1 as f32;
             (2.0 * (t - t.floor()) - 1.0).abs()
         })
     }
 
     /// Makes lines of writing in no language: glyphs of a few straight strokes, value 1 on 0. There are `lines` rows,
     /// and strokes are `thickness` times a line wide. The pattern repeats with a seam.
-    pub fn strokes(size: (usize, usize), lines: usize, thickness: f32, dice: &mut Dice) -> Self {
+    pub fn strokes(size: Size, lines: usize, thickness: f32, dice: &mut Dice) -> Self {
         let mut pattern = Self::from_fn(size, |_, _| 0.0);
-        let line = size.1 as f32 / lines as f32;
+        let line = size.height as f32 / lines as f32;
         let (glyph_height, pen) = (0.62 * line, (0.5 * thickness * line).max(0.4));
         for row in 0..lines {
             let top = (row as f32 + 0.19) * line;
             let mut left = 0.3 * line;
-            while left + 0.5 * line < size.0 as f32 {
+            while left + 0.5 * line < size.width as f32 {
                 let glyph_width = dice.range(0.3, 0.6) as f32 * line;
                 // Strokes join points of a grid of 3 by 3. Each stroke starts at the end of the one before.
                 let mut from = (dice.integer(0, 2), dice.integer(0, 2));
@@ -223,12 +227,12 @@ impl Pattern {
             let high = (from[axis].max(to[axis]) + pen + 1.0).clamp(0.0, size as f32) as usize;
             low..high
         };
-        for y in span(1, self.height) {
-            for x in span(0, self.width) {
+        for y in span(1, self.size.height) {
+            for x in span(0, self.size.width) {
                 let p = [x as f32 + 0.5 - from[0], y as f32 + 0.5 - from[1]];
                 let t = ((p[0] * along[0] + p[1] * along[1]) / square).clamp(0.0, 1.0);
                 let (dx, dy) = (p[0] - t * along[0], p[1] - t * along[1]);
-                let value = &mut self.values[y * self.width + x];
+                let value = &mut self.values[y * self.size.width + x];
                 *value = value.max((pen - (dx * dx + dy * dy).sqrt() + 0.5).clamp(0.0, 1.0));
             }
         }
@@ -236,9 +240,9 @@ impl Pattern {
 
     /// Returns the pattern with each value moved toward that of `other` by `amount`. A smaller `other` repeats.
     pub fn mixed(&self, other: &Self, amount: f32) -> Self {
-        Self::from_fn((self.width, self.height), |x, y| {
+        Self::from_fn(self.size, |x, y| {
             let value = self.at(x, y);
-            value + (other.at(x % other.width, y % other.height) - value) * amount
+            value + (other.at(x % other.size.width, y % other.size.height) - value) * amount
         })
     }
 
@@ -251,7 +255,7 @@ impl Pattern {
             let [r, g, b] = std::array::from_fn(|c| ((from[c] + (to[c] - from[c]) * t) * 255.0 + 0.5) as u8);
             [r, g, b, 255]
         };
-        Texture::sized(self.width, self.height, self.values.iter().map(texel).collect())
+        Texture::sized(self.size, self.values.iter().map(texel).collect())
     }
 
     /// Returns `texture` with holes where the value is below one half. A smaller pattern repeats.
@@ -259,9 +263,15 @@ impl Pattern {
         let mut texels = texture.texels().to_vec();
         for (index, texel) in texels.iter_mut().enumerate() {
             let (x, y) = (index % texture.width(), index / texture.width());
-            texel[3] = (self.at(x % self.width, y % self.height) * 255.0 + 0.5) as u8;
+            texel[3] = (self.at(x % self.size.width, y % self.size.height) * 255.0 + 0.5) as u8;
         }
-        Texture::sized(texture.width(), texture.height(), texels)
+        Texture::sized(
+            Size {
+                width: texture.width(),
+                height: texture.height(),
+            },
+            texels,
+        )
     }
 }
 
@@ -292,16 +302,9 @@ fn jittered(dice: &mut Dice, count: usize) -> Vec<[f32; 2]> {
 }
 
 /// Calls `visit(index, distance in cells)` for the points of the texel's own grid cell and of the eight around it.
-fn around(
-    size: (usize, usize),
-    count: usize,
-    x: usize,
-    y: usize,
-    points: &[[f32; 2]],
-    mut visit: impl FnMut(usize, f32),
-) {
-    let u = (x as f32 + 0.5) / size.0 as f32 * count as f32;
-    let v = (y as f32 + 0.5) / size.1 as f32 * count as f32;
+fn around(size: Size, count: usize, x: usize, y: usize, points: &[[f32; 2]], mut visit: impl FnMut(usize, f32)) {
+    let u = (x as f32 + 0.5) / size.width as f32 * count as f32;
+    let v = (y as f32 + 0.5) / size.height as f32 * count as f32;
     let (i, j) = (u as usize, v as usize);
     for dj in 0..3 {
         for di in 0..3 {

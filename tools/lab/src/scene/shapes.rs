@@ -55,20 +55,20 @@ impl Shape {
         Self::grid(1, 1, |u, v| [2.0 * u - 1.0, 2.0 * v - 1.0, 0.0])
     }
 
-    /// Makes a sheet of `columns` x `rows` pieces with points `point(u, v)`, u and v in [0, 1]. It is visible from the
+    /// Makes a sheet of pieces, `across` x `down`, with points `point(u, v)`, u and v in [0, 1]. It is visible from the
     /// side on which u runs right and v runs up. The texture's top is at v = 1.
-    pub fn grid(columns: usize, rows: usize, point: impl Fn(f64, f64) -> [f64; 3]) -> Self {
+    pub fn grid(across: usize, down: usize, point: impl Fn(f64, f64) -> [f64; 3]) -> Self {
         let mut shape = Self::default();
-        for j in 0..=rows {
-            for i in 0..=columns {
-                let (u, v) = (i as f64 / columns as f64, j as f64 / rows as f64);
+        for j in 0..=down {
+            for i in 0..=across {
+                let (u, v) = (i as f64 / across as f64, j as f64 / down as f64);
                 shape.positions.push(point(u, v));
                 shape.uv.push([u, 1.0 - v]);
             }
         }
-        let at = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
-        for j in 0..rows {
-            for i in 0..columns {
+        let at = |i: usize, j: usize| (j * (across + 1) + i) as u32;
+        for j in 0..down {
+            for i in 0..across {
                 shape.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
                 shape.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
             }
@@ -90,8 +90,8 @@ impl Shape {
                 (shape.normals[a], shape.normals[b]) = (sum, sum);
             }
         };
-        (0..=rows).for_each(|j| share(at(0, j), at(columns, j)));
-        (0..=columns).for_each(|i| share(at(i, 0), at(i, rows)));
+        (0..=down).for_each(|j| share(at(0, j), at(across, j)));
+        (0..=across).for_each(|i| share(at(i, 0), at(i, down)));
         shape.normals.iter_mut().for_each(|normal| *normal = unit(*normal));
         shape
     }
@@ -370,6 +370,7 @@ mod tests {
 
     use super::*;
     use crate::scene::{Scene, render_ldi_reference};
+    use phasefront::Size;
 
     fn solids() -> Vec<(&'static str, Shape, f64)> {
         let knot = |t: f64| {
@@ -434,7 +435,7 @@ mod tests {
             }),
         };
         let mesh = Shape::cuboid().place(&place, Arc::new(Texture::plain([1.0; 3])));
-        let ldi = render_ldi_reference(&Scene { meshes: vec![mesh] }, 20, 40, 2).unwrap();
+        let ldi = render_ldi_reference(&Scene { meshes: vec![mesh] }, Size { width: 40, height: 20 }, 2).unwrap();
         for ((y, x), &d) in ldi.layers[0].depth.indexed_iter() {
             // After a quarter turn, the box extends 4 pixels to either side and 8 up and down. Its front is 100 px
             // nearer than its middle.
@@ -456,7 +457,7 @@ mod tests {
             [0, 0, 255, 255],
             [255, 255, 255, 255],
         ];
-        let texture = Arc::new(Texture::new(2, 2, texels).unwrap());
+        let texture = Arc::new(Texture::new(Size { width: 2, height: 2 }, texels).unwrap());
         let place = Place {
             scale_px: [8.0; 3],
             rotation: turn([0.0, 0.0, 1.0], 0.0),
@@ -472,7 +473,7 @@ mod tests {
             let scene = Scene {
                 meshes: vec![shape.place(&place, texture.clone())],
             };
-            let ldi = render_ldi_reference(&scene, 16, 16, 1).unwrap();
+            let ldi = render_ldi_reference(&scene, Size { width: 16, height: 16 }, 1).unwrap();
             let seen = |y: usize, x: usize| [0, 1, 2].map(|c| ldi.layers[0].rgb[[c, y, x]].round());
             assert_eq!([seen(4, 4), seen(4, 12)], [[1., 0., 0.], [0., 1., 0.]]);
             assert_eq!([seen(12, 4), seen(12, 12)], [[0., 0., 1.], [1., 1., 1.]]);

@@ -1,5 +1,6 @@
 //! The picture on a mesh, and its sampling.
 
+use phasefront::Size;
 use phasefront_io::{Error, Result};
 
 /// The alpha from which a sampled point of a surface is solid. Below it the surface has a hole.
@@ -15,7 +16,8 @@ pub struct Texture {
 
 impl Texture {
     /// Makes a texture of `texels`, row by row. Returns an error if it is empty or the count is not `width * height`.
-    pub fn new(width: usize, height: usize, texels: Vec<[u8; 4]>) -> Result<Self> {
+    pub fn new(size: Size, texels: Vec<[u8; 4]>) -> Result<Self> {
+        let Size { width, height } = size;
         if texels.is_empty() || width.checked_mul(height) != Some(texels.len()) {
             return Err(Error::Input(format!(
                 "a texture of {width}x{height} cannot hold {} texels",
@@ -26,7 +28,8 @@ impl Texture {
     }
 
     /// Makes a texture like [`new`](Self::new) from texels whose count the caller guarantees to be right and not zero.
-    pub(super) fn sized(width: usize, height: usize, texels: Vec<[u8; 4]>) -> Self {
+    pub(super) fn sized(size: Size, texels: Vec<[u8; 4]>) -> Self {
+        let Size { width, height } = size;
         debug_assert!(!texels.is_empty() && texels.len() == width * height);
         Self { width, height, texels }
     }
@@ -94,8 +97,7 @@ mod tests {
     #[test]
     fn sampling_is_exact_at_centres_linear_between_and_repeats() {
         let texture = Texture::new(
-            2,
-            2,
+            Size { width: 2, height: 2 },
             vec![[0, 0, 0, 255], [255, 0, 0, 255], [0, 255, 0, 255], [255, 255, 51, 0]],
         )
         .unwrap();
@@ -114,8 +116,17 @@ mod tests {
 
     #[test]
     fn wrong_sizes_are_refused() {
-        assert!(Texture::new(0, 0, Vec::new()).is_err());
-        assert!(Texture::new(2, 2, vec![[0; 4]; 3]).is_err());
-        assert!(Texture::new(usize::MAX, 2, vec![[0; 4]; 3]).is_err());
+        assert!(Texture::new(Size { width: 0, height: 0 }, Vec::new()).is_err());
+        assert!(Texture::new(Size { width: 2, height: 2 }, vec![[0; 4]; 3]).is_err());
+        assert!(
+            Texture::new(
+                Size {
+                    width: usize::MAX,
+                    height: 2
+                },
+                vec![[0; 4]; 3]
+            )
+            .is_err()
+        );
     }
 }

@@ -4,6 +4,7 @@
 use crate::scene;
 use crate::sensor::coarse::{Coarse, Sampling};
 use crate::sensor::{FAR_M, Images, NEAR_M, Reading, Sensor, colour_bytes};
+use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthRange, Plane};
 use phasefront::output::Layout;
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
@@ -16,9 +17,15 @@ use serde::Serialize;
 type Process = dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>;
 
 /// The shape, (H, W), of the depth sensor, which is ARKit's.
-const SENSOR: (usize, usize) = (192, 256);
+const SENSOR: Size = Size {
+    width: 256,
+    height: 192,
+};
 /// The shape, (H, W), of the scenes.
-pub const SHAPE: (usize, usize) = (4 * SENSOR.0, 4 * SENSOR.1);
+pub const SIZE: Size = Size {
+    width: 4 * SENSOR.width,
+    height: 4 * SENSOR.height,
+};
 /// The sensor's faults: noise and missing readings, new in each frame.
 const FAULTS: Coarse = Coarse {
     ratio: 4.0,
@@ -109,7 +116,7 @@ pub struct Row {
 /// A scene that does not move, and a reading of its depth for each frame.
 pub struct Standing {
     /// (H, W) of the frames.
-    shape: (usize, usize),
+    size: Size,
     /// The colours, interleaved.
     rgb: Vec<u8>,
     readings: Vec<Images>,
@@ -117,18 +124,18 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Makes `frames` frames of random scene `seed`, of [`SHAPE`], with depth as noisy as a phone's. The session takes
+    /// Makes `frames` frames of random scene `seed`, of [`SIZE`], with depth as noisy as a phone's. The session takes
     /// the range from percentiles.
     ///
     /// # Errors
     /// Returns an error if the scene cannot be rendered.
     pub fn random(seed: u64, frames: usize) -> Result<Self> {
-        let random = scene::random_scene(seed, SHAPE.0, SHAPE.1);
-        let ldi = scene::render_ldi_reference(&random, SHAPE.0, SHAPE.1, 1)?.quantized();
+        let random = scene::random_scene(seed, SIZE);
+        let ldi = scene::render_ldi_reference(&random, SIZE, 1)?.quantized();
         let depth = visible_depth(&ldi);
         let read = |frame| FAULTS.read(depth.view(), seed + 1 + frame).images(RANGE_M.0, RANGE_M.1);
         Ok(Standing {
-            shape: SHAPE,
+            size: SIZE,
             rgb: colour_bytes(&ldi.layers[0].rgb),
             readings: (0..frames as u64).map(read).collect(),
             range: DepthRange::Percentiles,
@@ -142,7 +149,7 @@ impl Standing {
             .map(|frame| sensor.read(depth.view(), seed + frame))
             .collect();
         Standing {
-            shape: depth.dim(),
+            size: Size::from_shape(depth.dim()),
             rgb: colour_bytes(&visible_rgb(ldi)),
             range: readings.first().map_or(DepthRange::Percentiles, Reading::range),
             readings: readings.iter().map(|reading| reading.images(NEAR_M, FAR_M)).collect(),
@@ -168,19 +175,19 @@ pub fn study(
             "a change from frame to frame needs at least two frames".into(),
         ));
     }
-    let (height, width) = standing.shape;
+    let Size { width, height } = standing.size;
     (settings.iter())
         .map(|setting| {
             let process = setting.session(display, method, standing.range)?;
             let mut seen: Vec<Vec<f32>> = Vec::with_capacity(frames);
             for (frame, images) in standing.readings.iter().enumerate() {
                 let colour = Plane::new(&standing.rgb, 3 * width, 3);
-                let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[colour])?;
+                let colour = ColourImage::new(ColourFormat::Rgb, standing.size, &[colour])?;
                 let timestamp = (1 + frame as u64) * 1_000_000_000 / RATE_HZ;
                 let hologram = process(&CameraFrame::new(timestamp, colour, images.depth()?))?;
                 let (height, width) = (height / 2, width / 2);
                 let mut rgba = vec![0; 4 * height * width];
-                hologram.write_preview(0.0, (height, width), Layout::Rgba, &mut rgba, 4 * width)?;
+                hologram.write_preview(0.0, Size { width, height }, Layout::Rgba, &mut rgba, 4 * width)?;
                 // The preview undoes the scale, but the eye sees the light, which is the amplitude divided by the
                 // scale.
                 let light = |byte: &u8| f32::from(*byte) / 255.0 / hologram.scale();

@@ -13,6 +13,7 @@
 use ndarray::{Array2, Array3, Axis, Zip, s};
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_core::optics::asm;
 use phasefront_core::optics::metrics::{self, Comparison};
 use phasefront_core::view::refocus::Refocus;
@@ -120,16 +121,19 @@ pub struct Study {
 /// Makes the paper's scene: four pairs of vertical bars at both ends of the volume. The front bar of each pair hides
 /// the lower half of the rear one. The LDI has two layers of 320×256, which hold the complete scene.
 pub fn two_bars() -> Ldi {
-    const SHAPE: (usize, usize) = (256, 320);
+    const SIZE: Size = Size {
+        width: 320,
+        height: 256,
+    };
     const FRONT_AMPLITUDE: f32 = 0.3;
     const REAR_AMPLITUDE: f32 = 0.6;
     let empty = || LdiLayer {
-        rgb: Array3::zeros((3, SHAPE.0, SHAPE.1)),
-        depth: Array2::from_elem(SHAPE, f32::NAN),
+        rgb: Array3::zeros((3, SIZE.height, SIZE.width)),
+        depth: Array2::from_elem(SIZE.shape(), f32::NAN),
     };
     let mut layers = vec![empty(), empty()];
     let mut bar = |layer: usize, y: std::ops::Range<usize>, amplitude: f32, depth: f32| {
-        for left in (24..SHAPE.1).step_by(80) {
+        for left in (24..SIZE.width).step_by(80) {
             let columns = left..left + 32;
             let place = s![y.clone(), columns.clone()];
             layers[layer].depth.slice_mut(place).fill(depth);
@@ -149,7 +153,7 @@ pub fn two_bars() -> Ldi {
 /// # Errors
 /// Returns an error if the scene has no points or a method fails.
 pub fn study(ldi: &Ldi, display: &Display, planes: usize, progress: &dyn Fn(usize)) -> Result<Study> {
-    let (height, width) = ldi.shape();
+    let Size { width, height } = ldi.size();
     let rasterized = Ldi {
         layers: ldi.layers[..1].to_vec(),
     };
@@ -165,7 +169,7 @@ pub fn study(ldi: &Ldi, display: &Display, planes: usize, progress: &dyn Fn(usiz
     let [front_z_m, rear_z_m] = focuses(ldi, display, planes)?;
     let midpoint = display.clone().with_offset_m(0.0)?;
     let focuses = [front_z_m, rear_z_m];
-    let plan = Refocus::new(height, width, &midpoint, &focuses, None)?;
+    let plan = Refocus::new(ldi.size(), &midpoint, &focuses, None)?;
     let mut views = Vec::with_capacity(SETTINGS.len());
     for hologram in &holograms {
         let values = hologram.as_slice().expect("standard layout");
@@ -236,7 +240,7 @@ impl Regions {
         let nearer = |d: f32| display.z_of_depth(d.into()) > middle;
         let front = ldi.layers[0].depth.mapv(|d| !d.is_nan() && nearer(d));
         let visible = ldi.layers[0].depth.mapv(|d| !d.is_nan() && !nearer(d));
-        let mut hidden = Array2::from_elem(ldi.shape(), false);
+        let mut hidden = Array2::from_elem(ldi.size().shape(), false);
         for layer in &ldi.layers[1..] {
             Zip::from(&mut hidden)
                 .and(&layer.depth)

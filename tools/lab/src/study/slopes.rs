@@ -3,6 +3,7 @@
 use crate::study::sweep_parts::Figures;
 use ndarray::{Array2, Array3, ArrayView3, Axis, concatenate};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::view::refocus::Refocus;
@@ -55,7 +56,15 @@ pub struct Slopes {
 /// Returns an error if the size is 0 or the display cannot be swept.
 pub fn study(size: usize, planes: usize, display: &Display, done: &(dyn Fn() + Sync)) -> Result<Slopes> {
     let z_m = FOCUS.map(|depth| display.z_of_depth(depth));
-    let refocus = Refocus::new(size, size, display, &z_m, None)?;
+    let refocus = Refocus::new(
+        Size {
+            width: size,
+            height: size,
+        },
+        display,
+        &z_m,
+        None,
+    )?;
     let views = |field: Array3<Complex32>| -> Result<Vec<Array3<f32>>> {
         let midpoint = field.mapv(|u| u.norm());
         let stack = refocus.focal_stack(field.as_slice().expect("standard layout"), &z_m)?;
@@ -75,7 +84,15 @@ pub fn study(size: usize, planes: usize, display: &Display, done: &(dyn Fn() + S
         done();
         let (mut rows, mut seen) = (Vec::new(), vec![truth.clone()]);
         for (method, sweep) in &sweeps {
-            let plan = SweepPlan::new(size, size, display, *sweep, 0.0)?;
+            let plan = SweepPlan::new(
+                Size {
+                    width: size,
+                    height: size,
+                },
+                display,
+                *sweep,
+                0.0,
+            )?;
             let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
             plan.field(&frame, values, &mut plan.scratch())?;

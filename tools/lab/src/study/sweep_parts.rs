@@ -8,6 +8,7 @@ use crate::sensor::coarse::{Coarse, Sampling};
 use crate::study::Scenes;
 use ndarray::{Array3, ArrayView3};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::method::sweep;
 use phasefront_core::method::sweep::SweepPlan;
@@ -113,7 +114,15 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
         plans.push(match *how {
             Propagation::Exact { .. } => None,
             Propagation::Sweep { sweep, merged } => {
-                let plan = SweepPlan::new(size, size, display, sweep, 0.0)?;
+                let plan = SweepPlan::new(
+                    Size {
+                        width: size,
+                        height: size,
+                    },
+                    display,
+                    sweep,
+                    0.0,
+                )?;
                 Some(if merged { plan } else { plan.unmerged() })
             }
         });
@@ -255,7 +264,15 @@ pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
         // The sweep goes directly to a near modulator, as in `Method::Sweep`.
         let near = sweep::reaches(&display, display.offset_m());
         let z_m = if near { display.offset_m() } else { 0.0 };
-        let plan = SweepPlan::new(scenes.size, scenes.size, &display, sweep, z_m)?;
+        let plan = SweepPlan::new(
+            Size {
+                width: scenes.size,
+                height: scenes.size,
+            },
+            &display,
+            sweep,
+            z_m,
+        )?;
         let of_scenes = (0..scenes.scenes as u64)
             .into_par_iter()
             .map(|i| {
@@ -307,8 +324,22 @@ fn check(scenes: &Scenes) -> Result<()> {
 
 fn render(scenes: &Scenes, i: u64) -> Result<Ldi> {
     let size = scenes.size;
-    let scene = scene::random_scene(scenes.seed + i, size, size);
-    Ok(scene::render_ldi_reference(&scene, size, size, 5)?.quantized())
+    let scene = scene::random_scene(
+        scenes.seed + i,
+        Size {
+            width: size,
+            height: size,
+        },
+    );
+    Ok(scene::render_ldi_reference(
+        &scene,
+        Size {
+            width: size,
+            height: size,
+        },
+        5,
+    )?
+    .quantized())
 }
 
 /// Computes SM-LBM of the visible layer and the first `hidden` layers that the sweep adds.
@@ -319,7 +350,7 @@ fn exact(frame: &RgbdFrame, display: &Display, hidden: usize, planes: usize) -> 
 }
 
 fn swept(plan: &SweepPlan, frame: &RgbdFrame) -> Result<Array3<Complex32>> {
-    let (height, width) = plan.shape();
+    let Size { width, height } = plan.size();
     let mut field = Array3::zeros((3, height, width));
     let values = field.as_slice_mut().expect("standard layout");
     plan.field(frame, values, &mut plan.scratch())?;
@@ -333,7 +364,7 @@ fn time(plan: &SweepPlan, frame: &RgbdFrame) -> Result<f64> {
         .build()
         .map_err(|e| Error::Input(e.to_string()))?;
     pool.install(|| {
-        let (height, width) = plan.shape();
+        let Size { width, height } = plan.size();
         let mut field = vec![Complex32::ZERO; 3 * height * width];
         let mut scratch = plan.scratch();
         let mut least = f64::INFINITY;
@@ -353,8 +384,7 @@ fn to_modulator(mut field: Array3<Complex32>, display: &Display) -> Result<Array
     }
     let (_, height, width) = field.dim();
     let plans = Propagator::for_colours(
-        height,
-        width,
+        Size { width, height },
         display.pitch_m(),
         display.wavelengths_m(),
         display.offset_m(),

@@ -1,5 +1,6 @@
 //! Tests SM-LBM with aberration correction against Eq. 5 in f64, plane by plane, and against known results.
 use crate::reference;
+use phasefront::Size;
 
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};
@@ -19,20 +20,19 @@ fn hologram(ldi: &Ldi, planes: usize, correction: &Correction) -> Array3<Complex
     corrected::hologram(ldi, &Display::default(), planes, correction, &|_, _| {}).unwrap()
 }
 
-fn random_ldi((h, w): (usize, usize), layers: usize) -> Ldi {
-    let scene = scene::random_scene(7, h, w);
-    scene::render_ldi_reference(&scene, h, w, layers).unwrap()
+fn random_ldi(Size { width: w, height: h }: Size, layers: usize) -> Ldi {
+    let scene = scene::random_scene(7, Size { width: w, height: h });
+    scene::render_ldi_reference(&scene, Size { width: w, height: h }, layers).unwrap()
 }
 
-fn shape_for(ldi: &Ldi) -> (usize, usize) {
-    let (h, w) = ldi.shape();
-    corrected::padded_shape(h, w, &Display::default()).unwrap()
+fn size_for(ldi: &Ldi) -> Size {
+    corrected::padded_size(ldi.size(), &Display::default()).unwrap()
 }
 
 fn plane_of(hologram: &Array3<Complex32>, colour: usize) -> Array2<Complex64> {
     let plane = hologram.index_axis(Axis(0), colour);
     let plane = plane.as_standard_layout();
-    widen(plane.as_slice().unwrap(), plane.dim())
+    widen(plane.as_slice().unwrap(), Size::from_shape(plane.dim()))
 }
 
 /// Returns an asymmetric aberration: a shift, a defocus and an astigmatism, all growing with z.
@@ -47,16 +47,17 @@ fn agrees_with_equation_5_plane_by_plane() {
     let display = Display::default();
     let (volume, pitch) = (display.volume_depth_m(), display.pitch_m());
     for (frame, planes, z_m) in [
-        ((40, 33), 9, vec![-2e-3, 0.5e-3, 1e-3]),
+        (Size { width: 33, height: 40 }, 9, vec![-2e-3, 0.5e-3, 1e-3]),
         (
-            (21, 35),
+            Size { width: 35, height: 21 },
             6,
             (0..6).map(|k| 2.5e-3 - 1e-3 * f64::from(k)).rev().collect(),
         ),
     ] {
         let ldi = random_ldi(frame, 3);
-        let shape = shape_for(&ldi);
-        let correction = Correction::sampled(z_m.clone(), shape, &display, kernel).unwrap();
+        let padded = size_for(&ldi);
+        let shape = padded.shape();
+        let correction = Correction::sampled(z_m.clone(), padded, &display, kernel).unwrap();
         let ours = hologram(&ldi, planes, &correction);
         let z = |k: usize| volume / 2.0 - volume * (k as f64 + 0.5) / planes as f64;
         let plane_of_depth = |d: f32| ((f64::from(d) * planes as f64) as usize).min(planes - 1);
@@ -105,7 +106,7 @@ fn agrees_with_equation_5_plane_by_plane() {
                 }
                 sum += &asm_periodic(&fft2(&spectrum, true), pitch, lambda, -z(k));
             }
-            let expected = sum.slice(s![..frame.0, ..frame.1]).to_owned();
+            let expected = sum.slice(s![..frame.height, ..frame.width]).to_owned();
             let error = relative_error(&plane_of(&ours, colour), &expected);
             assert!(error < 1e-4, "{frame:?}, colour {colour}: {error:e}");
         }
@@ -114,10 +115,10 @@ fn agrees_with_equation_5_plane_by_plane() {
 
 #[test]
 fn kernels_of_one_change_nothing() {
-    let ldi = random_ldi((61, 47), 3);
+    let ldi = random_ldi(Size { width: 47, height: 61 }, 3);
     let plain = sm_lbm::hologram(&ldi, &Display::default(), 64, &|_, _| {}).unwrap();
     for z_m in [vec![0.0], vec![-3e-3, 0.0, 1e-3, 3e-3], vec![5e-3, 6e-3]] {
-        let shape = shape_for(&ldi);
+        let shape = size_for(&ldi).shape();
         let ones = Correction::new(
             z_m.clone(),
             vec![Array3::from_elem((3, shape.0, shape.1), Complex32::ONE); z_m.len()],
@@ -133,15 +134,33 @@ fn kernels_of_one_change_nothing() {
 
 #[test]
 fn a_shift_moves_the_hologram() {
-    let ldi = random_ldi((64, 72), 2);
+    let ldi = random_ldi(Size { width: 72, height: 64 }, 2);
     let display = Display::default();
     // The shift is two pixels right and three down, and the plane is larger than necessary by this amount.
-    let (h, w) = shape_for(&ldi);
+    let Size { width: w, height: h } = size_for(&ldi);
     let shift = |_: f64, _: f64, mu: f64, nu: f64| Complex64::from_polar(1.0, -2.0 * PI * 8e-6 * (2.0 * mu + 3.0 * nu));
-    let correction = Correction::sampled(vec![0.0], (h + 3, w + 2), &display, shift).unwrap();
+    let correction = Correction::sampled(
+        vec![0.0],
+        Size {
+            width: w + 2,
+            height: h + 3,
+        },
+        &display,
+        shift,
+    )
+    .unwrap();
     let ours = hologram(&ldi, 30, &correction);
     let one = |_: f64, _: f64, _: f64, _: f64| Complex64::ONE;
-    let still = Correction::sampled(vec![0.0], (h + 3, w + 2), &display, one).unwrap();
+    let still = Correction::sampled(
+        vec![0.0],
+        Size {
+            width: w + 2,
+            height: h + 3,
+        },
+        &display,
+        one,
+    )
+    .unwrap();
     let plain = hologram(&ldi, 30, &still);
     for colour in 0..3 {
         let moved = plane_of(&ours, colour).slice(s![3.., 2..]).to_owned();
@@ -175,12 +194,19 @@ fn a_defocus_moves_the_focus() {
             Complex64::from_polar(1.0, 2.0 * PI * ahead_m * bend)
         };
         let ends = vec![display.z_of_depth(0.995), display.z_of_depth(0.005)];
-        let correction = Correction::sampled(ends, shape_for(&ldi), &display, defocus).unwrap();
+        let correction = Correction::sampled(ends, size_for(&ldi), &display, defocus).unwrap();
         let ours = hologram(&ldi, 100, &correction);
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
         let error_at = |z_m: f64| {
             let lambda = display.wavelengths_m()[1];
-            let plan = Propagator::new(96, 96, display.pitch_m(), lambda, z_m, Padding::Reach).unwrap();
+            let plan = Propagator::new(
+                Size { width: 96, height: 96 },
+                display.pitch_m(),
+                lambda,
+                z_m,
+                Padding::Reach,
+            )
+            .unwrap();
             let mut plane = ours.index_axis(Axis(0), 1).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
             let image = ldi.layers[0].rgb.index_axis(Axis(0), 1);
@@ -201,8 +227,8 @@ fn a_defocus_moves_the_focus() {
 #[test]
 fn what_cannot_be_computed_is_refused() {
     let display = Display::default();
-    let ldi = random_ldi((32, 32), 1);
-    let shape = shape_for(&ldi);
+    let ldi = random_ldi(Size { width: 32, height: 32 }, 1);
+    let shape = size_for(&ldi);
     let one = |_: f64, _: f64, _: f64, _: f64| Complex64::ONE;
     let refused = |result: phasefront_io::Result<Correction>, word: &str| {
         let message = result.err().unwrap().to_string();
@@ -236,7 +262,7 @@ fn too_many_propagations_are_refused_before_they_begin() {
         depth: Array2::from_shape_fn((1, planes), |(_, x)| (x as f32 + 0.5) / planes as f32),
     }])
     .unwrap();
-    let shape = shape_for(&ldi);
+    let shape = size_for(&ldi).shape();
     let z_m: Vec<f64> = (0..planes)
         .rev()
         .map(|k| sm_lbm::plane_z_m(k, planes, &display))
@@ -254,7 +280,7 @@ fn too_many_propagations_are_refused_before_they_begin() {
 /// Compares interpolated kernels for coefficients that change over depth with a separate kernel for each plane.
 #[test]
 fn coefficients_that_change_over_depth_are_followed() {
-    let ldi = random_ldi((48, 56), 3);
+    let ldi = random_ldi(Size { width: 56, height: 48 }, 3);
     let display = Display::default();
     let at = |a: [f64; 5]| Aberration::new([a; 3]).unwrap();
     let all = Aberrations::new(vec![
@@ -263,13 +289,13 @@ fn coefficients_that_change_over_depth_are_followed() {
     ])
     .unwrap();
     let planes = 96;
-    let ours = Correction::of_aberrations(&all, (48, 56), planes, &display).unwrap();
+    let ours = Correction::of_aberrations(&all, Size { width: 56, height: 48 }, planes, &display).unwrap();
     let z_m: Vec<_> = (0..planes)
         .rev()
         .map(|k| sm_lbm::plane_z_m(k, planes, &display))
         .collect();
     let lambda = display.wavelengths_m();
-    let exact = Correction::sampled(z_m, ours.shape(), &display, |z, l, mu, nu| {
+    let exact = Correction::sampled(z_m, ours.size(), &display, |z, l, mu, nu| {
         let colour = lambda.iter().position(|x| *x == l).unwrap();
         Complex64::from_polar(1.0, all.at(z).phase(colour, mu, nu, display.pitch_m()))
     })
@@ -283,11 +309,11 @@ fn coefficients_that_change_over_depth_are_followed() {
 
 #[test]
 fn one_correction_over_the_frame_is_the_fourier_filter() {
-    let ldi = random_ldi((40, 52), 2);
+    let ldi = random_ldi(Size { width: 52, height: 40 }, 2);
     let display = Display::default();
     let a = Aberration::new([[0.8, -0.5, 0.4, 0.3, -0.6]; 3]).unwrap();
     let all = Aberrations::new(vec![(0.0, a)]).unwrap();
-    let correction = Correction::of_aberrations(&all, (40, 52), 7, &display).unwrap();
+    let correction = Correction::of_aberrations(&all, Size { width: 52, height: 40 }, 7, &display).unwrap();
     let filtered = hologram(&ldi, 7, &correction);
     let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
     let points = points.map(|place| (place, all.clone())).to_vec();

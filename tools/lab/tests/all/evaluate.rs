@@ -1,6 +1,7 @@
 //! Tests the evaluation on small generated data sets against separately computed metrics.
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::target::Aberration;
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Sweep};
 use phasefront_command::networks::{self, Precision};
@@ -89,8 +90,23 @@ fn encoded(display: &Display, name: &str, encoding: Encoding) -> Shown {
 fn a_pair_is_read_as_it_was_made() {
     let data = Data::new();
     let pair = dataset::read_pair(&data.manifest, data.path(), 79).unwrap();
-    let scene = scene::random_scene(data.manifest.scene_seed(79), SIZE, SIZE);
-    let ldi = scene::render_ldi_reference(&scene, SIZE, SIZE, 3).unwrap().quantized();
+    let scene = scene::random_scene(
+        data.manifest.scene_seed(79),
+        Size {
+            width: SIZE,
+            height: SIZE,
+        },
+    );
+    let ldi = scene::render_ldi_reference(
+        &scene,
+        Size {
+            width: SIZE,
+            height: SIZE,
+        },
+        3,
+    )
+    .unwrap()
+    .quantized();
     assert_eq!(pair.ldi, ldi);
     let hologram = sm_lbm::hologram(&ldi, &Display::default(), PLANES, &|_, _| {}).unwrap();
     assert_eq!(pair.hologram, hologram);
@@ -143,7 +159,17 @@ fn the_figures_are_those_of_the_definition() {
                 let mut out = field.clone();
                 for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
                     let z = display.z_of_depth(*d);
-                    let plan = Propagator::new(SIZE, SIZE, display.pitch_m(), lambda, z, Padding::Double).unwrap();
+                    let plan = Propagator::new(
+                        Size {
+                            width: SIZE,
+                            height: SIZE,
+                        },
+                        display.pitch_m(),
+                        lambda,
+                        z,
+                        Padding::Double,
+                    )
+                    .unwrap();
                     let mut plane = out.index_axis_mut(Axis(0), colour);
                     plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
                 }
@@ -369,7 +395,15 @@ fn encoded_fields_are_judged_as_their_files_look() {
         assert_eq!(row.shown, shown.name);
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
         let (target, options) = shown.levels.as_ref().unwrap();
-        let modulator = DisplayPlan::new((SIZE, SIZE), target, options).unwrap();
+        let modulator = DisplayPlan::new(
+            Size {
+                width: SIZE,
+                height: SIZE,
+            },
+            target,
+            options,
+        )
+        .unwrap();
         let mut field = pair.hologram.clone();
         let mut levels = Array3::zeros((3, SIZE, SIZE));
         let modulation = modulator.modulate(

@@ -1,4 +1,5 @@
 //! Tests models from glTF, GLB and OBJ files: their rendered images, ignored features, and refused files.
+use phasefront::Size;
 use phasefront_io::ldi::Ldi;
 use phasefront_lab::scene::shapes::Light;
 use phasefront_lab::scene::{MAX_MODEL_TRIANGLES, read_model, render_ldi_reference};
@@ -13,8 +14,8 @@ const WHITE: [f32; 3] = [1.0; 3];
 
 /// Reads a model and renders two layers of 40×20 pixels: a square fills columns 11 to 28 and rows 1 to 18.
 fn seen(path: &Path) -> Ldi {
-    let scene = read_model(path, 20, 40, None).unwrap();
-    render_ldi_reference(&scene, 20, 40, 2).unwrap()
+    let scene = read_model(path, Size { width: 40, height: 20 }, None).unwrap();
+    render_ldi_reference(&scene, Size { width: 40, height: 20 }, 2).unwrap()
 }
 
 /// Returns the colours at the centres of the square's quarters: top left, top right, bottom left, bottom right.
@@ -118,7 +119,9 @@ fn changed(folder: &Path, change: impl FnOnce(&mut Value)) -> PathBuf {
 }
 
 fn refused(path: &Path, reason: &str) {
-    let message = read_model(path, 20, 40, None).unwrap_err().to_string();
+    let message = read_model(path, Size { width: 40, height: 20 }, None)
+        .unwrap_err()
+        .to_string();
     assert!(
         message.contains(path.file_name().unwrap().to_str().unwrap()),
         "{message}"
@@ -275,15 +278,14 @@ fn light_shades_what_it_does_not_meet_in_the_face() {
     let brightness = |direction: [f64; 3]| {
         let scene = read_model(
             &path,
-            20,
-            40,
+            Size { width: 40, height: 20 },
             Some(Light {
                 direction,
                 ambient: 0.2,
             }),
         )
         .unwrap();
-        quarters(&render_ldi_reference(&scene, 20, 40, 1).unwrap())[3][0]
+        quarters(&render_ldi_reference(&scene, Size { width: 40, height: 20 }, 1).unwrap())[3][0]
     };
     assert_eq!(brightness([0.0, 0.0, 1.0]), 1.0);
     assert!((brightness([0.6, 0.0, 0.8]) - 0.84).abs() < 1e-6);
@@ -300,7 +302,7 @@ fn broken_gltf_is_refused_by_name() {
     fs::write(folder.join("short.glb"), b"glTF\x02\0\0\0\x0b\0\0\0").unwrap();
     refused(&folder.join("short.glb"), "it has 11 bytes; 12 are the fewest");
     fs::write(folder.join("empty.glb"), "").unwrap();
-    assert!(read_model(&folder.join("empty.glb"), 20, 40, None).is_err());
+    assert!(read_model(&folder.join("empty.glb"), Size { width: 40, height: 20 }, None).is_err());
 
     let refused = |change: &dyn Fn(&mut Value), reason: &str| refused(&changed(folder, change), reason);
     refused(&|json| json["scenes"][0]["nodes"] = json!([]), "no triangles");
@@ -413,7 +415,7 @@ fn damaged_glb_never_panics() {
     let whole = glb(&json, &buffer);
     let attempt = |bytes: &[u8]| {
         fs::write(&path, bytes).unwrap();
-        let result = read_model(&path, 20, 40, None);
+        let result = read_model(&path, Size { width: 40, height: 20 }, None);
         if let Err(error) = &result {
             assert!(!error.to_string().contains('\n'), "{error}");
         }
@@ -488,14 +490,14 @@ fn broken_obj_is_refused_by_name() {
     refused(&obj(folder, "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "not finite");
     refused(&obj(folder, "v 0 0 0\nv 0 0 1\nv 0 0 2\nf 1 2 3\n"), "has no size");
     fs::write(folder.join("model.obj"), [0xff, 0xfe, 0, 1, 2]).unwrap();
-    assert!(read_model(&folder.join("model.obj"), 20, 40, None).is_err());
+    assert!(read_model(&folder.join("model.obj"), Size { width: 40, height: 20 }, None).is_err());
     let path = obj(folder, OBJ);
     for index in 0..OBJ.len() {
         for value in [b'0', b'-', b'/', b'\n', b'e', 0xff] {
             let mut bytes = OBJ.as_bytes().to_vec();
             bytes[index] = value;
             fs::write(&path, bytes).unwrap();
-            if let Err(error) = read_model(&path, 20, 40, None) {
+            if let Err(error) = read_model(&path, Size { width: 40, height: 20 }, None) {
                 assert!(!error.to_string().contains('\n'), "{error}");
             }
         }

@@ -1,6 +1,7 @@
 //! Tests that the bundled networks load and that the fast path gives the same results as tract.
 use ndarray::{Array3, Axis};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, Method, Network, RgbdFrame};
 use phasefront_core::method::MethodPlan;
 use phasefront_core::method::network;
@@ -24,9 +25,9 @@ fn numbers(precision: Precision) -> network::Precision {
 
 /// Returns a rendered frame as network input, with the planes of `kind`. A seed consists of the frame's colours,
 /// rotated in phase.
-fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
-    let scene = scene::random_scene(11, height, width);
-    let ldi = scene::render_ldi_reference(&scene, height, width, 1).unwrap();
+fn input(kind: InputKind, size: Size) -> Vec<f32> {
+    let scene = scene::random_scene(11, size);
+    let ldi = scene::render_ldi_reference(&scene, size, 1).unwrap();
     let layer = &ldi.layers[0];
     let depth = layer.depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     let mut planes: Vec<f32> = layer.rgb.iter().chain(&depth).map(|v| v - 0.5).collect();
@@ -50,9 +51,9 @@ fn the_pair_is_for_its_offset_and_display() {
         assert_eq!(hologram.precision(), numbers(precision));
         assert_eq!(prefilter.precision(), numbers(precision));
         assert_eq!(prefilter.display().offset_m, 0.0);
-        let plan = hologram.plan(40, 64).unwrap();
+        let plan = hologram.plan(Size { width: 64, height: 40 }).unwrap();
         assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
-        let plan = prefilter.filter_plan(40, 64).unwrap();
+        let plan = prefilter.filter_plan(Size { width: 64, height: 40 }).unwrap();
         assert!(plan.engine().isa.is_some());
     }
     let none = |display: Display| pair_for(&display, Precision::Int8).is_none();
@@ -66,11 +67,11 @@ fn the_pair_is_for_its_offset_and_display() {
 fn assert_agrees_with_tract(name: &str, network: &Network, precision: Precision) {
     assert_eq!(network.precision(), numbers(precision));
     for (height, width) in [(61, 47), (40, 64)] {
-        let input = input(network.input(), height, width);
-        let fast = network.plan(height, width).unwrap();
+        let input = input(network.input(), Size { width, height });
+        let fast = network.plan(Size { width, height }).unwrap();
         let engine = fast.engine();
         assert_ne!(engine.name, "tract", "{name}: {}", engine.why);
-        let outputs = [fast, network.plan_on_stock_tract(height, width).unwrap()].map(|plan| {
+        let outputs = [fast, network.plan_on_stock_tract(Size { width, height }).unwrap()].map(|plan| {
             let mut output = vec![0.0; 6 * height * width];
             plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
             output
@@ -124,8 +125,8 @@ fn amplitude_psnr(field: &Array3<Complex32>, truth: &Array3<Complex32>) -> f64 {
 #[test]
 fn other_displays_are_served_by_physics() {
     let (height, width) = (128, 160);
-    let scene = scene::random_scene(7, height, width);
-    let ldi = scene::render_ldi_reference(&scene, height, width, 6)
+    let scene = scene::random_scene(7, Size { width, height });
+    let ldi = scene::render_ldi_reference(&scene, Size { width, height }, 6)
         .unwrap()
         .quantized();
     let front = &ldi.layers[0];
@@ -135,7 +136,7 @@ fn other_displays_are_served_by_physics() {
     let psnr_of = |network: &Arc<Network>, toml: &str| {
         let display = Display::from_toml(toml).unwrap();
         let truth = exact(&ldi, &display);
-        let plan = MethodPlan::new(height, width, Method::trained(network.clone()), &display).unwrap();
+        let plan = MethodPlan::new(Size { width, height }, Method::trained(network.clone()), &display).unwrap();
         let mut field = truth.clone();
         let values = field.as_slice_mut().unwrap();
         plan.field(&frame, values, &mut plan.scratch()).unwrap();
@@ -160,7 +161,7 @@ fn other_displays_are_served_by_physics() {
     assert!(psnr_of(&wide, "") > trained - 0.5);
     let twice = "pitch_um = 5.66";
     let display = Display::from_toml(twice).unwrap();
-    let front = scene::render_ldi_reference(&scene, height, width, 1)
+    let front = scene::render_ldi_reference(&scene, Size { width, height }, 1)
         .unwrap()
         .quantized();
     let visible = amplitude_psnr(&exact(&front, &display), &exact(&ldi, &display));

@@ -1,5 +1,6 @@
 //! Tests depth peeling on a GPU or a software driver against the CPU renderer.
 use crate::driver;
+use phasefront::Size;
 
 use phasefront_io::ldi::Ldi;
 use phasefront_lab::scene::{DepthPeeler, Mesh, Scene, Texture, random_scene, render_ldi_reference};
@@ -56,9 +57,9 @@ fn random_scenes_are_the_references_but_for_single_pixels() {
         (5, (192, 128)),
         (6, (1, 1)),
     ] {
-        let scene = random_scene(seed, height, width);
-        let expected = render_ldi_reference(&scene, height, width, 5).unwrap();
-        let ldi = peeler.render(&scene, height, width, 5).unwrap();
+        let scene = random_scene(seed, Size { width, height });
+        let expected = render_ldi_reference(&scene, Size { width, height }, 5).unwrap();
+        let ldi = peeler.render(&scene, Size { width, height }, 5).unwrap();
         // Each layer behind a differing pixel may differ too.
         let (count, all) = (differing(&ldi, &expected), 5 * height * width);
         assert!(
@@ -74,8 +75,14 @@ fn simple_scenes_are_the_references_exactly() {
     let peeler = peeler();
     let same = |meshes: Vec<Mesh>| {
         let scene = Scene { meshes };
-        let expected = render_ldi_reference(&scene, 9, 14, 3).unwrap();
-        assert_eq!(differing(&peeler.render(&scene, 9, 14, 3).unwrap(), &expected), 0);
+        let expected = render_ldi_reference(&scene, Size { width: 14, height: 9 }, 3).unwrap();
+        assert_eq!(
+            differing(
+                &peeler.render(&scene, Size { width: 14, height: 9 }, 3).unwrap(),
+                &expected
+            ),
+            0
+        );
         expected
     };
     let (red, green, blue) = ([1., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
@@ -94,7 +101,8 @@ fn simple_scenes_are_the_references_exactly() {
     let mut back = wall([0., 14.], 0.2, red);
     back.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let mut sieve = wall([0., 14.], 0.4, green);
-    sieve.texture = Arc::new(Texture::new(2, 1, vec![[200, 200, 9, 255], [200, 200, 9, 0]]).unwrap());
+    sieve.texture =
+        Arc::new(Texture::new(Size { width: 2, height: 1 }, vec![[200, 200, 9, 255], [200, 200, 9, 0]]).unwrap());
     sieve.uv = vec![[0.1, 1.0], [3.1, 1.0], [3.1, 0.0], [0.1, 0.0]];
     sieve.colour = vec![[2.0, 0.5, 1.0]; 4];
     same(vec![back, sieve, wall([0., 14.], 0.9, blue)]);
@@ -107,14 +115,26 @@ fn what_does_not_fit_is_refused() {
         meshes: vec![wall([0., 9.], 0.5, [1.0; 3])],
     };
     for (height, width, layers) in [(0, 4, 1), (4, 0, 1), (4, 4, 0), (1 << 20, 4, 1), (usize::MAX, 2, 2)] {
-        let message = peeler.render(&scene, height, width, layers).unwrap_err().to_string();
+        let message = peeler
+            .render(&scene, Size { width, height }, layers)
+            .unwrap_err()
+            .to_string();
         assert!(!message.contains('\n'), "{message}");
     }
     let mut long = scene.clone();
-    long.meshes[0].texture = Arc::new(Texture::new(1 << 20, 1, vec![[0; 4]; 1 << 20]).unwrap());
+    long.meshes[0].texture = Arc::new(
+        Texture::new(
+            Size {
+                width: 1 << 20,
+                height: 1,
+            },
+            vec![[0; 4]; 1 << 20],
+        )
+        .unwrap(),
+    );
     assert!(
         peeler
-            .render(&long, 4, 4, 1)
+            .render(&long, Size { width: 4, height: 4 }, 1)
             .unwrap_err()
             .to_string()
             .contains("texture of 1048576x1")
@@ -123,7 +143,7 @@ fn what_does_not_fit_is_refused() {
     broken.meshes[0].triangles[0][0] = 4;
     assert!(
         peeler
-            .render(&broken, 4, 4, 1)
+            .render(&broken, Size { width: 4, height: 4 }, 1)
             .unwrap_err()
             .to_string()
             .contains("vertex 4")

@@ -1,5 +1,6 @@
 //! Tests the point-based method against its definition, against waves, and for properties that hold in every scene.
 use crate::reference;
+use phasefront::Size;
 
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};
@@ -18,13 +19,13 @@ fn hologram(ldi: &Ldi, planes: usize, occlusion: Occlusion) -> Array3<Complex32>
     point_based::hologram(ldi, &Display::default(), planes, occlusion, &|_, _| {}).unwrap()
 }
 
-fn random_ldi((h, w): (usize, usize), layers: usize) -> Ldi {
-    let scene = scene::random_scene(7, h, w);
-    scene::render_ldi_reference(&scene, h, w, layers).unwrap()
+fn random_ldi(Size { width: w, height: h }: Size, layers: usize) -> Ldi {
+    let scene = scene::random_scene(7, Size { width: w, height: h });
+    scene::render_ldi_reference(&scene, Size { width: w, height: h }, layers).unwrap()
 }
 
 /// Creates one layer of smooth amplitude and constant depth.
-fn flat((h, w): (usize, usize), depth: f32) -> Ldi {
+fn flat(Size { width: w, height: h }: Size, depth: f32) -> Ldi {
     Ldi::new(vec![LdiLayer {
         rgb: Array3::from_shape_fn((3, h, w), |(c, y, x)| {
             0.5 + 0.3 * ((x as f32 * 0.2).sin() * (y as f32 * 0.15 + c as f32).cos())
@@ -34,7 +35,7 @@ fn flat((h, w): (usize, usize), depth: f32) -> Ldi {
     .unwrap()
 }
 
-/// Stacks two layers of the same shape.
+/// Stacks two layers of the same size.
 fn stacked(front: &Ldi, rear: &Ldi) -> Ldi {
     Ldi::new(vec![front.layers[0].clone(), rear.layers[0].clone()]).unwrap()
 }
@@ -46,25 +47,25 @@ fn energy(hologram: &Array3<Complex32>) -> f32 {
 #[test]
 fn agrees_with_its_definition() {
     let display = Display::default();
-    for (shape, planes) in [
-        ((17, 23), 16),
-        ((23, 16), 33),
-        ((1, 41), 7),
-        ((35, 3), 200),
-        ((5, 5), 1),
+    for (size, planes) in [
+        (Size { width: 23, height: 17 }, 16),
+        (Size { width: 16, height: 23 }, 33),
+        (Size { width: 41, height: 1 }, 7),
+        (Size { width: 3, height: 35 }, 200),
+        (Size { width: 5, height: 5 }, 1),
     ] {
-        let ldi = random_ldi(shape, 4);
+        let ldi = random_ldi(size, 4);
         for occlusion in ALL {
             let ours = hologram(&ldi, planes, occlusion);
             let expected = point_based::reference::hologram(&ldi, &display, planes, occlusion).unwrap();
             for colour in 0..3 {
                 let plane = ours.index_axis(Axis(0), colour);
-                let plane = widen(plane.to_slice().unwrap(), shape);
+                let plane = widen(plane.to_slice().unwrap(), size);
                 let expected = expected.index_axis(Axis(0), colour).to_owned();
                 let error = relative_error(&plane, &expected);
                 assert!(
                     error < 1e-5,
-                    "{shape:?}, {planes} planes, {occlusion:?}, colour {colour}: {error:e}"
+                    "{size:?}, {planes} planes, {occlusion:?}, colour {colour}: {error:e}"
                 );
             }
         }
@@ -74,12 +75,12 @@ fn agrees_with_its_definition() {
 #[test]
 fn bands_of_rows_join() {
     // The image has more rows than one band holds and is compared with the definition.
-    let ldi = random_ldi((71, 6), 2);
+    let ldi = random_ldi(Size { width: 6, height: 71 }, 2);
     let expected = point_based::reference::hologram(&ldi, &Display::default(), 20, Occlusion::Geometric).unwrap();
     let ours = hologram(&ldi, 20, Occlusion::Geometric);
     for colour in 0..3 {
         let plane = ours.index_axis(Axis(0), colour);
-        let plane = widen(plane.to_slice().unwrap(), (71, 6));
+        let plane = widen(plane.to_slice().unwrap(), Size { width: 6, height: 71 });
         let expected = expected.index_axis(Axis(0), colour).to_owned();
         assert!(relative_error(&plane, &expected) < 1e-5);
     }
@@ -124,15 +125,28 @@ fn a_sub_hologram_is_the_wave_of_its_point() {
 
 #[test]
 fn a_plane_of_constant_depth_gives_back_its_amplitude() {
-    let shape = (120, 160);
+    let size = Size {
+        width: 160,
+        height: 120,
+    };
     let display = Display::default();
     let inner = s![32..88, 32..128];
     for depth in [0.0, 0.2, 0.45, 0.5, 0.7, 1.0] {
-        let ldi = flat(shape, depth);
+        let ldi = flat(size, depth);
         let ours = hologram(&ldi, 100, Occlusion::Geometric);
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
         for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
-            let plan = Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
+            let plan = Propagator::new(
+                Size {
+                    width: 160,
+                    height: 120,
+                },
+                display.pitch_m(),
+                lambda,
+                z,
+                Padding::Reach,
+            )
+            .unwrap();
             let mut plane = ours.index_axis(Axis(0), colour).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
             let image = ldi.layers[0].rgb.index_axis(Axis(0), colour);
@@ -148,7 +162,7 @@ fn a_plane_of_constant_depth_gives_back_its_amplitude() {
 
 #[test]
 fn threads_do_not_change_a_bit() {
-    let ldi = random_ldi((75, 47), 3);
+    let ldi = random_ldi(Size { width: 47, height: 75 }, 3);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| hologram(&ldi, 50, Occlusion::Geometric))
@@ -158,10 +172,10 @@ fn threads_do_not_change_a_bit() {
 
 #[test]
 fn rays_are_stopped_by_what_is_before_them_and_by_nothing_else() {
-    let shape = (80, 96);
+    let size = Size { width: 96, height: 80 };
     // Both layers lie behind z = 0, both in front of it, or one on each side.
     for (near, far) in [(0.6, 0.9), (0.1, 0.4), (0.1, 0.9)] {
-        let (front, rear) = (flat(shape, near), flat(shape, far));
+        let (front, rear) = (flat(size, near), flat(size, far));
         let both = stacked(&front, &rear);
         // A full plate blocks all light except past the frame's ends.
         let inner = s![.., 33..47, 33..63];
@@ -187,18 +201,21 @@ fn rays_are_stopped_by_what_is_before_them_and_by_nothing_else() {
 
 #[test]
 fn of_two_points_on_one_plane_the_front_one_shines() {
-    let both = stacked(&flat((9, 9), 0.31), &flat((9, 9), 0.32));
+    let both = stacked(
+        &flat(Size { width: 9, height: 9 }, 0.31),
+        &flat(Size { width: 9, height: 9 }, 0.32),
+    );
     for occlusion in ALL {
         assert_eq!(
             hologram(&both, 10, occlusion),
-            hologram(&flat((9, 9), 0.31), 10, occlusion)
+            hologram(&flat(Size { width: 9, height: 9 }, 0.31), 10, occlusion)
         );
     }
 }
 
 #[test]
 fn what_cannot_be_computed_is_refused() {
-    let ldi = flat((8, 8), 0.0);
+    let ldi = flat(Size { width: 8, height: 8 }, 0.0);
     let refuses = |display: &str, planes, word: &str| {
         let display = Display::from_toml(display).unwrap();
         let e = point_based::hologram(&ldi, &display, planes, Occlusion::None, &|_, _| {});

@@ -2,6 +2,7 @@
 use ndarray::{Array2, Array3, Array4, Axis, concatenate, s};
 use ndarray_npy::{read_npy, write_npy};
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_exact::truth;
@@ -42,7 +43,16 @@ fn seeds_are_the_sweeps_fields_on_given_and_refined_depth() {
     }
 
     let fields: Array4<i16> = read_npy(file("seed")).unwrap();
-    let plan = SweepPlan::new(SIZE, SIZE, &manifest.display, sweep, 0.0).unwrap();
+    let plan = SweepPlan::new(
+        Size {
+            width: SIZE,
+            height: SIZE,
+        },
+        &manifest.display,
+        sweep,
+        0.0,
+    )
+    .unwrap();
     let colour = truth::visible_rgb(&pair.ldi);
     let depths = concatenate![Axis(0), given, refined];
     assert_eq!(fields.dim(), (4, 6, SIZE, SIZE));

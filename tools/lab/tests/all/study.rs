@@ -1,6 +1,7 @@
 //! Tests the studies of layers and planes: their comparisons, and the files that the command writes.
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Size;
 use phasefront::{Display, Method, RgbdFrame, Sweep};
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::metrics;
@@ -25,10 +26,23 @@ fn scenes(size: usize) -> Scenes {
 }
 
 fn ldi(seed: u64, size: usize, layers: usize) -> Ldi {
-    let scene = scene::random_scene(seed, size, size);
-    scene::render_ldi_reference(&scene, size, size, layers)
-        .unwrap()
-        .quantized()
+    let scene = scene::random_scene(
+        seed,
+        Size {
+            width: size,
+            height: size,
+        },
+    );
+    scene::render_ldi_reference(
+        &scene,
+        Size {
+            width: size,
+            height: size,
+        },
+        layers,
+    )
+    .unwrap()
+    .quantized()
 }
 
 #[test]
@@ -59,7 +73,7 @@ fn layers_are_compared_with_ten() {
 
 #[test]
 fn video_sessions_flicker_less_with_sensors_than_single_frames() {
-    let display = Display::default().with_size(96, 96).unwrap();
+    let display = Display::default().with_size(Size { width: 96, height: 96 }).unwrap();
     let method = Method::Sweep(Sweep::for_display(&display));
     for sensor in [Sensor::Noise, Sensor::Lidar, Sensor::Kinect] {
         let study = |frames, settings: &[_]| {
@@ -203,7 +217,7 @@ fn the_sweep_is_studied_beside_exact_waves() {
             let rgb = truth::visible_rgb(&ldi);
             let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
             let frame = RgbdFrame::new(rgb, depth).unwrap();
-            let plan = SweepPlan::new(64, 64, display, sweep, 0.0).unwrap();
+            let plan = SweepPlan::new(Size { width: 64, height: 64 }, display, sweep, 0.0).unwrap();
             let mut field = Array3::zeros((3, 64, 64));
             plan.field(&frame, field.as_slice_mut().unwrap(), &mut plan.scratch())
                 .unwrap();

@@ -1,6 +1,7 @@
 //! Tests the plane sweep on displays for which no network was trained. The sweep and exact waves on the same surfaces
 //! are compared with the ground truth. A captured frame must show no seams between tiles.
 use crate::skip;
+use phasefront::Size;
 
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -26,8 +27,22 @@ const SIZE: usize = 96;
 const TRUE_PLANES: usize = 200;
 
 fn scene_of(seed: u64) -> (Ldi, RgbdFrame) {
-    let scene = scene::random_scene(seed, SIZE, SIZE);
-    let ldi = scene::render_ldi_reference(&scene, SIZE, SIZE, 5).unwrap();
+    let scene = scene::random_scene(
+        seed,
+        Size {
+            width: SIZE,
+            height: SIZE,
+        },
+    );
+    let ldi = scene::render_ldi_reference(
+        &scene,
+        Size {
+            width: SIZE,
+            height: SIZE,
+        },
+        5,
+    )
+    .unwrap();
     let front = &ldi.layers[0];
     let depth = front.depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     let mut rgb = front.rgb.clone();
@@ -43,8 +58,10 @@ fn scene_of(seed: u64) -> (Ldi, RgbdFrame) {
 fn to_display(mut field: Array3<Complex32>, display: &Display) -> Array3<Complex32> {
     if display.offset_m() != 0.0 {
         let plans = Propagator::for_colours(
-            SIZE,
-            SIZE,
+            Size {
+                width: SIZE,
+                height: SIZE,
+            },
             display.pitch_m(),
             display.wavelengths_m(),
             display.offset_m(),
@@ -81,7 +98,16 @@ fn other_displays_need_no_training() {
         let offset_m = display.offset_m();
         let ends_there = sweep::reaches(&display, offset_m);
         let z_m = if ends_there { offset_m } else { 0.0 };
-        let plan = SweepPlan::new(SIZE, SIZE, &display, sweep, z_m).unwrap();
+        let plan = SweepPlan::new(
+            Size {
+                width: SIZE,
+                height: SIZE,
+            },
+            &display,
+            sweep,
+            z_m,
+        )
+        .unwrap();
         let (mut swept, mut exact) = (0.0, 0.0);
         for seed in [7, 8] {
             let (ldi, frame) = scene_of(seed);
@@ -104,21 +130,24 @@ fn other_displays_need_no_training() {
 
 /// Returns a captured frame of 640×480, converted to 1080p as a session does.
 fn captured(folder: &Path) -> RgbdFrame {
-    const OUT: (usize, usize) = (1080, 1920);
-    let ((height, width), bytes) = picture::read_rgb_bytes(&folder.join("color_0.jpg")).unwrap();
-    let plane = Plane::new(&bytes, 3 * width, 3);
-    let image = ColourImage::new(ColourFormat::Rgb, width, height, &[plane]).unwrap();
-    let plan = ColourPlan::new(&image, Orientation::default(), OUT.0, OUT.1).unwrap();
-    let mut rgb = Array3::zeros((3, OUT.0, OUT.1));
+    const OUT: Size = Size {
+        width: 1920,
+        height: 1080,
+    };
+    let (size, bytes) = picture::read_rgb_bytes(&folder.join("color_0.jpg")).unwrap();
+    let plane = Plane::new(&bytes, 3 * size.width, 3);
+    let image = ColourImage::new(ColourFormat::Rgb, size, &[plane]).unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), OUT).unwrap();
+    let mut rgb = Array3::zeros((3, OUT.height, OUT.width));
     let amplitudes = rgb.as_slice_mut().unwrap();
     plan.convert(&image, amplitudes, &mut plan.scratch()).unwrap();
     let millimetres = depth_map::read_depth(&folder.join("depth_0.png"), false).unwrap();
-    let shape = millimetres.dim();
+    let given = Size::from_shape(millimetres.dim());
     let depth = phasefront_core::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
         .unwrap()
         .depth;
-    let conditioner = Conditioner::new(shape, Crop::cover(shape, OUT), OUT, false).unwrap();
-    let mut conditioned = ndarray::Array2::zeros(OUT);
+    let conditioner = Conditioner::new(given, Crop::cover(given, OUT), OUT, false).unwrap();
+    let mut conditioned = ndarray::Array2::zeros(OUT.shape());
     let mut scratch = conditioner.scratch();
     conditioner
         .condition(
@@ -139,13 +168,13 @@ fn a_captured_frame_has_no_seams_between_tiles() {
         return;
     }
     let frame = captured(&folder);
-    let (height, width) = frame.shape();
+    let Size { width, height } = frame.size();
     let display = Display::default();
     let default = Sweep::for_display(&display);
     // One tile of 1920 pixels covers the whole frame.
     let [tiles, whole] = [default.tile, 1920].map(|tile| {
         let sweep = Sweep { tile, ..default };
-        let plan = SweepPlan::new(height, width, &display, sweep, 0.0).unwrap();
+        let plan = SweepPlan::new(frame.size(), &display, sweep, 0.0).unwrap();
         let mut field = vec![Complex32::ZERO; 3 * height * width];
         plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
         field
@@ -157,7 +186,7 @@ fn a_captured_frame_has_no_seams_between_tiles() {
     println!("tiles and whole frame differ by {difference:.1e}");
     assert!(difference < 3e-3, "{difference}");
     let z_m = [2.4e-3, -2.4e-3];
-    let refocus = Refocus::new(height, width, &display, &z_m, None).unwrap();
+    let refocus = Refocus::new(frame.size(), &display, &z_m, None).unwrap();
     let views = [&tiles, &whole].map(|field| refocus.focal_stack(field, &z_m).unwrap());
     for (z_m, (tiled, whole)) in z_m.iter().zip(views[0].iter().zip(&views[1])) {
         assert!(worst(tiled, whole) < 3e-3, "{z_m}: {}", worst(tiled, whole));

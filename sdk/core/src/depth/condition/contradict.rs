@@ -7,6 +7,7 @@
 use super::colour::Moments;
 use super::edges::Kind;
 use super::fill::{REACH, Rim, TOLERANCE, surface};
+use crate::Size;
 use crate::frame::Crop;
 use rayon::prelude::*;
 
@@ -16,15 +17,15 @@ pub(super) const OWN: f32 = 0.5;
 /// The largest number of pixels of a reading whose colour tells its surface.
 const MOST_PIXELS: f64 = 5.0;
 
-/// Returns whether readings of the part `crop` for a display of (H, W) = `out` have a few pixels each.
-pub(super) fn applies(crop: Crop, out: (usize, usize)) -> bool {
+/// Returns whether readings of the part `crop` for a display of the size `out` have a few pixels each.
+pub(super) fn applies(crop: Crop, out: Size) -> bool {
     let pixels = pixels(crop, out);
     pixels > 1.0 && pixels <= MOST_PIXELS
 }
 
-/// Returns the number of pixels of a reading of the part `crop` for a display of (H, W) = `out`.
-pub(super) fn pixels(crop: Crop, out: (usize, usize)) -> f64 {
-    (out.0 * out.1) as f64 / (crop.height * crop.width)
+/// Returns the number of pixels of a reading of the part `crop` for a display of the size `out`.
+pub(super) fn pixels(crop: Crop, out: Size) -> f64 {
+    (out.height * out.width) as f64 / (crop.height * crop.width)
 }
 
 /// Writes `depth`, rows of `width` without NaN, to `to` with its contradicted readings replaced, and makes them

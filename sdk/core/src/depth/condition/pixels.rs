@@ -6,6 +6,7 @@ use super::edges::Kind;
 use super::history::{self, History};
 use super::lanes::{self, LANES, Lanes, lanes, load, store};
 use super::surfaces::{MOST, Places, Readings, Surface};
+use crate::Size;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -53,7 +54,7 @@ pub(super) struct Decider<'a> {
 
 impl Pixels {
     /// Creates the memory for `rows` rows of readings and (H, W) pixels.
-    pub(super) fn new(rows: usize, (height, width): (usize, usize)) -> Self {
+    pub(super) fn new(rows: usize, Size { width, height }: Size) -> Self {
         let square = |i: usize| (i as f32 - REACH as f32) * (i as f32 - REACH as f32);
         Pixels {
             second: vec![0.0; height * width],

@@ -3,6 +3,7 @@
 use super::axis::AxisMap;
 use super::edges::Kind;
 use super::{history, pixels, surfaces};
+use crate::Size;
 
 /// The conditioned readings of a frame and where the display's pixels lie among them.
 #[derive(Debug, Clone, Copy)]
@@ -28,13 +29,19 @@ pub struct ReadingsAxis<'a> {
 
 impl<'a> ConditionedReadings<'a> {
     /// Returns (h, w), the number of readings.
-    pub fn shape(&self) -> (usize, usize) {
-        (self.y.pixels.len(), self.x.pixels.len())
+    pub fn size(&self) -> Size {
+        Size {
+            width: self.x.pixels.len(),
+            height: self.y.pixels.len(),
+        }
     }
 
     /// Returns (H, W) of the display.
-    pub fn out(&self) -> (usize, usize) {
-        (self.y.cell.len(), self.x.cell.len())
+    pub fn out(&self) -> Size {
+        Size {
+            width: self.x.cell.len(),
+            height: self.y.cell.len(),
+        }
     }
 
     /// Returns the normalized depth of the readings, (h, w), without holes.

@@ -3,6 +3,7 @@
 
 use super::edges::{BESIDE, EDGE, MIXED, MIXED_BY, SINGLE, UNEXPLAINED, WHOLE};
 use super::{Misfit, contradict, fill, narrow, pixels, register, smooth, surfaces};
+use crate::Size;
 use crate::depth::{fill_nearest, sharpness};
 use crate::frame::Crop;
 use ndarray::{Array2, ArrayView2, ArrayView3};
@@ -10,7 +11,7 @@ use ndarray::{Array2, ArrayView2, ArrayView3};
 /// Returns how `depth`, (h, w), lies beside `rgb`, (3, H, W).
 pub fn misfit(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) -> Misfit {
     let samples = ((rgb.dim().1 as f64 / crop.height).round() as usize).clamp(1, register::MOST_SAMPLES);
-    let edges = colour_edges(depth.dim(), samples, crop, rgb);
+    let edges = colour_edges(Size::from_shape(depth.dim()), samples, crop, rgb);
     let reach = register::REACH as isize;
     let evidence = |(y, x): (isize, isize), growth: isize| evidence(depth, samples, &edges, (y, x), growth);
     let shifts = |reach: isize| (-reach..=reach).flat_map(move |y| (-reach..=reach).map(move |x| (y, x)));
@@ -44,7 +45,12 @@ pub fn misfit(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32>) 
 }
 
 /// Returns the colour edges at the samples of (h, w) readings, along x and along y, as multiples of the mean around.
-fn colour_edges((h, w): (usize, usize), samples: usize, crop: Crop, rgb: ArrayView3<'_, f32>) -> [Array2<f64>; 2] {
+fn colour_edges(
+    Size { width: w, height: h }: Size,
+    samples: usize,
+    crop: Crop,
+    rgb: ArrayView3<'_, f32>,
+) -> [Array2<f64>; 2] {
     let (_, height, width) = rgb.dim();
     let (rows, columns) = (h * samples, w * samples);
     let colour = |y: usize, x: usize| {
@@ -167,10 +173,10 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
     }
     let mixes = mixes(&readings);
     let mut kinds = kinds_of(&readings, mixes);
-    if !clean && contradict::applies(crop, (height, width)) {
+    if !clean && contradict::applies(crop, Size { width, height }) {
         let before = readings.clone();
         for (at, value) in readings.indexed_iter_mut().filter(|(at, _)| !kinds[*at].1) {
-            if near(depth.dim(), at, fill::REACH).any(|(at, _)| kinds[at].0)
+            if near(Size::from_shape(depth.dim()), at, fill::REACH).any(|(at, _)| kinds[at].0)
                 && let Some(depth) = contradiction(&before, &kinds, at, &colours)
             {
                 (*value, filled[at]) = (depth, true);
@@ -178,7 +184,7 @@ pub fn condition(depth: ArrayView2<'_, f32>, crop: Crop, rgb: ArrayView3<'_, f32
         }
         kinds = kinds_of(&readings, mixes);
     }
-    let is_coarse = contradict::pixels(crop, (height, width)) > 1.0;
+    let is_coarse = contradict::pixels(crop, Size { width, height }) > 1.0;
     let choices = Array2::from_shape_fn((height, width), |(y, x)| {
         let (row, column) = (rows.reading(y), columns.reading(x));
         let around: [(usize, usize); 9] = std::array::from_fn(|k| {
@@ -268,7 +274,7 @@ fn mean(colours: &[[f64; 3]]) -> [f64; 3] {
 
 /// Returns the places within `reach` of a place, with their steps from it.
 fn near(
-    (h, w): (usize, usize),
+    Size { width: w, height: h }: Size,
     (y, x): (usize, usize),
     reach: usize,
 ) -> impl Iterator<Item = ((usize, usize), (f64, f64))> {
@@ -281,7 +287,7 @@ fn near(
 /// Returns `depth` with near surfaces narrowed by `growth` readings, or as it is if no reading remains.
 fn narrowed(depth: ArrayView2<'_, f32>, growth: usize) -> Array2<f32> {
     let narrowed = Array2::from_shape_fn(depth.dim(), |at| {
-        let around = || near(depth.dim(), at, growth);
+        let around = || near(Size::from_shape(depth.dim()), at, growth);
         let behind = around().filter(|(other, _)| depth[*other] - depth[at] > narrow::EDGE);
         let nearest = behind.min_by(|a, b| a.1.0.hypot(a.1.1).total_cmp(&b.1.0.hypot(b.1.1)));
         match nearest {
@@ -299,7 +305,7 @@ fn narrowed(depth: ArrayView2<'_, f32>, growth: usize) -> Array2<f32> {
 /// Returns the depth and the weight of each reading around one.
 fn rim(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>) -> Vec<(f32, f64)> {
     let own = mean(&colours(at.0, at.1));
-    let around = near(depth.dim(), at, fill::REACH).map(|(at, (dy, dx))| {
+    let around = near(Size::from_shape(depth.dim()), at, fill::REACH).map(|(at, (dy, dx))| {
         let theirs = mean(&colours(at.0, at.1));
         let apart: f64 = (0..3).map(|c| (own[c] - theirs[c]).powi(2)).sum();
         let weight = (1.0 + (dx * dx + dy * dy) / f64::from(fill::NEAR).powi(2))
@@ -312,7 +318,7 @@ fn rim(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -
 /// Returns whether a reading around one has nearly its colour.
 fn has_alike(depth: &Array2<f32>, at: (usize, usize), colours: &dyn Fn(usize, usize) -> Vec<[f64; 3]>) -> bool {
     let own = mean(&colours(at.0, at.1));
-    let known = near(depth.dim(), at, fill::REACH).filter(|(at, _)| !depth[*at].is_nan());
+    let known = near(Size::from_shape(depth.dim()), at, fill::REACH).filter(|(at, _)| !depth[*at].is_nan());
     known.map(|(at, _)| mean(&colours(at.0, at.1))).any(|theirs| {
         let apart: f64 = (0..3).map(|c| (own[c] - theirs[c]).powi(2)).sum();
         apart <= f64::from(fill::ALIKE).powi(2)
@@ -401,7 +407,7 @@ fn mixes(depth: &Array2<f32>) -> bool {
 /// Returns whether each reading is at an edge, and whether it is mixed.
 fn kinds_of(depth: &Array2<f32>, mixes: bool) -> Array2<(bool, bool)> {
     let range = |at: (usize, usize), reach: usize| {
-        near(depth.dim(), at, reach).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), (at, _)| {
+        near(Size::from_shape(depth.dim()), at, reach).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), (at, _)| {
             (a.min(depth[at]), b.max(depth[at]))
         })
     };
@@ -426,7 +432,7 @@ fn kinds_of(depth: &Array2<f32>, mixes: bool) -> Array2<(bool, bool)> {
     });
     Array2::from_shape_fn(depth.dim(), |at| {
         let (least, most) = range(at, 1);
-        let is_edge = is_steep(at) && near(depth.dim(), at, 1).any(|(at, _)| bent[at]);
+        let is_edge = is_steep(at) && near(Size::from_shape(depth.dim()), at, 1).any(|(at, _)| bent[at]);
         let margin = (MIXED * (most - least)).max(MIXED_BY);
         (
             is_edge,
@@ -586,7 +592,7 @@ fn voted(choices: &Array2<(f32, f32, f64)>, rgb: ArrayView3<'_, f32>, (y, x): (u
     let (height, width) = choices.dim();
     let inside = y >= reach && y + reach < height && x >= reach && x + reach < width;
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (at, (dy, dx)) in near(choices.dim(), (y, x), reach).filter(|(at, _)| *at != (y, x)) {
+    for (at, (dy, dx)) in near(Size::from_shape(choices.dim()), (y, x), reach).filter(|(at, _)| *at != (y, x)) {
         let apart: f64 = (0..3)
             .map(|c| f64::from(rgb[(c, at.0, at.1)] - rgb[(c, y, x)]).powi(2))
             .sum();

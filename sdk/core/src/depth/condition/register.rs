@@ -7,6 +7,7 @@
 //! Colour is sampled at up to four places per reading along each axis, so a shift is found to a quarter of a reading.
 //! Colour edges count in proportion to their surroundings: a texture has many.
 
+use crate::Size;
 use crate::frame::Crop;
 use rayon::prelude::*;
 
@@ -59,13 +60,13 @@ pub struct Misfit {
 /// Finds the misfit of a sequence of frames.
 pub(super) struct Registration {
     /// (H, W) of the readings.
-    shape: (usize, usize),
+    size: Size,
     /// The number of samples per reading along each axis.
     samples: usize,
     /// The display's row of each row of samples, and the column of each column, where they lie in the display.
     pixels: [Vec<Option<u32>>; 2],
     /// (H, W) of the display.
-    out: (usize, usize),
+    out: Size,
     /// The colour of each sample, (3, samples·h, samples·w).
     colour: Vec<f32>,
     /// The colour edges in a reading's size around each sample, along x and along y.
@@ -82,9 +83,9 @@ pub(super) struct Registration {
 }
 
 impl Registration {
-    /// Plans the part `crop` of (h, w) = `shape` readings for a display of (H, W) = `out`.
-    pub(super) fn new(shape: (usize, usize), crop: Crop, out: (usize, usize)) -> Self {
-        let ratio = [out.0 as f64 / crop.height, out.1 as f64 / crop.width];
+    /// Plans the part `crop` of readings of `size` for a display of the size `out`.
+    pub(super) fn new(size: Size, crop: Crop, out: Size) -> Self {
+        let ratio = [out.height as f64 / crop.height, out.width as f64 / crop.width];
         let samples = (ratio[0].round() as usize).clamp(1, MOST_SAMPLES);
         let pixels = |readings: usize, from: f64, ratio: f64, out: usize| {
             let at = |i: usize| ((i as f64 + 0.5) / samples as f64 - from) * ratio;
@@ -95,18 +96,18 @@ impl Registration {
             };
             (0..readings * samples).map(pixel).collect::<Vec<_>>()
         };
-        let size = shape.0 * shape.1 * samples * samples;
+        let count = size.pixels() * samples * samples;
         Registration {
-            shape,
+            size,
             samples,
             pixels: [
-                pixels(shape.0, crop.y, ratio[0], out.0),
-                pixels(shape.1, crop.x, ratio[1], out.1),
+                pixels(size.height, crop.y, ratio[0], out.height),
+                pixels(size.width, crop.x, ratio[1], out.width),
             ],
             out,
-            colour: vec![0.0; 3 * size],
-            edges: [vec![0.0; size], vec![0.0; size]],
-            rows: vec![[0.0; SUMS]; shape.0],
+            colour: vec![0.0; 3 * count],
+            edges: [vec![0.0; count], vec![0.0; count]],
+            rows: vec![[0.0; SUMS]; size.height],
             evidence: [0.0; SUMS],
             best: NONE,
             age: None,
@@ -191,7 +192,7 @@ impl Registration {
     /// Samples the colours. Samples outside the display are NaN.
     fn sample(&mut self, rgb: &[f32]) {
         let [rows, columns] = &self.pixels;
-        let (height, width) = self.out;
+        let Size { width, height } = self.out;
         let samples = self.colour.par_chunks_exact_mut(columns.len()).enumerate();
         samples.for_each(|(i, samples)| {
             let (colour, row) = (i / rows.len(), rows[i % rows.len()]);
@@ -204,7 +205,7 @@ impl Registration {
 
     /// Computes the colour edges around each sample.
     fn find_edges(&mut self) {
-        let (samples, width) = (self.samples, self.samples * self.shape.1);
+        let (samples, width) = (self.samples, self.samples * self.size.width);
         let size = self.edges[0].len();
         let height = size / width;
         let colour = &self.colour;
@@ -266,14 +267,14 @@ impl Registration {
 
     /// Sums the colour edges under the depth edges of each row, for each direction and shift.
     fn compare(&mut self, depth: &[f32]) {
-        let (h, w) = self.shape;
+        let Size { width: w, height: h } = self.size;
         let (samples, width, height) = (self.samples, self.samples * w, self.samples * h);
         let edges = &self.edges;
         self.rows.par_iter_mut().enumerate().for_each(|(y, sums)| {
             sums.fill(0.0);
             for x in 0..w {
                 for axis in [0, 1] {
-                    let Some((step, direction)) = step(depth, self.shape, (y, x), axis) else {
+                    let Some((step, direction)) = step(depth, self.size, (y, x), axis) else {
                         continue;
                     };
                     sums[SUMS - 1] += step;
@@ -300,7 +301,12 @@ impl Registration {
 /// x (`axis` 0) or y (1), or `None` without an edge.
 ///
 /// An edge beside a hole does not count: the hole may hide where the near surface ends.
-fn step(depth: &[f32], (h, w): (usize, usize), (y, x): (usize, usize), axis: usize) -> Option<(f32, usize)> {
+fn step(
+    depth: &[f32],
+    Size { width: w, height: h }: Size,
+    (y, x): (usize, usize),
+    axis: usize,
+) -> Option<(f32, usize)> {
     let at = y * w + x;
     let along = [(x, w, 1), (y, h, w)];
     let ((i, n, by), (j, m, across)) = (along[axis], along[1 - axis]);

@@ -1,6 +1,7 @@
 //! Smoothing within surfaces. Along rows and then columns, each reading moves onto the line that fits its neighbours of
 //! the same surface best, so that slopes stay slopes.
 
+use crate::Size;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
@@ -26,7 +27,7 @@ pub(super) struct SmoothScratch {
 }
 
 impl SmoothScratch {
-    pub(super) fn new((height, width): (usize, usize)) -> Self {
+    pub(super) fn new(Size { width, height }: Size) -> Self {
         SmoothScratch {
             padded: vec![BEYOND; height * (width + 2 * REACH)],
             along_rows: vec![0.0; height * width],

@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used)]
 use super::*;
+use crate::Size;
 use ndarray::{Array2, Array3};
 use rand::{RngExt, SeedableRng};
 
@@ -12,7 +13,8 @@ struct Case {
 impl Case {
     /// Creates a case without a crop. The sides of `rgb` have the same proportion as those of `depth`.
     fn whole(depth: Array2<f32>, rgb: Array3<f32>) -> Self {
-        let crop = Crop::cover(depth.dim(), depth.dim());
+        let size = Size::from_shape(depth.dim());
+        let crop = Crop::cover(size, size);
         Case { depth, rgb, crop }
     }
 
@@ -21,16 +23,22 @@ impl Case {
     fn random(seed: u64) -> Self {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let mut side = || random.random_range(1..60usize);
-        let (cells, out) = ((side(), side()), (side(), side()));
+        let mut size = || Size::from_shape((side(), side()));
+        let (cells, out) = (size(), size());
         let crop = Crop::cover(cells, out);
         let mut noise = |most: f32| random.random_range(-most..most);
         let front = |x: f64, y: f64| (x - 0.4).powi(2) + (y - 0.5).powi(2) < 0.07;
         let growth = (seed % 2) as f64;
-        let depth = Array2::from_shape_fn(cells, |(y, x)| {
-            let place = |k: f64| ((x as f64 + 0.9 + k) / cells.1 as f64, (y as f64 + 0.5) / cells.0 as f64);
+        let depth = Array2::from_shape_fn(cells.shape(), |(y, x)| {
+            let place = |k: f64| {
+                (
+                    (x as f64 + 0.9 + k) / cells.width as f64,
+                    (y as f64 + 0.5) / cells.height as f64,
+                )
+            };
             let (x, y) = place(0.0);
             let is_front = [-growth, 0.0, growth].into_iter().any(|dx| {
-                let below = growth / cells.0 as f64;
+                let below = growth / cells.height as f64;
                 [-below, 0.0, below].into_iter().any(|dy| front(place(dx).0, y + dy))
             });
             let surface = if is_front { 0.2 } else { 0.7 + 0.2 * y as f32 };
@@ -40,9 +48,9 @@ impl Case {
                 n => surface + 0.02 * n,
             }
         });
-        let rgb = Array3::from_shape_fn((3, out.0, out.1), |(c, y, x)| {
-            let x = (crop.x + (x as f64 + 0.5) * crop.width / out.1 as f64) / cells.1 as f64;
-            let y = (crop.y + (y as f64 + 0.5) * crop.height / out.0 as f64) / cells.0 as f64;
+        let rgb = Array3::from_shape_fn((3, out.height, out.width), |(c, y, x)| {
+            let x = (crop.x + (x as f64 + 0.5) * crop.width / out.width as f64) / cells.width as f64;
+            let y = (crop.y + (y as f64 + 0.5) * crop.height / out.height as f64) / cells.height as f64;
             let colour = if front(x, y) { [0.9, 0.5, 0.1] } else { [0.2, 0.4, 0.6] };
             (colour[c] + 0.03 * noise(1.0)).clamp(0.0, 1.0)
         });
@@ -84,7 +92,13 @@ impl Case {
     /// Conditions `frames` of this shape one after the other with one memory.
     fn in_video(&self, frames: &[&Case]) -> Vec<Vec<f32>> {
         let (_, height, width) = self.rgb.dim();
-        let plan = Conditioner::new(self.depth.dim(), self.crop, (height, width), false).unwrap();
+        let plan = Conditioner::new(
+            Size::from_shape(self.depth.dim()),
+            self.crop,
+            Size { width, height },
+            false,
+        )
+        .unwrap();
         let mut scratch = plan.scratch();
         let condition = |frame: &&Case| {
             let mut to = vec![0.0; height * width];
@@ -97,7 +111,12 @@ impl Case {
 
     fn condition(&self, aligned: bool) -> Result<Vec<f32>> {
         let (_, height, width) = self.rgb.dim();
-        let plan = Conditioner::new(self.depth.dim(), self.crop, (height, width), aligned)?;
+        let plan = Conditioner::new(
+            Size::from_shape(self.depth.dim()),
+            self.crop,
+            Size { width, height },
+            aligned,
+        )?;
         let mut to = vec![9.0; height * width];
         plan.condition(
             self.depth.as_slice().unwrap(),
@@ -204,15 +223,15 @@ fn contradicted_readings_take_the_depth_of_their_colour() {
 
 #[test]
 fn weak_evidence_shifts_nothing() {
-    let size = (40, 50);
-    let step = Array2::from_shape_fn(size, |(_, x)| if x < 20 { 0.2 } else { 0.8 });
+    let shape = (40, 50);
+    let step = Array2::from_shape_fn(shape, |(_, x)| if x < 20 { 0.2 } else { 0.8 });
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
     let mut noisy = |least: f32, most: f32| random.random_range(least..most);
     let black = Array3::zeros((3, 160, 200));
     let grey = Array3::from_elem((3, 160, 200), 0.5);
-    let flat = Array2::from_elem(size, 0.4);
+    let flat = Array2::from_elem(shape, 0.4);
     let texture = Array3::from_shape_fn((3, 160, 200), |_| noisy(0.0, 1.0));
-    let rough = Array2::from_shape_fn(size, |_| 0.5 + noisy(-0.02, 0.02));
+    let rough = Array2::from_shape_fn(shape, |_| 0.5 + noisy(-0.02, 0.02));
     for (depth, rgb) in [(&step, &black), (&step, &grey), (&flat, &texture), (&rough, &texture)] {
         let case = Case::whole(depth.clone(), rgb.clone());
         assert_eq!(case.condition(false).unwrap(), case.condition(true).unwrap());
@@ -233,7 +252,16 @@ fn a_shift_beyond_the_range_leaves_surfaces_whole() {
 #[test]
 fn frames_share_their_evidence_until_a_reset() {
     let (case, other) = (Case::disc(4, (2, 2)), Case::disc(4, (0, 0)));
-    let plan = Conditioner::new((50, 50), case.crop, (200, 200), false).unwrap();
+    let plan = Conditioner::new(
+        Size { width: 50, height: 50 },
+        case.crop,
+        Size {
+            width: 200,
+            height: 200,
+        },
+        false,
+    )
+    .unwrap();
     let mut scratch = plan.scratch();
     let run = |case: &Case, scratch: &mut ConditionScratch| {
         let mut to = vec![0.0; 200 * 200];
@@ -286,7 +314,16 @@ fn a_sensor_that_is_moved_is_followed() {
 #[test]
 fn surfaces_stay_where_nothing_moves() {
     let case = Case::disc(4, (0, 0));
-    let plan = Conditioner::new((50, 50), case.crop, (200, 200), true).unwrap();
+    let plan = Conditioner::new(
+        Size { width: 50, height: 50 },
+        case.crop,
+        Size {
+            width: 200,
+            height: 200,
+        },
+        true,
+    )
+    .unwrap();
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
     // Only its place tells the surface of a pixel.
     let rgb = vec![0.5; 3 * 200 * 200];
@@ -315,7 +352,16 @@ fn surfaces_stay_where_nothing_moves() {
 #[test]
 fn what_moves_leaves_no_trail() {
     let first = Case::disc(4, (0, 0));
-    let plan = Conditioner::new((50, 50), first.crop, (200, 200), true).unwrap();
+    let plan = Conditioner::new(
+        Size { width: 50, height: 50 },
+        first.crop,
+        Size {
+            width: 200,
+            height: 200,
+        },
+        true,
+    )
+    .unwrap();
     let mut scratch = plan.scratch();
     for step in 0..5 {
         let mut case = Case::disc(4, (0, 0));
@@ -438,7 +484,7 @@ fn unusual_frames_give_depth() {
     assert!((conditioned[5 * 20 + 2] - 0.2).abs() < 1e-5 && (conditioned[5 * 20 + 17] - 0.7).abs() < 1e-5);
     // Of twice the width in proportion to its height: the display sees the middle half.
     let long = Array2::from_shape_fn((12, 40), |(_, x)| [0.1, 0.3, 0.6, 0.9][x / 10]);
-    let crop = Crop::cover((12, 40), (12, 20));
+    let crop = Crop::cover(Size { width: 40, height: 12 }, Size { width: 20, height: 12 });
     let middle = Case {
         depth: long,
         rgb: texture.clone(),
@@ -463,7 +509,18 @@ fn unusual_frames_give_depth() {
 
 #[test]
 fn impossible_shapes_are_refused() {
-    let crop = Crop::cover((1, 1), (1, 1));
-    assert!(Conditioner::new((0, 4), crop, (4, 4), true).is_err());
-    assert!(Conditioner::new((4, 4), crop, (4, 1 << 17), true).is_err());
+    let crop = Crop::cover(Size { width: 1, height: 1 }, Size { width: 1, height: 1 });
+    assert!(Conditioner::new(Size { width: 4, height: 0 }, crop, Size { width: 4, height: 4 }, true).is_err());
+    assert!(
+        Conditioner::new(
+            Size { width: 4, height: 4 },
+            crop,
+            Size {
+                width: 1 << 17,
+                height: 4
+            },
+            true
+        )
+        .is_err()
+    );
 }

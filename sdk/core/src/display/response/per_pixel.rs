@@ -25,6 +25,7 @@
 //! which is interpolated in the same way, the smallest phase is nearer than the largest, so phase 0 determines the
 //! level. All arithmetic is in f32.
 
+use crate::Size;
 use crate::runtime::error::{Error, Result};
 use std::f32::consts::TAU;
 
@@ -38,13 +39,12 @@ pub const MAX_INTERVALS: usize = 64;
 /// The levels of every pixel. The table is immutable and can be shared between threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerPixel {
-    /// The height of the modulator.
-    height: usize,
-    width: usize,
+    /// The size of the modulator.
+    modulator: Size,
     /// The upper left pixel of the part of the modulator that a stack (C, H, W) covers; `window` is the size of that
     /// part.
     corner: (usize, usize),
-    window: (usize, usize),
+    window: Size,
     spacing: usize,
     intervals: usize,
     /// The grid of nodes, (Gh, Gw).
@@ -55,14 +55,15 @@ pub struct PerPixel {
     turn: Vec<f32>,
 }
 
-/// Returns the grid (Gh, Gw) of nodes every `spacing` pixels over (`height`, `width`).
-pub fn nodes(height: usize, width: usize, spacing: usize) -> (usize, usize) {
+/// Returns the grid (Gh, Gw) of nodes every `spacing` pixels over `size`.
+pub fn nodes(size: Size, spacing: usize) -> (usize, usize) {
+    let Size { width, height } = size;
     let along = |n: usize| n.saturating_sub(1).div_ceil(spacing) + 1;
     (along(height), along(width))
 }
 
 impl PerPixel {
-    /// Creates a table for a modulator of (`height`, `width`) pixels with nodes every `spacing` pixels.
+    /// Creates a table for a modulator of `size` with nodes every `spacing` pixels.
     ///
     /// `levels`, (C, Gh, Gw, `intervals` + 1), are the levels of the phases 2πk/`intervals`. They may exceed 255 for
     /// phases that the modulator does not reach. `turn`, (C, Gh, Gw), are the phases from which phase 0 is nearer, or
@@ -73,14 +74,7 @@ impl PerPixel {
     /// # Errors
     /// Returns an error if a size is 0, there are more than [`MAX_INTERVALS`] intervals, lengths do not match, levels
     /// fall along a curve or lie outside 0..=511, or a `turn` lies outside 0..=2π.
-    pub fn new(
-        height: usize,
-        width: usize,
-        spacing: usize,
-        intervals: usize,
-        levels: &[f32],
-        turn: &[f32],
-    ) -> Result<Self> {
+    pub fn new(size: Size, spacing: usize, intervals: usize, levels: &[f32], turn: &[f32]) -> Result<Self> {
         let refuse = |what: String| Err(Error::Setting(format!("per-pixel table: {what}")));
         let most = f32::from(u16::MAX) / FRACTIONS;
         if let Some(level) = levels.iter().find(|l| !(0.0..=most).contains(*l)) {
@@ -93,17 +87,11 @@ impl PerPixel {
         let turn: Vec<u16> = (turn.iter())
             .map(|t| (t / TAU * f32::from(u16::MAX)).round() as u16)
             .collect();
-        Self::of_fractions(height, width, spacing, intervals, &levels, &turn)
+        Self::of_fractions(size, spacing, intervals, &levels, &turn)
     }
 
-    fn of_fractions(
-        height: usize,
-        width: usize,
-        spacing: usize,
-        intervals: usize,
-        levels: &[u16],
-        turn: &[u16],
-    ) -> Result<Self> {
+    fn of_fractions(size: Size, spacing: usize, intervals: usize, levels: &[u16], turn: &[u16]) -> Result<Self> {
+        let Size { width, height } = size;
         let refuse = |what: String| Err(Error::Setting(format!("per-pixel table: {what}")));
         if height == 0 || width == 0 || spacing == 0 || height > 65536 || width > 65536 {
             return refuse(format!(
@@ -115,7 +103,7 @@ impl PerPixel {
                 "{intervals} intervals of phase; there must be 1 to {MAX_INTERVALS}"
             ));
         }
-        let nodes = nodes(height, width, spacing);
+        let nodes = nodes(Size { width, height }, spacing);
         let one = nodes.0 * nodes.1;
         let count = if turn.len() == one { one } else { 3 * one };
         if turn.len() != count || levels.len() != count * (intervals + 1) {
@@ -130,10 +118,9 @@ impl PerPixel {
             return refuse("a curve falls; levels must rise with the phase".into());
         }
         Ok(PerPixel {
-            height,
-            width,
+            modulator: size,
             corner: (0, 0),
-            window: (height, width),
+            window: size,
             spacing,
             intervals,
             nodes,
@@ -160,7 +147,7 @@ impl PerPixel {
         if sizes.iter().any(|n| !(1..=65536).contains(n)) {
             return Err(refuse(format!("holds impossible sizes {sizes:?}")));
         }
-        let (rows, columns) = nodes(height, width, spacing);
+        let (rows, columns) = nodes(Size { width, height }, spacing);
         // The number of bytes of one colour.
         let needed = 2 * rows * columns * (intervals + 2);
         let count = rest.len() / needed * rows * columns;
@@ -174,13 +161,18 @@ impl PerPixel {
             .map(|pair| u16::from_le_bytes([pair[0], pair[1]]))
             .collect();
         let (levels, turn) = values.split_at(count * (intervals + 1));
-        Self::of_fractions(height, width, spacing, intervals, levels, turn)
+        Self::of_fractions(Size { width, height }, spacing, intervals, levels, turn)
     }
 
     /// Returns the bytes of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
-        for number in [self.height, self.width, self.spacing, self.intervals] {
+        for number in [
+            self.modulator.height,
+            self.modulator.width,
+            self.spacing,
+            self.intervals,
+        ] {
             bytes.extend((number as u32).to_le_bytes());
         }
         for level in &self.levels {
@@ -192,15 +184,20 @@ impl PerPixel {
         bytes
     }
 
-    /// Returns the table of the central (`height`, `width`) pixels, for a hologram smaller than the modulator.
+    /// Returns the part of the table of `size` in its middle, for a hologram smaller than the modulator.
     ///
     /// # Errors
     /// Returns an error if the table has fewer pixels.
-    pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
-        let (rows, columns) = self.window;
+    pub fn centred(&self, size: Size) -> Result<Self> {
+        let Size { width, height } = size;
+        let Size {
+            width: columns,
+            height: rows,
+        } = self.window;
         if height > rows || width > columns {
             return Err(Error::Setting(format!(
-                "per-pixel table: for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
+                "per-pixel table: for {} pixels, the hologram has {size}; it must not be larger",
+                self.window
             )));
         }
         Ok(PerPixel {
@@ -208,7 +205,7 @@ impl PerPixel {
                 self.corner.0 + (rows - height) / 2,
                 self.corner.1 + (columns - width) / 2,
             ),
-            window: (height, width),
+            window: size,
             ..self.clone()
         })
     }
@@ -218,8 +215,8 @@ impl PerPixel {
         self.turn.len() / (self.nodes.0 * self.nodes.1)
     }
 
-    /// Returns the (H, W) of stacks for this table.
-    pub fn shape(&self) -> (usize, usize) {
+    /// Returns the size of the planes that this table is for.
+    pub fn size(&self) -> Size {
         self.window
     }
 
@@ -285,7 +282,7 @@ impl PerPixel {
 
     /// Returns the colour and the modulator pixel (y, x) of value `at` of a stack.
     fn place(&self, at: usize) -> (usize, usize, usize) {
-        let (height, width) = self.window;
+        let Size { width, height } = self.window;
         let plane = height * width;
         assert!(at < self.colours() * plane, "a place outside the modulator");
         let (y, x) = (at % plane / width, at % width);
@@ -313,7 +310,7 @@ impl PerPixel {
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         let (colour, y, x) = self.place(first);
-        let end = self.corner.1 + self.window.1;
+        let end = self.corner.1 + self.window.width;
         assert!(x + phases.len() <= end, "a run beyond its row");
         let knots = self.intervals + 1;
         let (i, fy) = self.split(y);
@@ -457,8 +454,8 @@ mod tests {
     use super::*;
 
     /// Creates a table of curves that bend and differ between nodes. If `short`, they do not reach 2π.
-    fn table(shape: (usize, usize), spacing: usize, intervals: usize, short: bool) -> PerPixel {
-        let (rows, columns) = nodes(shape.0, shape.1, spacing);
+    fn table(size: Size, spacing: usize, intervals: usize, short: bool) -> PerPixel {
+        let (rows, columns) = nodes(size, spacing);
         let mut levels = Vec::new();
         let mut turn = Vec::new();
         for node in 0..3 * rows * columns {
@@ -477,7 +474,7 @@ mod tests {
             }
             turn.push(if reach < 1.0 { (reach + 1.0) / 2.0 * TAU } else { TAU });
         }
-        PerPixel::new(shape.0, shape.1, spacing, intervals, &levels, &turn).unwrap()
+        PerPixel::new(size, spacing, intervals, &levels, &turn).unwrap()
     }
 
     fn phases(n: usize, seed: usize) -> Vec<f32> {
@@ -492,16 +489,16 @@ mod tests {
 
     #[test]
     fn rows_agree_with_the_rule_to_the_bit() {
-        for (shape, spacing, intervals) in [
-            ((7, 301), 32, 32),
-            ((33, 65), 32, 64),
-            ((1, 1), 5, 1),
-            ((9, 10), 1, 17),
-            ((5, 40), 64, 8),
+        for (size, spacing, intervals) in [
+            (Size { width: 301, height: 7 }, 32, 32),
+            (Size { width: 65, height: 33 }, 32, 64),
+            (Size { width: 1, height: 1 }, 5, 1),
+            (Size { width: 10, height: 9 }, 1, 17),
+            (Size { width: 40, height: 5 }, 64, 8),
         ] {
             for short in [false, true] {
-                let table = table(shape, spacing, intervals, short);
-                let (h, w) = shape;
+                let table = table(size, spacing, intervals, short);
+                let Size { width: w, height: h } = size;
                 for row in 0..3 * h {
                     let phases = phases(w, row);
                     for begin in [0, w / 3] {
@@ -509,7 +506,7 @@ mod tests {
                         table.levels(&phases[begin..], row * w + begin, &mut out);
                         for (x, level) in out.iter().enumerate() {
                             let at = row * w + begin + x;
-                            assert_eq!(*level, table.level(phases[begin + x], at), "{shape:?} {at}");
+                            assert_eq!(*level, table.level(phases[begin + x], at), "{size} {at}");
                         }
                     }
                 }
@@ -519,7 +516,7 @@ mod tests {
 
     #[test]
     fn a_level_shows_the_phase_that_asks_for_it() {
-        let table = table((20, 50), 16, 32, false);
+        let table = table(Size { width: 50, height: 20 }, 16, 32, false);
         for at in [0, 77, 999, 1500, 2999] {
             for i in 0..200 {
                 let phase = i as f32 / 200.0 * TAU;
@@ -535,7 +532,7 @@ mod tests {
     fn phases_out_of_reach_get_the_nearer_end() {
         let levels: Vec<f32> = (0..=8).map(|k| k as f32 / 8.0 * 340.0).collect();
         let levels: Vec<f32> = levels.iter().cycle().take(9 * 12).copied().collect();
-        let table = PerPixel::new(3, 4, 4, 8, &levels, &[TAU * 0.875; 12]).unwrap();
+        let table = PerPixel::new(Size { width: 4, height: 3 }, 4, 8, &levels, &[TAU * 0.875; 12]).unwrap();
         assert_eq!(table.level(TAU * 0.5, 5), 170);
         assert_eq!(table.level(TAU * 0.8, 5), 255);
         assert_eq!(table.level(TAU * 0.87, 5), 255);
@@ -544,9 +541,9 @@ mod tests {
 
     #[test]
     fn a_centred_table_is_the_middle_of_the_whole() {
-        let whole = table((33, 65), 16, 32, true);
-        let part = whole.centred(20, 41).unwrap();
-        assert_eq!((part.shape(), part.corner()), ((20, 41), (6, 12)));
+        let whole = table(Size { width: 65, height: 33 }, 16, 32, true);
+        let part = whole.centred(Size { width: 41, height: 20 }).unwrap();
+        assert_eq!((part.size(), part.corner()), (Size { width: 41, height: 20 }, (6, 12)));
         let phases = phases(41, 1);
         let mut levels = vec![0; 41];
         for row in [0, 19, 20, 45, 59] {
@@ -557,13 +554,13 @@ mod tests {
                 assert_eq!(*level, part.level(phases[x], row * 41 + x));
             }
         }
-        assert_eq!(part.centred(2, 41).unwrap().corner(), (15, 12));
-        assert!(part.centred(21, 3).is_err());
+        assert_eq!(part.centred(Size { width: 41, height: 2 }).unwrap().corner(), (15, 12));
+        assert!(part.centred(Size { width: 3, height: 21 }).is_err());
     }
 
     #[test]
     fn bytes_hold_the_table_and_broken_ones_are_named() {
-        let table = table((33, 65), 16, 32, true);
+        let table = table(Size { width: 65, height: 33 }, 16, 32, true);
         let bytes = table.to_bytes();
         assert_eq!(PerPixel::from_bytes(&bytes).unwrap(), table);
         let message = |bytes: &[u8]| PerPixel::from_bytes(bytes).unwrap_err().to_string();

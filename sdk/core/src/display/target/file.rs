@@ -108,8 +108,8 @@ impl Target {
         }
         let colours = header.display.colours();
         let (laser, rest) = (rest.split_at_checked(4 * colours * rows * columns)).ok_or_else(short)?;
-        let modulator = (header.display.height(), header.display.width());
-        let values = maps * modulator.0 * modulator.1;
+        let modulator = header.display.size();
+        let values = maps * modulator.height * modulator.width;
         let (flatness, rest) = rest.split_at_checked(2 * values).ok_or_else(short)?;
         let (model, table) = (rest.split_at_checked(header.model.unwrap_or_default())).ok_or_else(short)?;
         if table.len() != header.per_pixel {
@@ -190,7 +190,7 @@ impl Target {
             lens_m: *lens_m,
             flatness: flatness
                 .as_ref()
-                .map(|flatness| flatness.maps().len() / (flatness.shape().0 * flatness.shape().1)),
+                .map(|flatness| flatness.maps().len() / (flatness.size().height * flatness.size().width)),
             levels_turns: levels_turns.clone(),
             shift_px: Some(self.registration.shift_px.clone()).filter(|shift| !shift.is_empty()),
             scale: Some(self.registration.scale.clone()).filter(|scale| !scale.is_empty()),
@@ -214,6 +214,7 @@ impl Target {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::Size;
     use crate::display::model::ColourModel;
     use crate::display::response::per_pixel::nodes;
     use ndarray::Array3;
@@ -226,12 +227,12 @@ mod tests {
         let text = format!("width = 40\nheight = 24\noffset_mm = 3.5\nwavelengths_nm = {wavelengths_nm}");
         let display = Display::from_toml(&text).unwrap();
         let colours = display.colours();
-        let (rows, columns) = nodes(24, 40, 16);
+        let (rows, columns) = nodes(Size { width: 40, height: 24 }, 16);
         let levels: Vec<f32> = (0..colours * rows * columns)
             .flat_map(|node| (0..=4).map(move |k| (node % 7) as f32 + 50.0 * k as f32))
             .collect();
         let turns = vec![6.0; colours * rows * columns];
-        let table = PerPixel::new(24, 40, 16, 4, &levels, &turns).unwrap();
+        let table = PerPixel::new(Size { width: 40, height: 24 }, 16, 4, &levels, &turns).unwrap();
         let amplitude = Array3::from_shape_fn((colours, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
         Target {
             display,
@@ -241,7 +242,9 @@ mod tests {
             panel: Panel {
                 carrier_rad: [0.01, -0.002],
                 lens_m: Some(0.5),
-                flatness: Some(Flatness::new((24, 40), (0..960).map(|i| 64 * i).collect()).unwrap()),
+                flatness: Some(
+                    Flatness::new(Size { width: 40, height: 24 }, (0..960).map(|i| 64 * i).collect()).unwrap(),
+                ),
                 levels_turns: None,
             },
             registration: Registration {

@@ -202,6 +202,7 @@ pub struct AntiAliasScratch {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::Size;
 
     #[test]
     fn agrees_with_the_direct_double_sum_edges_included() {
@@ -214,12 +215,13 @@ mod tests {
         ] {
             for threads in [1, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| check(h, w, sigma, taps));
+                pool.install(|| check(Size { width: w, height: h }, sigma, taps));
             }
         }
     }
 
-    fn check(h: usize, w: usize, sigma: f32, taps: usize) {
+    fn check(size: Size, sigma: f32, taps: usize) {
+        let Size { width: w, height: h } = size;
         let plan = AntiAlias::new(sigma, taps).unwrap();
         let plane: Vec<_> = (0..h * w)
             .map(|i| Complex32::new((i as f32).sin(), (i as f32 * 2.0).cos()))

@@ -1,6 +1,7 @@
 //! The filter of BL-DPM (Sui et al., Opt. Express 29, 2597, 2021). It removes the frequencies that the checkerboard
 //! would fold onto the image and keeps |tan(πfx)·tan(πfy)| ≤ k, with f in cycles per pixel.
 
+use crate::Size;
 use crate::optics::fft::{ConvolveScratch, Fft2};
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -23,14 +24,14 @@ impl BandLimit {
     ///
     /// # Errors
     /// Returns an error if `k` is not positive.
-    pub fn new(height: usize, width: usize, k: f32) -> Result<Self> {
+    pub fn new(size: Size, k: f32) -> Result<Self> {
         if k.is_nan() || k <= 0.0 {
             return Err(Error::Setting(format!(
                 "a band limit of {k} keeps only the axes; it must be above 0"
             )));
         }
         Ok(BandLimit {
-            fft: Fft2::new(height, width, height, width),
+            fft: Fft2::new(size, size),
             k: k.into(),
         })
     }
@@ -42,7 +43,7 @@ impl BandLimit {
 
     /// Returns the largest |ky| that is kept in column `kx` of the spectrum.
     fn bound(&self, kx: usize) -> f64 {
-        let (height, width) = self.fft.padded_shape();
+        let Size { width, height } = self.fft.padded_size();
         let tan_x = (PI * kx.min(width - kx) as f64 / width as f64).tan();
         // tan grows with the frequency, so the kept rows are those up to one angle.
         (self.k / tan_x).atan() * height as f64 / PI
@@ -55,7 +56,7 @@ impl BandLimit {
 
     /// Filters `plane`, (H, W), with periodic boundaries.
     pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
-        let (height, width) = self.fft.padded_shape();
+        let Size { width, height } = self.fft.padded_size();
         let scale = 1.0 / (height * width) as f32;
         self.fft.convolve(
             plane,
@@ -79,7 +80,7 @@ mod tests {
     #[test]
     fn keeps_just_the_frequencies_under_the_bound() {
         let (h, w) = (12, 9);
-        let plan = BandLimit::new(h, w, 1.0).unwrap();
+        let plan = BandLimit::new(Size { width: w, height: h }, 1.0).unwrap();
         let mut scratch = plan.scratch();
         for ky in 0..h {
             for kx in 0..w {

@@ -6,6 +6,7 @@
 //! the network's input requires it, the blur of AA-DPM is applied first.
 
 use super::anti_alias::{AntiAlias, AntiAliasScratch};
+use crate::Size;
 use crate::display::Display;
 use crate::method::network::{FilterPlan, FilterScratch, Network};
 use crate::runtime::cancel::Cancel;
@@ -23,7 +24,7 @@ pub fn blur() -> Result<AntiAlias> {
 /// A pre-filter for one shape.
 pub struct Deep {
     /// The frame shape (H, W).
-    shape: (usize, usize),
+    size: Size,
     blur: Option<AntiAlias>,
     network: FilterPlan,
 }
@@ -42,24 +43,24 @@ impl DeepScratch {
 }
 
 impl Deep {
-    /// Plans the filtering of fields of (C, `height`, `width`) in the colours of `display`.
+    /// Plans the filtering of fields of `size` in the colours of `display`.
     ///
     /// # Errors
     /// Returns an error if the network is not a pre-filter, does not support the display, or is not supported by the
     /// kernels.
-    pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
+    pub fn new(size: Size, network: &Network, display: &Display) -> Result<Self> {
         let blurred = network.input().is_blurred();
         Ok(Deep {
-            shape: (height, width),
+            size,
             blur: blurred.then(blur).transpose()?,
-            network: network.filter_plan_for(height, width, display)?,
+            network: network.filter_plan_for(size, display)?,
         })
     }
 
     /// Returns working memory for one call at a time.
     pub fn scratch(&self) -> DeepScratch {
         DeepScratch {
-            blur: self.blur.as_ref().map(|blur| blur.scratch(self.shape.1)),
+            blur: self.blur.as_ref().map(|blur| blur.scratch(self.size.width)),
             network: self.network.scratch(),
         }
     }
@@ -69,7 +70,7 @@ impl Deep {
     /// # Panics
     /// Panics if `field` does not have C·H·W values.
     pub fn filter(&self, field: &mut [Complex32], scratch: &mut DeepScratch) {
-        let (height, width) = self.shape;
+        let Size { width, height } = self.size;
         if let (Some(blur), Some(scratch)) = (&self.blur, &mut scratch.blur) {
             for plane in field.chunks_exact_mut(height * width) {
                 blur.in_place(plane, width, scratch);

@@ -3,6 +3,7 @@
 
 use super::fused::{FusedChain, FusedScratch, tanh};
 use super::{Engine, Head, InputKind};
+use crate::Size;
 use crate::runtime::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling, wide};
@@ -15,7 +16,7 @@ pub struct FilterPlan {
     pub(super) head: Head,
     /// The output that is the field of a display with one laser.
     pub(super) colour: Option<usize>,
-    pub(super) size: (usize, usize),
+    pub(super) size: Size,
     pub(super) engine: Engine,
 }
 
@@ -60,7 +61,7 @@ impl FilterPlan {
     /// Filters with some colours of the output. The field's planes are the network's red, green and blue. A single
     /// plane is used for all three.
     fn filter_of<const C: usize>(&self, colours: [usize; C], field: &mut [Complex32], scratch: &mut FilterScratch) {
-        let (height, width) = self.size;
+        let Size { width, height } = self.size;
         assert_eq!(field.len(), C * height * width, "values of the field");
         // Bands span the whole width because a neighbouring strip would overwrite a strip's halo.
         let tiling = Tiling {

@@ -2,6 +2,7 @@
 
 use super::chain::{Chain, Precision, Quantisation, Weights};
 use super::{Head, InputKind, Source};
+use crate::Size;
 use crate::runtime::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{
@@ -62,7 +63,7 @@ impl FusedChain {
     }
 
     /// Runs the chain on the current rayon pool. `input` and `output` are planes of `size` (height, width).
-    pub(super) fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), scratch: &FusedScratch) {
+    pub(super) fn run(&self, input: &[f32], output: &mut [f32], size: Size, scratch: &FusedScratch) {
         let tiling = self.tiling(size);
         match &self.kernels {
             Kernels::Int8(chain) => chain.run(input, output, size, tiling, &scratch.int8),
@@ -81,7 +82,7 @@ impl FusedChain {
         source: &S,
         into: FieldOf<C>,
         field: &mut [Complex32],
-        size: (usize, usize),
+        size: Size,
         scratch: &FusedScratch,
     ) {
         let rows = FieldRows {
@@ -90,7 +91,7 @@ impl FusedChain {
             tanh: self.tanh,
             cancel: &scratch.cancel,
         };
-        let mut planes = field.chunks_exact_mut((size.0 * size.1).max(1));
+        let mut planes = field.chunks_exact_mut((size.height * size.width).max(1));
         let planes: [_; C] = std::array::from_fn(|_| planes.next().unwrap_or_default());
         self.run_rows(&rows, planes, size, self.tiling(size), scratch);
     }
@@ -108,10 +109,10 @@ impl FusedChain {
     }
 
     /// Returns the tiling that suits a frame of `size` and the current rayon pool.
-    pub(super) fn tiling(&self, size: (usize, usize)) -> Tiling {
+    pub(super) fn tiling(&self, size: Size) -> Tiling {
         match &self.kernels {
-            Kernels::Int8(chain) => chain.tiling(size.0, size.1),
-            Kernels::F32(chain) => chain.tiling(size.0, size.1),
+            Kernels::Int8(chain) => chain.tiling(size),
+            Kernels::F32(chain) => chain.tiling(size),
         }
     }
 
@@ -120,7 +121,7 @@ impl FusedChain {
         &self,
         rows: &R,
         planes: [&mut [R::Value]; PLANES],
-        size: (usize, usize),
+        size: Size,
         tiling: Tiling,
         scratch: &FusedScratch,
     ) {

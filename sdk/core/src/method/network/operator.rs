@@ -1,6 +1,7 @@
 //! The fused chain as one operator of a tract graph.
 
 use super::fused::{FusedChain, FusedScratch};
+use crate::Size;
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;
 use std::sync::Arc;
@@ -78,7 +79,7 @@ impl EvalOp for FusedOperator {
         let written = view.as_slice_mut().context("the chain writes planes row by row")?;
         self.chain
             .0
-            .run(planes, written, (height, width), &FusedScratch::default());
+            .run(planes, written, Size { width, height }, &FusedScratch::default());
         Ok(tvec!(output.into_tvalue()))
     }
 }

@@ -2,6 +2,7 @@
 //! tested against it.
 
 use super::chain::{Chain, Quantisation, Weights};
+use crate::Size;
 
 /// The pixels of a square of two by two, from the upper left.
 const PIXELS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
@@ -12,14 +13,22 @@ const PIXELS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 ///
 /// # Panics
 /// Panics if `input` does not have `chain.inputs · height · width` values.
-pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
+pub fn run(chain: &Chain, input: &[f32], size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
     assert_eq!(input.len(), chain.inputs * height * width);
     let mut output = if chain.halved {
         let half = (height.div_ceil(2), width.div_ceil(2));
-        let output = layers(chain, &squares(input, height, width), half.0, half.1);
-        pixels(&output, chain.outputs(), height, width)
+        let output = layers(
+            chain,
+            &squares(input, size),
+            Size {
+                width: half.1,
+                height: half.0,
+            },
+        );
+        pixels(&output, chain.outputs(), size)
     } else {
-        layers(chain, input, height, width)
+        layers(chain, input, size)
     };
     if chain.tanh {
         output.iter_mut().for_each(|v| *v = v.tanh());
@@ -28,7 +37,8 @@ pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32
 }
 
 /// Rearranges (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉).
-fn squares(values: &[f32], height: usize, width: usize) -> Vec<f32> {
+fn squares(values: &[f32], size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
     let mut squares = Vec::new();
     for (dy, dx) in PIXELS {
         for plane in values.chunks(height * width) {
@@ -42,7 +52,8 @@ fn squares(values: &[f32], height: usize, width: usize) -> Vec<f32> {
 }
 
 /// Rearranges squares as pixels. This is the inverse of [`squares`].
-fn pixels(squares: &[f32], channels: usize, height: usize, width: usize) -> Vec<f32> {
+fn pixels(squares: &[f32], channels: usize, size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
     let (rows, columns) = (height.div_ceil(2), width.div_ceil(2));
     let mut values = Vec::new();
     for channel in 0..channels {
@@ -55,7 +66,7 @@ fn pixels(squares: &[f32], channels: usize, height: usize, width: usize) -> Vec<
 }
 
 /// Runs the layers on (C, H, W) at their own resolution.
-fn layers(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
+fn layers(chain: &Chain, input: &[f32], size: Size) -> Vec<f32> {
     let last = chain.layers.len() - 1;
     let mut inputs: Vec<Vec<f32>> = Vec::new();
     let mut output = input.to_vec();
@@ -79,7 +90,7 @@ fn layers(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32>
             x.extend(network_input);
         }
         round(&mut x, rounding.input);
-        output = convolve(&x, &real_kernel(layer), layer.outputs, height, width);
+        output = convolve(&x, &real_kernel(layer), layer.outputs, size);
         if i < last {
             output.iter_mut().for_each(|v| *v = v.max(0.0));
         }
@@ -118,7 +129,8 @@ fn real_kernel(layer: &super::chain::Layer) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// Computes a 3×3 convolution (a correlation, as in networks) with stride 1 and zero padding.
-fn convolve(x: &[f32], (kernel, bias): &(Vec<f64>, Vec<f64>), outputs: usize, height: usize, width: usize) -> Vec<f32> {
+fn convolve(x: &[f32], (kernel, bias): &(Vec<f64>, Vec<f64>), outputs: usize, size: Size) -> Vec<f32> {
+    let Size { width, height } = size;
     let inputs = x.len() / (height * width);
     let mut result = Vec::with_capacity(outputs * height * width);
     for (o, bias) in bias.iter().enumerate().take(outputs) {

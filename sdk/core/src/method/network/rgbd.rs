@@ -1,6 +1,7 @@
 //! RGB-D frames as network input.
 
 use super::Source;
+use crate::Size;
 use crate::frame::RgbdFrame;
 
 /// Reads the planes of [`super::InputKind::Rgbd`]: red, green, blue and depth, each minus ½. The amplitude of one laser
@@ -8,7 +9,7 @@ use crate::frame::RgbdFrame;
 impl Source for RgbdFrame {
     #[inline(always)]
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
-        let (height, width) = self.shape();
+        let Size { width, height } = self.size();
         let place = |at: usize, n: usize| (at as f32 + 0.5) / n as f32 - 0.5;
         let (rgb, depth) = self.values();
         let (values, plane) = match plane {

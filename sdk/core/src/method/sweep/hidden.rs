@@ -11,6 +11,7 @@
 //! the four sides is the first hidden layer. The nearest source deeper than that is the second.
 
 use super::workers::Workers;
+use crate::Size;
 use rayon::prelude::*;
 
 /// The difference in normalized depth above which two pixels are on different surfaces.
@@ -181,8 +182,9 @@ struct Work {
 }
 
 impl Hidden {
-    /// Plans the search in frames of (`height`, `width`) up to `reach` pixels.
-    pub fn new(height: usize, width: usize, reach: usize) -> Self {
+    /// Plans the search in frames of `size` up to `reach` pixels.
+    pub fn new(size: Size, reach: usize) -> Self {
+        let Size { width, height } = size;
         Hidden { height, width, reach }
     }
 
@@ -350,7 +352,8 @@ fn step(
 
 /// Finds the same sources as [`Hidden::find`] naively, as the oracle for tests: for each side of each pixel, it walks
 /// from a pixel beyond `reach`.
-pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Vec<u32> {
+pub fn reference(depth: &[f32], size: Size, reach: usize) -> Vec<u32> {
+    let Size { width, height } = size;
     let size = height * width;
     assert_eq!(depth.len(), size);
     let mut sources = vec![NOTHING; 2 * size];

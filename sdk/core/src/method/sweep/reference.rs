@@ -2,6 +2,7 @@
 
 use super::filters::Filters;
 use super::{MEET, Sweep, hidden, hidden_reach, optics};
+use crate::Size;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::runtime::error::Result;
@@ -14,17 +15,20 @@ use num_complex::{Complex32, Complex64};
 /// Returns the same errors as [`super::SweepPlan::new`].
 pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Result<Vec<Complex32>> {
     sweep.check(display)?;
-    frame.check(frame.shape(), display.colours())?;
-    let (height, width) = frame.shape();
+    frame.check(frame.size(), display.colours())?;
+    let Size { width, height } = frame.size();
     let (rgb, depth) = frame.values();
     let size = height * width;
-    let sources = hidden::reference(depth, height, width, hidden_reach(display));
+    let sources = hidden::reference(depth, frame.size(), hidden_reach(display));
     let mut result = Vec::with_capacity(display.colours() * size);
     for (colour, optics) in optics(display, &sweep, z_m)?.iter().enumerate() {
         let filters = Filters::new(optics, sweep.taps / 2);
         // Light may leave the frame and return, so the black border is as wide as the reach of the filters.
         let border = sweep.planes * (filters.step.len() - 1) + filters.home.len();
-        let mut plane = Plane::new(height + 2 * border, width + 2 * border);
+        let mut plane = Plane::new(Size {
+            width: width + 2 * border,
+            height: height + 2 * border,
+        });
         for k in (0..sweep.planes).rev() {
             plane.convolve(&filters.step);
             for layer in (0..=sweep.hidden_layers).rev() {
@@ -73,7 +77,8 @@ struct Plane {
 }
 
 impl Plane {
-    fn new(height: usize, width: usize) -> Self {
+    fn new(size: Size) -> Self {
+        let Size { width, height } = size;
         Plane {
             height,
             width,

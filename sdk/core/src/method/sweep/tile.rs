@@ -9,6 +9,7 @@ use super::Sweep;
 use super::filters::{Filters, Optics};
 use super::hidden::NOTHING;
 use super::shares::{Slot, share};
+use crate::Size;
 use num_complex::Complex32;
 use phasefront_kernels::fir::{Fir, Pixel, RUN, Taps};
 use phasefront_kernels::wide;
@@ -40,14 +41,13 @@ pub(super) struct Surfaces<'a> {
     pub(super) slots: &'a [Slot],
     /// The pixels that the hidden layers continue, (layers, H, W).
     pub(super) hidden: &'a [u32],
-    pub(super) height: usize,
-    pub(super) width: usize,
+    pub(super) size: Size,
 }
 
 /// The properties that all tiles of a plan share.
 pub(super) struct Layout {
-    /// The rows and columns of a tile.
-    side: (usize, usize),
+    /// The size of a tile.
+    tile: Size,
     /// The distance around the tile within which the points of each plane matter, for each colour.
     halos: Vec<Vec<usize>>,
     /// The same for any colour.
@@ -61,8 +61,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Creates the layout of tiles in a frame of `shape`.
-    pub(super) fn new(shape: (usize, usize), sweep: Sweep, optics: &[Optics], filters: &[Filters]) -> Self {
+    /// Creates the layout of tiles in a frame of `size`.
+    pub(super) fn new(size: Size, sweep: Sweep, optics: &[Optics], filters: &[Filters]) -> Self {
         let planes = sweep.planes;
         // Light passes from plane k to plane 0, and from there to the hologram.
         let halo = |optics: &Optics, k: usize| optics.reach(optics.home_m.abs() + k as f64 * optics.step_m) + MARGIN;
@@ -78,27 +78,31 @@ impl Layout {
         let border = (widest[planes - 1] + part).max(end).next_multiple_of(RUN);
         // Tiles of equal size, because the halo of a small rest costs as much as that of a whole tile.
         let side = |size: usize| size.div_ceil(size.div_ceil(sweep.tile));
-        let side = (side(shape.0), side(shape.1).next_multiple_of(RUN));
+        let tile = Size {
+            width: side(size.width).next_multiple_of(RUN),
+            height: side(size.height),
+        };
         let spread = |optics: &Optics| (0..planes).map(|k| optics.reach(k as f64 * optics.step_m)).collect();
         Layout {
-            side,
+            tile,
             halos,
             widest,
             border,
-            stride: side.1 + 2 * border + RUN,
+            stride: tile.width + 2 * border + RUN,
             longest: part.max(end),
             spread: optics.iter().map(spread).collect(),
         }
     }
 
     /// Returns the number of tiles down and across a frame.
-    pub(super) fn count(&self, height: usize, width: usize) -> (usize, usize) {
-        (height.div_ceil(self.side.0), width.div_ceil(self.side.1))
+    pub(super) fn count(&self, size: Size) -> (usize, usize) {
+        let Size { width, height } = size;
+        (height.div_ceil(self.tile.height), width.div_ceil(self.tile.width))
     }
 
     /// Returns the number of rows of the buffer.
     fn rows(&self) -> usize {
-        self.side.0 + 2 * self.border
+        self.tile.height + 2 * self.border
     }
 }
 
@@ -180,14 +184,14 @@ pub(super) struct Tile<'a> {
 impl<'a> Tile<'a> {
     /// Returns tile `index` of a frame, counted by rows.
     pub(super) fn of(layout: &'a Layout, fir: Fir, surfaces: Surfaces<'a>, index: usize) -> Self {
-        let (_, across) = layout.count(surfaces.height, surfaces.width);
+        let (_, across) = layout.count(surfaces.size);
         let part = |i: usize, side: usize, size: usize| i * side..((i + 1) * side).min(size);
         Tile {
             layout,
             fir,
             surfaces,
-            rows: part(index / across, layout.side.0, surfaces.height),
-            columns: part(index % across, layout.side.1, surfaces.width),
+            rows: part(index / across, layout.tile.height, surfaces.size.height),
+            columns: part(index % across, layout.tile.width, surfaces.size.width),
         }
     }
 
@@ -226,8 +230,7 @@ impl<'a> Tile<'a> {
         let Surfaces {
             slots,
             hidden,
-            height,
-            width,
+            size: Size { width, height },
             ..
         } = self.surfaces;
         let widest = self.layout.widest.last().copied().unwrap_or(0);
@@ -438,7 +441,7 @@ impl<'a> Tile<'a> {
         let field = scratch.field.pixels();
         for (i, y) in self.rows.clone().enumerate() {
             let at = (border + i) * stride + border;
-            let out = &mut plane[y * self.surfaces.width..][self.columns.clone()];
+            let out = &mut plane[y * self.surfaces.size.width..][self.columns.clone()];
             wide!(for (out, pixel) in out.iter_mut().zip(&field[at..]) {
                 *out = Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT);
             });

@@ -181,6 +181,7 @@ fn turn(rows: &[Complex32], stride: usize, first: usize, tile: &mut [Complex32])
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Size;
 
     #[test]
     fn an_all_pass_filter_returns_the_plane() {
@@ -191,7 +192,7 @@ mod tests {
             (61, 47, 75, 64),
             (33, 90, 40, 100),
         ] {
-            let fft = Fft2::new(h, w, hp, wp);
+            let fft = Fft2::new(Size { width: w, height: h }, Size { width: wp, height: hp });
             let plane: Vec<_> = (0..h * w)
                 .map(|i| Complex32::new((i as f32 * 0.7).sin(), (i as f32 * 0.3).cos()))
                 .collect();

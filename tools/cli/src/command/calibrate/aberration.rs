@@ -231,7 +231,7 @@ impl Aberration {
                 if first != (photo.height, photo.width) {
                     return Err(format!("is not {}×{} as the others", first.1, first.0));
                 }
-                let zoom = photo.width as f64 / display.width() as f64;
+                let zoom = photo.width as f64 / display.size().width as f64;
                 spot::sharpness(&photo, spot::window(zoom)).map_err(|e| e.to_string())
             };
             if let Some(program) = capture.program()? {
@@ -287,7 +287,7 @@ impl Aberration {
                     ),
                 ));
             }
-            let zoom = photo.width as f64 / display.width() as f64;
+            let zoom = photo.width as f64 / display.size().width as f64;
             *value = spot::sharpness(&photo, spot::window(zoom)).map_err(|e| Error::file(&path, e))?;
         }
         Ok(sharpness)

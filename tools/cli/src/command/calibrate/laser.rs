@@ -5,6 +5,7 @@ use super::{Told, channel, find_photo, photo_path, reading_captures};
 use clap::Args;
 use ndarray::{Array2, Axis, stack};
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_calibration::camera::marks;
 use phasefront_calibration::camera::pattern::Pattern;
 use phasefront_calibration::camera::photograph::Photograph;
@@ -56,8 +57,11 @@ impl Laser {
         let display = self.display.read_without_offset()?.target.display;
         self.take(&display, capture)?;
         reading_captures(&self.captures, colours(&display))?;
-        let shape = (display.height(), display.width());
-        let pattern = Pattern::new(shape.0, shape.1)?;
+        let size = display.size();
+        let pattern = Pattern::new(Size {
+            width: size.width,
+            height: size.height,
+        })?;
         let (mut maps, mut left) = (Vec::new(), Vec::new());
         for (colour, name) in colours(&display).iter().enumerate() {
             let folder = self.captures.join(name);
@@ -82,7 +86,7 @@ impl Laser {
             }
             let registration =
                 marks::Registration::find(&marked, &pattern).map_err(|e| Error::file(&marked_path, e))?;
-            let map = laser::map(&photo, &registration, shape).map_err(|e| Error::file(&path, e))?;
+            let map = laser::map(&photo, &registration, size).map_err(|e| Error::file(&path, e))?;
             let map = match self.gaussians {
                 None => map,
                 Some(count) => {
@@ -118,8 +122,8 @@ impl Laser {
         if !capture.is_given() {
             return Ok(());
         }
-        let pattern = Pattern::new(display.height(), display.width())?;
-        let (frame, flat) = (pattern.frame(0), Array2::zeros(pattern.shape()));
+        let pattern = Pattern::new(display.size())?;
+        let (frame, flat) = (pattern.frame(0), Array2::zeros(pattern.size().shape()));
         let lasers = colours(display).iter().zip(display.wavelengths_m());
         for (colour, (name, wavelength_m)) in lasers.enumerate() {
             let channel = channel(display, colour);
@@ -151,7 +155,7 @@ impl Laser {
                 let registration = marks::register(&marked, &pattern)?;
                 program.take(&shot, &folder.join("flat.png"), |path| {
                     let photo = Photograph::read(path, channel).map_err(|e| e.to_string())?;
-                    laser::map(&photo, &registration, pattern.shape()).map_err(|e| e.to_string())
+                    laser::map(&photo, &registration, pattern.size()).map_err(|e| e.to_string())
                 })?;
             }
         }

@@ -88,7 +88,7 @@ impl Lut {
     }
 
     fn pattern(&self, display: &Display) -> Result<Pattern> {
-        Ok(Pattern::new(display.height(), display.width())?.with_dark(self.dark.unwrap_or(DARK)))
+        Ok(Pattern::new(display.size())?.with_dark(self.dark.unwrap_or(DARK)))
     }
 
     fn check_outputs(&self) -> Result<()> {

@@ -183,8 +183,7 @@ impl OfColour<'_> {
 
     /// Returns the photographs and the number of those that are missing. A program takes them if there is one.
     fn samples(&self, capture: &mut Capture<'_>) -> Result<(Vec<Sample>, usize)> {
-        let (height, width) = self.target.modulator();
-        let pattern = Pattern::new(height, width)?;
+        let pattern = Pattern::new(self.target.modulator())?;
         let marks = scenes::marks(
             self.target,
             self.colour,

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use phasefront::Display;
+use phasefront::Size;
 use phasefront_calibration::colours;
 use phasefront_calibration::rehearse::learned::JUDGED;
 use phasefront_calibration::rehearse::{self, Rehearsal};
@@ -18,7 +19,7 @@ use std::path::PathBuf;
 pub(crate) struct Rehearse {
     /// Size of the modulator
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = parse_size)]
-    size: (usize, usize),
+    size: Size,
     /// Rehearse with one laser of this wavelength instead of three
     #[arg(long, value_name = "NM")]
     laser_nm: Option<f64>,
@@ -47,7 +48,7 @@ pub(crate) struct Rehearse {
 
 impl Rehearse {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        let (width, height) = self.size;
+        let Size { width, height } = self.size;
         check_used(&[("--learn", !self.learn.is_empty(), self.laser_nm.is_some(), "--laser-nm")])?;
         let laser = (self.laser_nm).map_or(String::new(), |nm| format!("wavelengths_nm = [{nm:?}]"));
         let rehearsal = Rehearsal {

@@ -3,6 +3,7 @@
 use crate::record::{Before, Claim, RunRecord, already, names_of};
 use ndarray::Array3;
 use phasefront::Hologram;
+use phasefront::Size;
 use phasefront::output::Layout;
 use phasefront_command::interrupt;
 use phasefront_io::film::video::VideoFrame;
@@ -141,11 +142,11 @@ impl Sink {
         let Some(folder) = &self.folder else {
             return Ok(());
         };
-        let (height, width) = hologram.shape();
+        let Size { width, height } = hologram.size();
         if let Some(z_m) = self.preview_z_m {
             let mut rgba = vec![0; 4 * height * width];
-            hologram.write_preview(z_m, (height, width), Layout::Rgba, &mut rgba, 4 * width)?;
-            picture::write_rgba(&self.preview(folder, index), width, height, &rgba)?;
+            hologram.write_preview(z_m, hologram.size(), Layout::Rgba, &mut rgba, 4 * width)?;
+            picture::write_rgba(&self.preview(folder, index), hologram.size(), &rgba)?;
         }
         let shape = (hologram.colours(), height, width);
         let info = HologramInfo {

@@ -2,6 +2,7 @@
 
 use super::Video;
 use indicatif::ProgressBar;
+use phasefront::Size;
 use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{progress_bar, progress_count};
 use phasefront_core::depth::DepthUnit;
@@ -17,7 +18,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// (H, W) of the colour, and of the depth if there is one.
-type Shapes = ((usize, usize), Option<(usize, usize)>);
+type Sizes = (Size, Option<Size>);
 
 /// A source of frames that all have one size.
 pub(super) struct Source {
@@ -25,7 +26,7 @@ pub(super) struct Source {
     /// The name of the input.
     path: PathBuf,
     /// (H, W) of the colour and of the depth of the first frame.
-    shapes: Option<Shapes>,
+    sizes: Option<Sizes>,
     given: usize,
     /// Fixed near and far, in metres.
     range_m: Option<(f32, f32)>,
@@ -89,14 +90,14 @@ enum FilmDepth {
 }
 
 impl Source {
-    /// Opens the source that `flags` name, and returns it with the (H, W) of its first frame. Completes the flags by
+    /// Opens the source that `flags` name, and returns it with the size of its first frame. Completes the flags by
     /// what a folder's layout defines.
-    pub(super) fn open(flags: &mut Video) -> Result<(Source, (usize, usize))> {
+    pub(super) fn open(flags: &mut Video) -> Result<(Source, Size)> {
         let (input, shape) = Input::open(flags)?;
         let source = Source {
             input,
             path: flags.input.clone(),
-            shapes: None,
+            sizes: None,
             given: 0,
             range_m: flags.depth.range()?,
             told: Vec::new(),
@@ -112,17 +113,17 @@ impl Source {
         let Some(Read { frame, mut doubts }) = self.input.next()? else {
             return Ok(None);
         };
-        let shapes = (frame.shape(), frame.depth_shape());
-        let first = *self.shapes.get_or_insert(shapes);
-        if shapes != first {
-            let said = |((h, w), depth): Shapes| match depth {
-                Some((dh, dw)) => format!("{w}×{h} with depth of {dw}×{dh}"),
-                None => format!("{w}×{h}"),
+        let sizes = (frame.size(), frame.depth_size());
+        let first = *self.sizes.get_or_insert(sizes);
+        if sizes != first {
+            let said = |(colour, depth): Sizes| match depth {
+                Some(depth) => format!("{colour} with depth of {depth}"),
+                None => colour.to_string(),
             };
             return Err(Error::Input(format!(
                 "{}: is {}, the first frame {}; frames of a video have one size, and pictures of any size go to `phasefront hologram` with folders for --rgb and --depth",
                 self.name(self.given),
-                said(shapes),
+                said(sizes),
                 said(first)
             )));
         }
@@ -178,7 +179,7 @@ impl Source {
 }
 
 impl Input {
-    fn open(flags: &mut Video) -> Result<(Input, (usize, usize))> {
+    fn open(flags: &mut Video) -> Result<(Input, Size)> {
         let numbers = flags.depth.options(flags.seen.invert())?;
         let is_pipe = flags.input.as_os_str() == "-";
         let is_film = !is_pipe && film::is_film(&flags.input);
@@ -288,23 +289,22 @@ fn check_range(flags: &Video, numbers: DepthOptions) -> Result<()> {
     }
 }
 
-fn open_pipe(flags: &Video, numbers: DepthOptions) -> Result<(Input, (usize, usize))> {
-    let Some((width, height)) = flags.raw else {
+fn open_pipe(flags: &Video, numbers: DepthOptions) -> Result<(Input, Size)> {
+    let Some(colour) = flags.raw else {
         return Err(Error::Input(
             "raw frames on stdin need --raw WxH, the size of their colour".into(),
         ));
     };
-    let (depth_width, depth_height) = flags.raw_depth.unwrap_or((width, height));
     let raw = RawVideo {
-        colour: (height, width),
-        depth: (depth_height, depth_width),
+        colour,
+        depth: flags.raw_depth.unwrap_or(colour),
         unit: numbers.unit,
     };
     let first = read_raw(&raw)?;
     if first.is_none() {
         return Err(Error::Input("stdin holds no frame".into()));
     }
-    Ok((Input::Pipe { raw, first }, (height, width)))
+    Ok((Input::Pipe { raw, first }, colour))
 }
 
 fn read_raw(raw: &RawVideo) -> Result<Option<Read>> {
@@ -312,7 +312,7 @@ fn read_raw(raw: &RawVideo) -> Result<Option<Read>> {
     frame.map(|frame| Read::checked(frame, false)).transpose()
 }
 
-fn open_film(flags: &Video, numbers: DepthOptions) -> Result<(Input, (usize, usize))> {
+fn open_film(flags: &Video, numbers: DepthOptions) -> Result<(Input, Size)> {
     let path = &flags.input;
     let depth = match (&flags.depth_video, flags.depth_beside, flags.seen.network()) {
         (Some(depth), false, None) => {
@@ -353,8 +353,8 @@ fn open_film(flags: &Video, numbers: DepthOptions) -> Result<(Input, (usize, usi
         .first
         .as_ref()
         .ok_or_else(|| Error::file(path, "holds no picture"))?;
-    let shape = first.frame.shape();
-    Ok((Input::Film(Box::new(film)), shape))
+    let size = first.frame.size();
+    Ok((Input::Film(Box::new(film)), size))
 }
 
 impl FilmSource {
@@ -381,11 +381,11 @@ impl FilmSource {
                     return Ok(None);
                 }
                 Some(depth) => {
-                    VideoFrame::of_big_endian(colour.shape, colour.bytes, depth.shape, &depth.bytes, self.numbers.unit)
+                    VideoFrame::of_big_endian(colour.size, colour.bytes, depth.size, &depth.bytes, self.numbers.unit)
                 }
             },
-            FilmDepth::Beside(sides) => VideoFrame::of_sides(colour.shape, &colour.bytes, sides.side)?,
-            FilmDepth::Network => VideoFrame::without_depth(colour.shape, colour.bytes),
+            FilmDepth::Beside(sides) => VideoFrame::of_sides(colour.size, &colour.bytes, sides.side)?,
+            FilmDepth::Network => VideoFrame::without_depth(colour.size, colour.bytes),
         };
         let read = Read::checked(frame, self.numbers.inverted).map_err(|e| Error::file(&self.path, e))?;
         Ok(Some(read))

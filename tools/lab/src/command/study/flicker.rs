@@ -17,8 +17,7 @@ const FRAMES: usize = 30;
 impl Study {
     /// Studies every setting on random scenes, by the network of 8 layers.
     pub(super) fn flicker(&self, json: bool) -> Result<()> {
-        let (height, width) = flicker::SHAPE;
-        let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
+        let display = self.display.read_of_three()?.target.display.with_size(flicker::SIZE)?;
         let method = Method::Network(networks::network("8", None)?);
         let bar = progress_bar((usize::from(self.scenes) * FRAMES * SETTINGS.len()) as u64, "frames");
         let of_scenes = (0..u64::from(self.scenes))

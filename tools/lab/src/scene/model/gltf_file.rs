@@ -1,6 +1,7 @@
 //! Reads glTF 2.0 and GLB files as [`Part`]s. The `gltf` crate trusts some of a file's statements about its own
 //! buffers, so this module checks them first.
 
+use phasefront::Size;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -241,7 +242,7 @@ impl Reader {
             });
             [r, g, b, (alpha * 255.0).round() as u8]
         });
-        let texture = Arc::new(Texture::new(width, height, texels.collect()).map_err(|e| e.to_string())?);
+        let texture = Arc::new(Texture::new(Size { width, height }, texels.collect()).map_err(|e| e.to_string())?);
         self.textures.push((key, texture.clone()));
         part.texture = Some(texture);
         Ok(())

@@ -1,5 +1,6 @@
 //! Reads Wavefront OBJ files, their MTL files and pictures, as [`Part`]s.
 
+use phasefront::Size;
 use std::cell::RefCell;
 use std::io::BufReader;
 use std::path::Path;
@@ -142,7 +143,7 @@ fn texture(beside: &mut Beside, material: &Material) -> Result<Option<Arc<Textur
         return Ok(None);
     };
     let (width, height, texels) = (beside.texels(&bytes)).map_err(|e| format!("picture {name}: {e}"))?;
-    let texture = Texture::new(width, height, texels).map_err(|e| e.to_string())?;
+    let texture = Texture::new(Size { width, height }, texels).map_err(|e| e.to_string())?;
     Ok(Some(Arc::new(texture)))
 }
 

@@ -4,6 +4,7 @@
 use crate::scene::pattern::Pattern;
 use crate::scene::random::parts::{DEPTH_PER_PX, MARGIN};
 use crate::scene::shapes::Shape;
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
@@ -81,7 +82,16 @@ impl Ground {
                 let cells = dice.integer(1, 5);
                 let rough = dice.range(0.3, 0.7) as f32;
                 let side = PIECES + 1;
-                let relief = Pattern::noise((side, side), (cells, cells), 4, rough, dice);
+                let relief = Pattern::noise(
+                    Size {
+                        width: side,
+                        height: side,
+                    },
+                    (cells, cells),
+                    4,
+                    rough,
+                    dice,
+                );
                 let (far, height) = (dice.range(0.7, 1.0), dice.range(0.1, 0.8));
                 Box::new(move |u, v| {
                     let [i, j] = [u, v].map(|t| (t * PIECES as f64 + 0.5) as usize);

@@ -10,6 +10,7 @@ use crate::scene::pattern::Pattern;
 use crate::scene::random::parts::{DEPTH_PER_PX, MARGIN, light};
 use crate::scene::shapes::{Light, Place, Shape, turn};
 use crate::scene::{Mesh, Scene, Texture};
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::sync::Arc;
 
@@ -21,9 +22,10 @@ const BLOCK_PIECES: usize = 3;
 /// The half size of a room's front over the size of the frame, which it exceeds a little.
 const HALF: f64 = 0.52;
 
-/// Makes a random room for a frame of `height` x `width` pixels. The same arguments give the same scene on every
+/// Makes a random room for a frame of `size`. The same arguments give the same scene on every
 /// machine.
-pub fn interior_scene(seed: u64, height: usize, width: usize) -> Scene {
+pub fn interior_scene(seed: u64, size: Size) -> Scene {
+    let Size { width, height } = size;
     let mut dice = Dice::new(seed);
     let view = View::new(&mut dice, height as f64, width as f64);
     let mut maker = Maker {
@@ -129,7 +131,11 @@ impl Maker {
         }
         let [left, low] = [self.dice.range(0.05, 0.5), self.dice.range(0.3, 0.5)];
         let [right, high] = [left + self.dice.range(0.2, 0.45), low + self.dice.range(0.2, 0.45)];
-        let sky = Arc::new(Pattern::gradient((8, 64), (0, 1)).texture([[0.6, 0.75, 0.9], [0.8, 0.9, 1.0], [1.0; 3]]));
+        let sky = Arc::new(Pattern::gradient(Size { width: 8, height: 64 }, (0, 1)).texture([
+            [0.6, 0.75, 0.9],
+            [0.8, 0.9, 1.0],
+            [1.0; 3],
+        ]));
         self.block([left, right], [low, high], [0.985, 0.99], &sky);
         let paint = Arc::new(Texture::plain(self.colour()));
         let slats = self.dice.pick(&[0, 4, 10, 20]);
@@ -268,7 +274,11 @@ impl Maker {
 
     /// Makes a texture of `side` x `side` texels in two colours of this room.
     fn texture(&mut self, material: Material, side: usize) -> Arc<Texture> {
-        let (size, dice) = ((side, side), &mut self.dice);
+        let size = Size {
+            width: side,
+            height: side,
+        };
+        let dice = &mut self.dice;
         let fine = side / 4;
         let pattern = match material {
             Material::Wallpaper => {
@@ -314,7 +324,12 @@ mod tests {
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         let of = |seed| {
-            let ldi = render_ldi_reference(&interior_scene(seed, 96, 96), 96, 96, 5).unwrap();
+            let ldi = render_ldi_reference(
+                &interior_scene(seed, Size { width: 96, height: 96 }),
+                Size { width: 96, height: 96 },
+                5,
+            )
+            .unwrap();
             format!("{:016x}", fingerprint(&ldi))
         };
         assert_eq!([of(3), of(4)], ["e35d03b1462c6b75", "0aa52a2c2f5072db"]);
@@ -324,10 +339,10 @@ mod tests {
     fn interiors_of_any_size_lie_in_the_volume() {
         for (height, width) in [(1, 1), (3, 200), (61, 47), (40, 270)] {
             for seed in 0..8 {
-                let scene = interior_scene(seed, height, width);
+                let scene = interior_scene(seed, Size { width, height });
                 let inside = |mesh: &Mesh| mesh.positions.iter().all(|p| p[2].abs() <= 0.5);
                 assert!(scene.meshes.iter().all(inside), "{seed}: a part is outside the volume");
-                render_ldi_reference(&scene, height, width, 5).unwrap();
+                render_ldi_reference(&scene, Size { width, height }, 5).unwrap();
             }
         }
     }
@@ -336,7 +351,21 @@ mod tests {
     fn walls_fill_the_frame_and_furniture_hides_them() {
         let (mut nearest, mut farthest, mut hidden) = (1.0f32, 0.0f32, 0);
         for seed in 0..16 {
-            let ldi = render_ldi_reference(&interior_scene(seed, 128, 128), 128, 128, 3).unwrap();
+            let ldi = render_ldi_reference(
+                &interior_scene(
+                    seed,
+                    Size {
+                        width: 128,
+                        height: 128,
+                    },
+                ),
+                Size {
+                    width: 128,
+                    height: 128,
+                },
+                3,
+            )
+            .unwrap();
             let depth = &ldi.layers[0].depth;
             assert!(depth.iter().all(|d| !d.is_nan()), "{seed}: a hole");
             nearest = depth.iter().copied().fold(nearest, f32::min);

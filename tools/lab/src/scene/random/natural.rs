@@ -10,6 +10,7 @@ use crate::scene::random::photographs::piece;
 use crate::scene::random::thin;
 use crate::scene::shapes::{Light, Place, Shape, turn};
 use crate::scene::{Mesh, Scene, Texture};
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -20,9 +21,10 @@ const MAX_TEXELS: f64 = 432.0;
 const WARMER: [f64; 3] = [0.5, 0.0, -0.5];
 const PURPLER: [f64; 3] = [0.25, -0.5, 0.25];
 
-/// Makes a random photograph-like scene for a frame of `height` x `width` pixels. Surfaces show pieces of `photographs`
+/// Makes a random photograph-like scene for a frame of `size`. Surfaces show pieces of `photographs`
 /// if there are any. The same arguments give the same scene on every machine.
-pub fn natural_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
+pub fn natural_scene(seed: u64, size: Size, photographs: &[Texture]) -> Scene {
+    let Size { width, height } = size;
     let mut dice = Dice::new(seed);
     let ground = Ground::natural(&mut dice);
     let mut maker = Maker::new(dice, height as f64, width as f64, ground, photographs);
@@ -74,7 +76,10 @@ impl<'a> Maker<'a> {
 
     fn background(&mut self) -> Mesh {
         let size = [self.width, self.height].map(|v| v.clamp(1.0, MAX_TEXELS) as usize);
-        let texture = self.texture((size[0], size[1]));
+        let texture = self.texture(Size {
+            width: size[0],
+            height: size[1],
+        });
         let sheet = self.ground.sheet(self.width, self.height);
         let place = self.place([1.0; 3], turn([0.0, 0.0, 1.0], 0.0), DEPTH_PER_PX, [0.5; 2]);
         sheet.place(&place, Arc::new(texture))
@@ -105,7 +110,7 @@ impl<'a> Maker<'a> {
         let scale = [radius, radius * aspect, 1.0];
         let size = texels(radius);
         // Strokes are at least a texel wide.
-        let most = (size.1 / 12).max(2);
+        let most = (size.height / 12).max(2);
         let lines = self.dice.integer(1, most.min(14));
         let thickness = self.dice.range(0.08, 0.25) as f32;
         let strokes = Pattern::strokes(size, lines, thickness, &mut self.dice);
@@ -202,7 +207,7 @@ impl<'a> Maker<'a> {
     }
 
     /// Makes a piece of a photograph, or a random texture of one natural surface or of two in a pattern.
-    fn texture(&mut self, size: (usize, usize)) -> Texture {
+    fn texture(&mut self, size: Size) -> Texture {
         if !self.photographs.is_empty() && self.dice.chance(0.7) {
             let index = self.dice.integer(0, self.photographs.len() - 1);
             return piece(&self.photographs[index], size, &mut self.dice);
@@ -212,18 +217,18 @@ impl<'a> Maker<'a> {
             let other = self.surface(size);
             let pattern = pattern(&mut self.dice, size);
             for (index, (mine, its)) in surface.iter_mut().zip(other).enumerate() {
-                let t = pattern.at(index % size.0, index / size.0);
+                let t = pattern.at(index % size.width, index / size.width);
                 *mine = std::array::from_fn(|c| mine[c] + t * (its[c] - mine[c]));
             }
         }
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
         let texels = surface.into_iter().map(|[r, g, b]| [byte(r), byte(g), byte(b), 255]);
-        Texture::sized(size.0, size.1, texels.collect())
+        Texture::sized(size, texels.collect())
     }
 
     /// Makes the colours of one material. Brightness varies around a mean as 1/f² noise; hue varies less and more
     /// smoothly.
-    fn surface(&mut self, size: (usize, usize)) -> Vec<[f32; 3]> {
+    fn surface(&mut self, size: Size) -> Vec<[f32; 3]> {
         let mean = self.colour();
         let dice = &mut self.dice;
         let noise = |dice: &mut Dice, roughness: f32| {
@@ -235,9 +240,9 @@ impl<'a> Maker<'a> {
         let [warmth, purple] = [0; 2].map(|_| noise(dice, 0.7 * rough));
         let contrast = (2.0 * self.contrast * dice.range(0.1, 1.0)) as f32;
         let tint = contrast * (self.colourfulness * dice.unit()) as f32;
-        (0..size.0 * size.1)
+        (0..size.pixels())
             .map(|index| {
-                let (x, y) = (index % size.0, index / size.0);
+                let (x, y) = (index % size.width, index / size.width);
                 let [l, a, b] = [&brightness, &warmth, &purple].map(|noise| noise.at(x, y) - 0.5);
                 std::array::from_fn(|c| {
                     let hue = a * WARMER[c] as f32 + b * PURPLER[c] as f32;
@@ -261,9 +266,12 @@ impl<'a> Maker<'a> {
 
 /// Returns the size of the texture of an object whose largest radius is `radius` pixels: two texels per pixel, up to a
 /// limit.
-fn texels(radius: f64) -> (usize, usize) {
+fn texels(radius: f64) -> Size {
     let size = 2 * radius.round().clamp(4.0, MAX_TEXELS / 4.0) as usize;
-    (size, size)
+    Size {
+        width: size,
+        height: size,
+    }
 }
 
 #[cfg(test)]
@@ -276,19 +284,38 @@ mod tests {
     use phasefront_io::ldi::Ldi;
 
     fn rendered(seed: u64, size: usize, photographs: &[Texture]) -> Ldi {
-        let scene = natural_scene(seed, size, size, photographs);
-        render_ldi_reference(&scene, size, size, 5).unwrap()
+        let scene = natural_scene(
+            seed,
+            Size {
+                width: size,
+                height: size,
+            },
+            photographs,
+        );
+        render_ldi_reference(
+            &scene,
+            Size {
+                width: size,
+                height: size,
+            },
+            5,
+        )
+        .unwrap()
     }
 
-    fn gradient(width: usize, height: usize) -> Texture {
+    fn gradient(size: Size) -> Texture {
+        let Size { width, height } = size;
         let texel = |i: usize| [(i % width) as u8, (i / width) as u8, 7, 255];
-        Texture::new(width, height, (0..width * height).map(texel).collect()).unwrap()
+        Texture::new(size, (0..width * height).map(texel).collect()).unwrap()
     }
 
     /// Every machine must reproduce these numbers, because a data set may be made in parts on several machines.
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
-        let photographs = [gradient(150, 90), gradient(20, 30)];
+        let photographs = [
+            gradient(Size { width: 150, height: 90 }),
+            gradient(Size { width: 20, height: 30 }),
+        ];
         let of = |seed, photographs: &[Texture]| format!("{:016x}", fingerprint(&rendered(seed, 96, photographs)));
         assert_eq!(
             [of(3, &[]), of(4, &[]), of(3, &photographs)],
@@ -300,11 +327,11 @@ mod tests {
     fn scenes_render_at_any_size_and_fill_the_frame() {
         for (height, width) in [(1, 1), (3, 200), (61, 47), (40, 270)] {
             for seed in 0..8 {
-                let scene = natural_scene(seed, height, width, &[gradient(9, 5)]);
+                let scene = natural_scene(seed, Size { width, height }, &[gradient(Size { width: 9, height: 5 })]);
                 scene.check().unwrap();
                 let inside = |mesh: &Mesh| mesh.positions.iter().all(|p| p[2].abs() <= 0.5);
                 assert!(scene.meshes.iter().all(inside), "all lies in the volume");
-                let ldi = render_ldi_reference(&scene, height, width, 5).unwrap();
+                let ldi = render_ldi_reference(&scene, Size { width, height }, 5).unwrap();
                 assert!(ldi.layers[0].depth.iter().all(|d| !d.is_nan()));
             }
         }

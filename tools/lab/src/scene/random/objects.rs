@@ -9,13 +9,15 @@ use crate::scene::random::parts::{
 };
 use crate::scene::shapes::{Light, Place, Shape, turn};
 use crate::scene::{Mesh, Scene, Texture};
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Makes a random scene for a frame of `height` x `width` pixels. The same arguments give the same scene on every
+/// Makes a random scene for a frame of `size`. The same arguments give the same scene on every
 /// machine.
-pub fn random_scene(seed: u64, height: usize, width: usize) -> Scene {
+pub fn random_scene(seed: u64, size: Size) -> Scene {
+    let Size { width, height } = size;
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64);
     let background = maker.background();
     let count = maker.dice.log_range(40.0, 120.0) as usize;
@@ -95,10 +97,25 @@ impl Maker {
         let (sin, cos) = libm::sincos(TAU * dice.unit());
         let pieces = if bumps > 0.0 { 24 } else { 1 };
         let cells = dice.integer(2, 5);
-        let relief = Pattern::noise((pieces + 1, pieces + 1), (cells, cells), 2, 0.4, dice);
+        let relief = Pattern::noise(
+            Size {
+                width: pieces + 1,
+                height: pieces + 1,
+            },
+            (cells, cells),
+            2,
+            0.4,
+            dice,
+        );
         // One texel per pixel, up to a limit, on a sheet a little larger than the frame.
         let size = [self.width, self.height].map(|v| v.min(3.0 * MAX_TEXELS) as usize);
-        let texture = self.texture((size[0].max(1), size[1].max(1)), &[0.5, 1.0, 1.0]);
+        let texture = self.texture(
+            Size {
+                width: size[0].max(1),
+                height: size[1].max(1),
+            },
+            &[0.5, 1.0, 1.0],
+        );
         // The division by `reach` makes the steepest tilt span the depth `slope` across the frame in every direction.
         let reach = sin.abs() + cos.abs();
         let depth_at = |u: f64, v: f64| {
@@ -132,9 +149,22 @@ impl Maker {
             .round()
             .clamp(4.0, MAX_TEXELS / 2.0) as usize
             * 2;
-        let mut texture = self.texture((size, size), &[0.0, 0.15, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+        let mut texture = self.texture(
+            Size {
+                width: size,
+                height: size,
+            },
+            &[0.0, 0.15, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
+        );
         if self.dice.chance(if flat { 0.35 } else { 0.06 }) {
-            texture = holes(&mut self.dice, (size, size)).cut(&texture);
+            texture = holes(
+                &mut self.dice,
+                Size {
+                    width: size,
+                    height: size,
+                },
+            )
+            .cut(&texture);
         }
         let dice = &mut self.dice;
         let at = [dice.range(-0.05, 1.05), dice.range(-0.05, 1.05), 0.0];
@@ -155,14 +185,14 @@ impl Maker {
 
     /// Makes a texture with one of the `contrasts`, each a fraction of the largest contrast of its colours. 0 gives a
     /// plain surface.
-    fn texture(&mut self, size: (usize, usize), contrasts: &[f32]) -> Texture {
+    fn texture(&mut self, size: Size, contrasts: &[f32]) -> Texture {
         let ramp = [0; 3].map(|_| self.palette.colour(&mut self.dice));
         let contrast = self.dice.pick(contrasts);
         let ramp = ramp.map(|colour| std::array::from_fn(|c| ramp[1][c] + (colour[c] - ramp[1][c]) * contrast));
         let pattern = pattern(&mut self.dice, size);
         let dice = &mut self.dice;
         if dice.chance(0.5) {
-            let grain = Pattern::noise(size, (size.0 / 4, size.1 / 4), 2, 0.7, dice);
+            let grain = Pattern::noise(size, (size.width / 4, size.height / 4), 2, 0.7, dice);
             return pattern.mixed(&grain, dice.range(0.05, 0.3) as f32).texture(ramp);
         }
         pattern.texture(ramp)
@@ -191,8 +221,9 @@ pub(super) mod tests {
     use crate::scene::render_ldi_reference;
     use phasefront_io::ldi::Ldi;
 
-    fn rendered(seed: u64, height: usize, width: usize) -> Ldi {
-        render_ldi_reference(&random_scene(seed, height, width), height, width, 5).unwrap()
+    fn rendered(seed: u64, size: Size) -> Ldi {
+        let Size { width, height } = size;
+        render_ldi_reference(&random_scene(seed, size), Size { width, height }, 5).unwrap()
     }
 
     /// Computes FNV-1a over the contents of the LDI's PNGs.
@@ -217,7 +248,7 @@ pub(super) mod tests {
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         assert_eq!(
-            [3, 4].map(|seed| format!("{:016x}", fingerprint(&rendered(seed, 96, 80)))),
+            [3, 4].map(|seed| format!("{:016x}", fingerprint(&rendered(seed, Size { width: 80, height: 96 })))),
             ["8b01907bb1bc3895", "575e04e964b74391"]
         );
     }
@@ -226,7 +257,7 @@ pub(super) mod tests {
     fn scenes_render_at_any_size() {
         for (height, width) in [(1, 1), (3, 200), (61, 47), (40, 270)] {
             for seed in 0..8 {
-                let scene = random_scene(seed, height, width);
+                let scene = random_scene(seed, Size { width, height });
                 scene.check().unwrap();
                 for mesh in &scene.meshes {
                     assert!(
@@ -234,7 +265,7 @@ pub(super) mod tests {
                         "all of a scene lies in the volume"
                     );
                 }
-                assert_eq!(rendered(seed, height, width).shape(), (height, width));
+                assert_eq!(rendered(seed, Size { width, height }).size(), Size { width, height });
             }
         }
     }
@@ -244,7 +275,13 @@ pub(super) mod tests {
         let mut deciles = [0.0f64; 10];
         let mut layers = [0; 5];
         for seed in 0..50 {
-            let ldi = rendered(seed, 384, 384);
+            let ldi = rendered(
+                seed,
+                Size {
+                    width: 384,
+                    height: 384,
+                },
+            );
             for &d in ldi.layers[0].depth.iter().filter(|d| !d.is_nan()) {
                 deciles[((d * 10.0) as usize).min(9)] += 1.0;
             }

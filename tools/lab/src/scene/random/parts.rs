@@ -3,6 +3,7 @@
 use crate::scene::Mesh;
 use crate::scene::pattern::Pattern;
 use crate::scene::shapes::{Light, Shape, quaternion, star, turn};
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
@@ -145,9 +146,9 @@ fn multiply(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
 }
 
 /// Makes a pattern of any kind.
-pub(super) fn pattern(dice: &mut Dice, size: (usize, usize)) -> Pattern {
+pub(super) fn pattern(dice: &mut Dice, size: Size) -> Pattern {
     // Features are at least 3 texels wide.
-    let finest = (size.0.min(size.1) as f64 / 6.0).max(1.0);
+    let finest = (size.width.min(size.height) as f64 / 6.0).max(1.0);
     let repeats = |dice: &mut Dice| dice.log_range(1.0, finest.min(16.0)) as usize;
     match dice.weighted(&[4.0, 1.5, 0.8, 0.8, 0.8, 0.8, 0.8, 0.6, 0.6]) {
         0 => {
@@ -192,14 +193,16 @@ pub(super) fn pattern(dice: &mut Dice, size: (usize, usize)) -> Pattern {
 }
 
 /// Makes the holes of a sheet: lattices, sieves, writing, tatters.
-pub(super) fn holes(dice: &mut Dice, size: (usize, usize)) -> Pattern {
-    let count = dice.integer(2, (size.0.min(size.1) / 8).clamp(2, 8));
+pub(super) fn holes(dice: &mut Dice, size: Size) -> Pattern {
+    let count = dice.integer(2, (size.width.min(size.height) / 8).clamp(2, 8));
     match dice.integer(0, 4) {
         0 => Pattern::stripes(size, (count as i32, 0), 0.0, 0.2, dice),
         1 => {
             let bars = dice.range(0.15, 0.4) as f32;
             let inside = |x: usize, n: usize| ((x as f32 + 0.5) / n as f32 * count as f32).fract() < bars;
-            Pattern::from_fn(size, |x, y| f32::from(u8::from(inside(x, size.0) || inside(y, size.1))))
+            Pattern::from_fn(size, |x, y| {
+                f32::from(u8::from(inside(x, size.width) || inside(y, size.height)))
+            })
         }
         2 => Pattern::spots(size, count, dice.range(0.2, 0.45) as f32, dice),
         3 => Pattern::strokes(size, count.min(4), dice.range(0.1, 0.25) as f32, dice),

@@ -1,6 +1,7 @@
 //! Pictures for the surfaces of random scenes, from a folder of the user.
 
 use crate::scene::Texture;
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use phasefront_io::fingerprint::Fingerprint;
 use phasefront_io::{Error, Result, output, picture};
@@ -25,21 +26,21 @@ pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
         return Err(Error::file(folder, "holds no .jpg, .jpeg or .png file"));
     }
     let read = |path: &std::path::PathBuf| {
-        let ((height, width), rgb) = picture::read_rgb_bytes(path)?;
+        let (size, rgb) = picture::read_rgb_bytes(path)?;
         let texels = rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]);
-        Texture::new(width, height, texels.collect())
+        Texture::new(size, texels.collect())
     };
     paths.iter().map(read).collect()
 }
 
 /// Returns a random piece of `photograph` as a texture of `size`. Each texel is the mean of a square of the photograph,
 /// of a random side up to the largest that fits.
-pub(super) fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice) -> Texture {
+pub(super) fn piece(photograph: &Texture, size: Size, dice: &mut Dice) -> Texture {
     let (width, height) = (photograph.width(), photograph.height());
-    let largest = (width / size.0).min(height / size.1).max(1);
+    let largest = (width / size.width).min(height / size.height).max(1);
     let square = dice.integer(1, largest);
     let corner = |dice: &mut Dice, whole: usize, part: usize| dice.integer(0, whole.saturating_sub(part * square));
-    let (left, top) = (corner(dice, width, size.0), corner(dice, height, size.1));
+    let (left, top) = (corner(dice, width, size.width), corner(dice, height, size.height));
     let mean = |x: usize, y: usize| {
         let mut sum = [0u32; 3];
         for (j, i) in (0..square).flat_map(|j| (0..square).map(move |i| (j, i))) {
@@ -51,8 +52,8 @@ pub(super) fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice)
         let [r, g, b] = sum.map(|sum| ((sum + count / 2) / count) as u8);
         [r, g, b, 255]
     };
-    let texels = (0..size.0 * size.1).map(|index| mean(index % size.0, index / size.0));
-    Texture::sized(size.0, size.1, texels.collect())
+    let texels = (0..size.pixels()).map(|index| mean(index % size.width, index / size.width));
+    Texture::sized(size, texels.collect())
 }
 
 /// Computes FNV-1a over sizes and texels, by which a data set identifies its photographs.
@@ -75,7 +76,7 @@ mod tests {
     fn pictures_are_read_by_name_and_known_again() {
         let folder = tempfile::tempdir().unwrap();
         for (name, grey) in [("b.png", 9), ("a.PNG", 200)] {
-            picture::write_rgba(&folder.path().join(name), 3, 2, &[grey; 24]).unwrap();
+            picture::write_rgba(&folder.path().join(name), Size { width: 3, height: 2 }, &[grey; 24]).unwrap();
         }
         std::fs::write(folder.path().join("LICENCE.txt"), "free").unwrap();
         let photographs = read_photographs(folder.path()).unwrap();

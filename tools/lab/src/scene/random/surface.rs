@@ -7,6 +7,7 @@ use crate::scene::Texture;
 use crate::scene::pattern::Pattern;
 use crate::scene::random::parts::pattern;
 use crate::scene::random::photographs::piece;
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
@@ -76,7 +77,7 @@ impl<'a> Surfaces<'a> {
 
     /// Makes the texture of one surface: a piece of a photograph, one of the kinds of this module, or two of them in a
     /// pattern.
-    pub(super) fn texture(&self, dice: &mut Dice, size: (usize, usize)) -> Texture {
+    pub(super) fn texture(&self, dice: &mut Dice, size: Size) -> Texture {
         if !self.photographs.is_empty() && dice.chance(0.35) {
             return piece(
                 &self.photographs[dice.integer(0, self.photographs.len() - 1)],
@@ -89,13 +90,13 @@ impl<'a> Surfaces<'a> {
             let other = self.one_kind(dice, size);
             let mask = pattern(dice, size);
             for (index, (mine, its)) in surface.iter_mut().zip(other).enumerate() {
-                let t = mask.at(index % size.0, index / size.0);
+                let t = mask.at(index % size.width, index / size.width);
                 *mine = std::array::from_fn(|c| mine[c] + t * (its[c] - mine[c]));
             }
         }
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
         let texels = surface.into_iter().map(|[r, g, b]| [byte(r), byte(g), byte(b), 255]);
-        Texture::sized(size.0, size.1, texels.collect())
+        Texture::sized(size, texels.collect())
     }
 
     /// Returns a colour of this scene, in [0, 1].
@@ -107,7 +108,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Returns the colours of a surface of one kind, row by row.
-    fn one_kind(&self, dice: &mut Dice, size: (usize, usize)) -> Vec<[f32; 3]> {
+    fn one_kind(&self, dice: &mut Dice, size: Size) -> Vec<[f32; 3]> {
         let kind = dice.weighted(&self.shares);
         let mean = self.colour(dice);
         let count = if dice.chance(self.own_colours) { 3 } else { 1 };
@@ -116,9 +117,9 @@ impl<'a> Surfaces<'a> {
         // Between black and white, a power of the pattern gives approximately the mean.
         let powers = mean.map(|m| 1.0 / m.clamp(0.04, 0.96) - 1.0);
         let whole = dice.chance(if kind == POINTS { 0.8 } else { self.whole });
-        (0..size.0 * size.1)
+        (0..size.pixels())
             .map(|index| {
-                let (x, y) = (index % size.0, index / size.0);
+                let (x, y) = (index % size.width, index / size.width);
                 std::array::from_fn(|c| {
                     let v = patterns[c % count].at(x, y);
                     if whole {
@@ -138,12 +139,12 @@ impl<'a> Surfaces<'a> {
         [-sign, sign].map(|side| mean.map(|m| m + side * contrast * m.min(1.0 - m)))
     }
 
-    fn pattern(&self, dice: &mut Dice, kind: usize, size: (usize, usize)) -> Pattern {
-        let side = size.0.min(size.1) as f64;
+    fn pattern(&self, dice: &mut Dice, kind: usize, size: Size) -> Pattern {
+        let side = size.width.min(size.height) as f64;
         match kind {
             0 => self.noise(dice, size),
             POINTS => {
-                let texels = (size.0 * size.1) as f64;
+                let texels = (size.width * size.height) as f64;
                 let count = (texels * dice.log_range(3e-4, 0.05)).max(1.0) as usize;
                 Pattern::points(size, count, dice.range(0.4, 1.3) as f32, dice)
             }
@@ -154,7 +155,7 @@ impl<'a> Surfaces<'a> {
             3 => Pattern::slanted_checks(size, dice.log_range(1.0, (side / 2.0).max(2.0)), TAU * dice.unit()),
             4 => {
                 // Lines are at least 6 texels high.
-                let most = (size.1 / 6).clamp(1, 30);
+                let most = (size.height / 6).clamp(1, 30);
                 let lines = dice.integer(1, most);
                 Pattern::strokes(size, lines, dice.range(0.08, 0.25) as f32, dice)
             }
@@ -166,7 +167,7 @@ impl<'a> Surfaces<'a> {
 
     /// Makes noise whose power falls as 1/f^exponent, from white noise to clouds. Its contrast reaches up to that of
     /// two tones.
-    fn noise(&self, dice: &mut Dice, size: (usize, usize)) -> Pattern {
+    fn noise(&self, dice: &mut Dice, size: Size) -> Pattern {
         let exponent = dice.range(self.exponents[0], self.exponents[1]);
         // The power of an octave is 1/f^exponent times the area of its ring of frequencies, f².
         let roughness = libm::pow(2.0, (2.0 - exponent) / 2.0) as f32;
@@ -204,7 +205,18 @@ mod tests {
         let mut surfaces = Surfaces::new(&mut dice, &[]);
         let mut mean = |exponent: f64| {
             surfaces.exponents = [exponent; 2];
-            let rough = |_| roughness(&surfaces.noise(&mut dice, (side, side)), side);
+            let rough = |_| {
+                roughness(
+                    &surfaces.noise(
+                        &mut dice,
+                        Size {
+                            width: side,
+                            height: side,
+                        },
+                    ),
+                    side,
+                )
+            };
             (0..8).map(rough).sum::<f64>() / 8.0
         };
         let measured = [0.0, 1.0, 2.0, 3.0].map(&mut mean);

@@ -9,6 +9,7 @@ use crate::scene::random::surface::Surfaces;
 use crate::scene::random::thin;
 use crate::scene::shapes::{Light, Place, Shape, star, turn};
 use crate::scene::{Mesh, Scene, Texture};
+use phasefront::Size;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -16,9 +17,10 @@ use std::sync::Arc;
 /// The most texels of a texture along a side. Larger surfaces show larger texels.
 const MAX_TEXELS: f64 = 432.0;
 
-/// Makes a random scene of any kind for a frame of `height` x `width` pixels. Some surfaces show pieces of
+/// Makes a random scene of any kind for a frame of `size`. Some surfaces show pieces of
 /// `photographs` if there are any. The same arguments give the same scene on every machine.
-pub fn varied_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
+pub fn varied_scene(seed: u64, size: Size, photographs: &[Texture]) -> Scene {
+    let Size { width, height } = size;
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64, photographs);
     let crowd = &CROWDS[maker.dice.weighted(&CROWDS.each_ref().map(|crowd| crowd.share))];
     maker.scene(crowd)
@@ -27,7 +29,8 @@ pub fn varied_scene(seed: u64, height: usize, width: usize, photographs: &[Textu
 /// Makes a random scene of about forty overlapping, tilted objects in front of a background, whose textures range from
 /// white noise to flat, with a mean amplitude of about one half. Nothing in it is dark or smooth enough to hide errors.
 /// The same arguments give the same scene on every machine.
-pub fn hard_scene(seed: u64, height: usize, width: usize) -> Scene {
+pub fn hard_scene(seed: u64, size: Size) -> Scene {
+    let Size { width, height } = size;
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64, &[]);
     maker.span = [0.0, 1.0];
     maker.ground = Some(Ground::varied(&mut maker.dice, maker.span));
@@ -149,7 +152,13 @@ impl<'a> Maker<'a> {
 
     fn background(&mut self) -> Option<Mesh> {
         let size = [self.width, self.height].map(|v| v.clamp(1.0, MAX_TEXELS) as usize);
-        let texture = self.surfaces.texture(&mut self.dice, (size[0], size[1]));
+        let texture = self.surfaces.texture(
+            &mut self.dice,
+            Size {
+                width: size[0],
+                height: size[1],
+            },
+        );
         let sheet = self.ground.as_ref()?.sheet(self.width, self.height);
         let place = self.place([1.0; 3], turn([0.0, 0.0, 1.0], 0.0), DEPTH_PER_PX, [0.5; 2]);
         Some(sheet.place(&place, Arc::new(texture)))
@@ -203,7 +212,7 @@ impl<'a> Maker<'a> {
         };
         let rotation = turn([0.0, 0.0, 1.0], TAU * dice.unit());
         let texture = if dice.chance(0.3) {
-            self.surfaces.texture(dice, (64, 8))
+            self.surfaces.texture(dice, Size { width: 64, height: 8 })
         } else {
             // A gain of 4 makes some thin objects as bright as possible.
             let colour = self.surfaces.colour(dice);
@@ -244,9 +253,12 @@ impl<'a> Maker<'a> {
 
 /// Returns the size of the texture of an object whose largest radius is `radius` pixels: half to one and a half texels
 /// per pixel.
-fn texels(radius: f64, dice: &mut Dice) -> (usize, usize) {
+fn texels(radius: f64, dice: &mut Dice) -> Size {
     let size = (2.0 * radius * dice.range(0.5, 1.5)).clamp(8.0, MAX_TEXELS) as usize;
-    (size, size)
+    Size {
+        width: size,
+        height: size,
+    }
 }
 
 #[cfg(test)]
@@ -259,12 +271,27 @@ mod tests {
     use phasefront_io::ldi::Ldi;
 
     fn rendered(seed: u64, size: usize, photographs: &[Texture]) -> Ldi {
-        render_ldi_reference(&varied_scene(seed, size, size, photographs), size, size, 5).unwrap()
+        render_ldi_reference(
+            &varied_scene(
+                seed,
+                Size {
+                    width: size,
+                    height: size,
+                },
+                photographs,
+            ),
+            Size {
+                width: size,
+                height: size,
+            },
+            5,
+        )
+        .unwrap()
     }
 
     fn gradient() -> Texture {
         let texel = |i: usize| [(i % 40) as u8, (i / 40) as u8, 7, 255];
-        Texture::new(40, 20, (0..800).map(texel).collect()).unwrap()
+        Texture::new(Size { width: 40, height: 20 }, (0..800).map(texel).collect()).unwrap()
     }
 
     /// Every machine must reproduce these numbers, because a data set may be made in parts on several machines.
@@ -281,11 +308,11 @@ mod tests {
     fn scenes_render_at_any_size() {
         for (height, width) in [(1, 1), (3, 200), (61, 47), (40, 270)] {
             for seed in 0..8 {
-                let scene = varied_scene(seed, height, width, &[gradient()]);
+                let scene = varied_scene(seed, Size { width, height }, &[gradient()]);
                 let inside = |mesh: &Mesh| mesh.positions.iter().all(|p| p[2].abs() <= 0.5);
                 assert!(scene.meshes.iter().all(inside), "all lies in the volume");
-                let ldi = render_ldi_reference(&scene, height, width, 5).unwrap();
-                assert_eq!(ldi.shape(), (height, width));
+                let ldi = render_ldi_reference(&scene, Size { width, height }, 5).unwrap();
+                assert_eq!(ldi.size(), Size { width, height });
             }
         }
     }
@@ -307,7 +334,7 @@ mod tests {
     fn scenes_are_of_all_brightness_spectra_numbers_and_depths() {
         let (mut means, mut rough, mut counts, mut deciles) = (Vec::new(), Vec::new(), Vec::new(), [0usize; 10]);
         for seed in 0..80 {
-            counts.push(varied_scene(seed, 96, 96, &[]).meshes.len());
+            counts.push(varied_scene(seed, Size { width: 96, height: 96 }, &[]).meshes.len());
             let ldi = rendered(seed, 96, &[]);
             let (mean, roughness) = brightness_and_roughness(&ldi);
             means.push(mean);
@@ -338,7 +365,21 @@ mod tests {
     fn hard_scenes_are_of_medium_brightness_and_full_of_edges() {
         let (mut means, mut rough) = (Vec::new(), Vec::new());
         for seed in 0..24 {
-            let ldi = render_ldi_reference(&hard_scene(seed, 128, 128), 128, 128, 3).unwrap();
+            let ldi = render_ldi_reference(
+                &hard_scene(
+                    seed,
+                    Size {
+                        width: 128,
+                        height: 128,
+                    },
+                ),
+                Size {
+                    width: 128,
+                    height: 128,
+                },
+                3,
+            )
+            .unwrap();
             let (mean, roughness) = brightness_and_roughness(&ldi);
             means.push(mean);
             rough.push(roughness);

@@ -4,6 +4,7 @@
 use crate::scene::render::raster::check_size;
 use crate::scene::{Scene, Texture};
 use ndarray::{Array2, Array3};
+use phasefront::Size;
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};
 use std::collections::HashMap;
@@ -94,23 +95,24 @@ impl DepthPeeler {
         &self.adapter
     }
 
-    /// Renders the first `layers` front-facing hits of every pixel of a `height` x `width` frame, front first.
+    /// Renders the first `layers` front-facing hits of every pixel of a frame of `size`, front first.
     ///
     /// Returns an error if the frame or `layers` is zero or too large, if the scene fails [`Scene::check`], or if the
     /// frame, the scene or one of its textures does not fit the device.
-    pub fn render(&self, scene: &Scene, height: usize, width: usize, layers: usize) -> Result<Ldi> {
+    pub fn render(&self, scene: &Scene, size: Size, layers: usize) -> Result<Ldi> {
+        let Size { width, height } = size;
         scene.check()?;
-        check_size(height, width, layers)?;
+        check_size(size, layers)?;
         let most = self.device.limits().max_texture_dimension_2d as usize;
         if height.max(width) > most {
             return Err(self.too_large(format!("a frame of {width}x{height} pixels; it takes {most} a side")));
         }
-        let scene = self.upload(scene, height, width)?;
+        let scene = self.upload(scene, size)?;
         let row = (width * PIXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
-        let results = guarded(&self.device, || self.passes(&scene, height, width, layers, row))?;
+        let results = guarded(&self.device, || self.passes(&scene, size, layers, row))?;
         let mut ldi = Vec::with_capacity(layers);
         for buffer in results {
-            ldi.push(self.read_layer(&buffer, height, width, row)?);
+            ldi.push(self.read_layer(&buffer, size, row)?);
         }
         Ldi::new(ldi)
     }
@@ -119,7 +121,8 @@ impl DepthPeeler {
         Error::Input(format!("too large for {}: {what}", self.adapter))
     }
 
-    fn upload(&self, scene: &Scene, height: usize, width: usize) -> Result<Uploaded> {
+    fn upload(&self, scene: &Scene, size: Size) -> Result<Uploaded> {
+        let Size { width, height } = size;
         let limits = self.device.limits();
         let mut vertices: Vec<Vertex> = Vec::new();
         let mut indices: Vec<u32> = Vec::new();
@@ -183,7 +186,10 @@ impl DepthPeeler {
     fn picture(&self, texture: &Texture) -> wgpu::BindGroup {
         let descriptor = wgpu::TextureDescriptor {
             label: None,
-            size: extent(texture.height(), texture.width()),
+            size: extent(Size {
+                width: texture.width(),
+                height: texture.height(),
+            }),
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -212,11 +218,12 @@ impl DepthPeeler {
     }
 
     /// Runs the passes of Algorithm 1 and copies the picture of each to a buffer with rows of `row` bytes.
-    fn passes(&self, scene: &Uploaded, height: usize, width: usize, layers: usize, row: usize) -> Vec<wgpu::Buffer> {
+    fn passes(&self, scene: &Uploaded, size: Size, layers: usize, row: usize) -> Vec<wgpu::Buffer> {
+        let height = size.height;
         let texture = |format, usage| {
             self.device.create_texture(&wgpu::TextureDescriptor {
                 label: None,
-                size: extent(height, width),
+                size: extent(size),
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -263,7 +270,7 @@ impl DepthPeeler {
                     buffer: &result,
                     layout,
                 },
-                extent(height, width),
+                extent(size),
             );
             results.push(result);
         }
@@ -271,7 +278,8 @@ impl DepthPeeler {
         results
     }
 
-    fn read_layer(&self, buffer: &wgpu::Buffer, height: usize, width: usize, row: usize) -> Result<LdiLayer> {
+    fn read_layer(&self, buffer: &wgpu::Buffer, size: Size, row: usize) -> Result<LdiLayer> {
+        let Size { width, height } = size;
         let failed = |what: String| Error::Input(format!("{} failed to render: {what}", self.adapter));
         let (send, receive) = mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
@@ -384,7 +392,8 @@ fn pipelines(
     (previous, picture, first, later)
 }
 
-fn extent(height: usize, width: usize) -> wgpu::Extent3d {
+fn extent(size: Size) -> wgpu::Extent3d {
+    let Size { width, height } = size;
     wgpu::Extent3d {
         width: width as u32,
         height: height as u32,

@@ -6,6 +6,7 @@
 use crate::scene::texture::ALPHA_CUT;
 use crate::scene::{Mesh, Scene};
 use ndarray::{Array2, Array3};
+use phasefront::Size;
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};
 
@@ -21,7 +22,7 @@ struct Hit {
     rgb: [f32; 3],
 }
 
-/// Renders the first `layers` front-facing hits of every pixel of a `height` x `width` frame, front first.
+/// Renders the first `layers` front-facing hits of every pixel of a frame of `size`, front first.
 ///
 /// A pixel has a hit if its centre lies in a front-facing triangle, at a depth in [0, 1], and the texture's alpha there
 /// is at least one half. The colour is the texture's (bilinear) times the vertex colour, clamped to [0, 1]. Hits of
@@ -29,9 +30,10 @@ struct Hit {
 /// 1).
 ///
 /// Returns an error if the frame or `layers` is zero or too large, or if the scene fails [`Scene::check`].
-pub fn render_ldi_reference(scene: &Scene, height: usize, width: usize, layers: usize) -> Result<Ldi> {
+pub fn render_ldi_reference(scene: &Scene, size: Size, layers: usize) -> Result<Ldi> {
+    let Size { width, height } = size;
     scene.check()?;
-    check_size(height, width, layers)?;
+    check_size(size, layers)?;
     let nothing = Hit {
         depth: f32::INFINITY,
         rgb: [0.0; 3],
@@ -51,7 +53,8 @@ pub fn render_ldi_reference(scene: &Scene, height: usize, width: usize, layers: 
 }
 
 /// Returns an error if a rendering of this size is empty or too large.
-pub(super) fn check_size(height: usize, width: usize, layers: usize) -> Result<()> {
+pub(super) fn check_size(size: Size, layers: usize) -> Result<()> {
+    let Size { width, height } = size;
     let count = height.checked_mul(width).and_then(|pixels| pixels.checked_mul(layers));
     if !count.is_some_and(|count| (1..=MAX_HITS).contains(&count)) {
         return Err(Error::Input(format!(
@@ -208,7 +211,7 @@ mod tests {
     const BLUE: [f32; 3] = [0.0, 0.0, 1.0];
 
     fn render(meshes: Vec<Mesh>, layers: usize) -> Ldi {
-        render_ldi_reference(&Scene { meshes }, 6, 9, layers).unwrap()
+        render_ldi_reference(&Scene { meshes }, Size { width: 9, height: 6 }, layers).unwrap()
     }
 
     fn colour(ldi: &Ldi, layer: usize, y: usize, x: usize) -> [f32; 3] {
@@ -271,7 +274,7 @@ mod tests {
     fn texture_times_colour_is_seen_and_holes_are_seen_through() {
         let texels = vec![[200, 100, 0, 255], [200, 100, 0, 0]];
         let mut front = wall([0., 8.], [0., 6.], [0.1, 0.1], RED);
-        front.texture = Arc::new(Texture::new(2, 1, texels).unwrap());
+        front.texture = Arc::new(Texture::new(Size { width: 2, height: 1 }, texels).unwrap());
         front.uv = vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
         front.colour = vec![[0.5, 2.0, 1.0]; 4];
         // 200 / 255 times 2 exceeds one.
@@ -314,7 +317,15 @@ mod tests {
         let scene = Scene {
             meshes: vec![plain(positions, triangles, RED)],
         };
-        let ldi = render_ldi_reference(&scene, 2 * n, 3 * n, 2).unwrap();
+        let ldi = render_ldi_reference(
+            &scene,
+            Size {
+                width: 3 * n,
+                height: 2 * n,
+            },
+            2,
+        )
+        .unwrap();
         assert!(ldi.layers[0].depth.iter().all(|d| !d.is_nan()));
         assert!(ldi.layers[1].depth.iter().all(|d| d.is_nan()));
     }
@@ -371,8 +382,8 @@ mod tests {
         let (height, width, layers) = (61, 47, 4);
         let (mut sure, mut second) = (0, 0);
         for seed in 0..6 {
-            let scene = random_scene(seed, height, width);
-            let ldi = render_ldi_reference(&scene, height, width, layers).unwrap();
+            let scene = random_scene(seed, Size { width, height });
+            let ldi = render_ldi_reference(&scene, Size { width, height }, layers).unwrap();
             for y in 0..height {
                 for x in 0..width {
                     let (hits, doubtful) = cast(&scene, x as f64 + 0.5, y as f64 + 0.5);
@@ -413,12 +424,14 @@ mod tests {
             (1 << 20, 1 << 20, 1),
             (usize::MAX, 2, 2),
         ] {
-            assert!(render_ldi_reference(&scene, height, width, layers).is_err());
+            assert!(render_ldi_reference(&scene, Size { width, height }, layers).is_err());
         }
         let refused = |change: &dyn Fn(&mut Mesh), reason: &str| {
             let mut scene = scene.clone();
             change(&mut scene.meshes[0]);
-            let message = render_ldi_reference(&scene, 4, 4, 1).unwrap_err().to_string();
+            let message = render_ldi_reference(&scene, Size { width: 4, height: 4 }, 1)
+                .unwrap_err()
+                .to_string();
             assert!(message.contains("mesh 0") && message.contains(reason), "{message}");
         };
         refused(&|mesh| mesh.triangles[1][2] = 4, "vertex 4");

@@ -1,0 +1,242 @@
+//! Checks that signatures take and return sizes as `Size`: two bare numbers compile in either order.
+//!
+//! A signature is wrong if it has a width and a height as two integers, whatever they are called (`width` and `height`,
+//! `columns` and `rows`, `w` and `h`), or a pair of integers that its name or its pattern makes a size. An array keeps
+//! its shape, (H, W), and says so: `shape`. A number of nodes or tiles, a place (y, x) and a range are no sizes.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The words of a pair that is a size.
+const SIZES: [&str; 12] = [
+    "size",
+    "sizes",
+    "resolution",
+    "screen",
+    "modulator",
+    "sensor",
+    "picture",
+    "frame",
+    "window",
+    "padded",
+    "out",
+    "inner",
+];
+
+/// The names of a width and of a height.
+const SIDES: [[&str; 2]; 3] = [["width", "height"], ["columns", "rows"], ["w", "h"]];
+
+/// The folders without sources of the project.
+const OTHERS: [&str; 6] = ["target", ".git", "node_modules", "build", ".venv", "Generated"];
+
+fn sources(folder: &Path, ending: &str, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() && !OTHERS.contains(&&*name) {
+            sources(&path, ending, found);
+        } else if path.is_file() && path.extension().is_some_and(|e| e == ending) {
+            found.push(path);
+        }
+    }
+}
+
+/// Returns the code of `text` without comments.
+fn code(text: &str) -> String {
+    let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// Returns the index after the bracket that closes the one at `open`.
+fn after(text: &[u8], open: usize) -> Option<usize> {
+    let mut depth = 0;
+    for (at, byte) in text.iter().enumerate().skip(open) {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some(at + 1);
+        }
+    }
+    None
+}
+
+/// Returns the name, the parameters and the returned type of each function of Rust's `code`.
+fn functions(code: &str) -> Vec<(String, Vec<String>, String)> {
+    let mut all = Vec::new();
+    for (at, _) in code.match_indices("fn ") {
+        let before = code[..at].chars().next_back();
+        let name: String = (code[at + 3..].chars())
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect();
+        if name.is_empty() || before.is_some_and(|c| c.is_alphanumeric() || c == '_') {
+            continue;
+        }
+        // Past the generic parameters, which may hold parentheses.
+        let mut open = at + 3 + name.len();
+        let mut angles = 0;
+        let bytes = code.as_bytes();
+        while open < bytes.len() && (angles > 0 || bytes[open] != b'(') {
+            match bytes[open] {
+                b'<' => angles += 1,
+                b'>' if bytes[open - 1] != b'-' => angles -= 1,
+                _ => {}
+            }
+            open += 1;
+        }
+        let Some(end) = after(bytes, open) else { continue };
+        let parameters = split(&code[open + 1..end - 1]);
+        let rest = &code[end..];
+        let body = rest.find(['{', ';']).unwrap_or(rest.len());
+        let returned = rest[..body].trim().strip_prefix("->").unwrap_or_default();
+        let returned = returned.split(" where ").next().unwrap_or_default().trim();
+        all.push((name, parameters, returned.to_owned()));
+    }
+    all
+}
+
+/// Splits a list at the commas that are in no brackets.
+fn split(list: &str) -> Vec<String> {
+    let (mut parts, mut depth, mut last) = (vec![String::new()], 0, ' ');
+    for c in list.chars() {
+        match c {
+            '(' | '[' | '{' | '<' => depth += 1,
+            ')' | ']' | '}' => depth -= 1,
+            '>' if last != '-' && last != '=' => depth -= 1,
+            _ => {}
+        }
+        match c {
+            ',' if depth == 0 => parts.push(String::new()),
+            c => parts.last_mut().unwrap().push(c),
+        }
+        last = c;
+    }
+    parts
+        .iter()
+        .map(|part| part.split_whitespace().collect::<Vec<_>>().join(" "))
+        .filter(|part| !part.is_empty())
+        .collect()
+}
+
+/// Returns whether `name` is `word`, alone or at the end of words that underscores join.
+fn ends_with(name: &str, word: &str) -> bool {
+    name == word || name.strip_suffix(word).is_some_and(|rest| rest.ends_with('_'))
+}
+
+/// Returns whether `text` has a pair of integers.
+fn has_pair(text: &str) -> bool {
+    ["(usize, usize)", "(u32, u32)", "(i32, i32)", "[usize; 2]", "[u32; 2]"]
+        .iter()
+        .any(|pair| text.contains(pair))
+}
+
+/// Returns what is wrong with the sizes of a function of Rust.
+fn wrong(name: &str, parameters: &[String], returned: &str) -> Option<String> {
+    let mut sides = Vec::new();
+    for parameter in parameters {
+        let Some((pattern, kind)) = parameter
+            .split_once(": ")
+            .map(|(a, b)| (a.trim_start_matches("mut "), b))
+        else {
+            continue;
+        };
+        if ["usize", "u32", "i32"].contains(&kind) {
+            sides.push(pattern);
+        }
+        let names: Vec<_> = pattern.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+        let is_size = |word: &str| names.iter().any(|name| ends_with(name, word));
+        let destructured = SIDES.iter().any(|[a, b]| is_size(a) && is_size(b));
+        // A pair of pairs is two ranges.
+        let ranges = kind.starts_with("((");
+        if has_pair(kind) && !ranges && !kind.contains("Fn") && (destructured || SIZES.iter().any(|word| is_size(word)))
+        {
+            return Some(format!("`{parameter}` is a size; take a Size"));
+        }
+    }
+    for [width, height] in SIDES {
+        let of = |word: &str| {
+            sides
+                .iter()
+                .filter(|side| ends_with(side, word))
+                .map(|side| side.strip_suffix(word).unwrap().to_owned())
+                .collect::<Vec<_>>()
+        };
+        let (wide, high) = (of(width), of(height));
+        if let Some(prefix) = wide.iter().find(|prefix| high.contains(prefix)) {
+            return Some(format!(
+                "`{prefix}{width}` and `{prefix}{height}` are a size; take a Size"
+            ));
+        }
+    }
+    let named = SIZES.iter().any(|word| ends_with(name, word));
+    (named && has_pair(returned)).then(|| format!("`{name}` returns `{returned}`; return a Size"))
+}
+
+/// Returns the faults of Rust's `text`.
+fn faults(text: &str) -> Vec<String> {
+    (functions(&code(text)).iter())
+        .filter_map(|(name, parameters, returned)| {
+            wrong(name, parameters, returned).map(|fault| format!("{name}: {fault}"))
+        })
+        .collect()
+}
+
+#[test]
+fn signatures_have_no_bare_sizes() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut files = Vec::new();
+    // The bindings still hand on widths and heights of other languages as two numbers.
+    for folder in ["sdk", "models", "tools", "examples", "fuzz", "tests"] {
+        sources(&root.join(folder), "rs", &mut files);
+    }
+    let mut all = Vec::new();
+    for path in files {
+        // The one place of the conversion between sizes and shapes.
+        if path.ends_with("kernels/src/size.rs") {
+            continue;
+        }
+        let name = path.strip_prefix(root).unwrap().display().to_string();
+        all.extend(
+            faults(&fs::read_to_string(&path).unwrap())
+                .into_iter()
+                .map(|fault| format!("{name}: {fault}")),
+        );
+    }
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+#[test]
+fn bare_sizes_are_found() {
+    for text in [
+        "fn f(height: usize, width: usize) {}",
+        "fn f(width: u32, name: &str, height: u32);",
+        "fn f(out_height: usize, out_width: usize) {}",
+        "fn f(&self, rows: usize, columns: usize) -> Result<()> {}",
+        "fn f((height, width): (usize, usize)) {}",
+        "fn f<T: Fn(usize) -> (usize, usize)>(of: T, (h, w): (usize, usize)) {}",
+        "fn f(size: (usize, usize)) {}",
+        "fn f(screen: Option<(u32, u32)>) {}",
+        "fn size(&self) -> (usize, usize) {}",
+        "fn padded_size(&self) -> Result<(usize, usize)> {}",
+        "fn f(modulator: [usize; 2]) {}",
+    ] {
+        assert_eq!(faults(text).len(), 1, "{text}: {:?}", faults(text));
+    }
+    for text in [
+        "fn f(size: Size) -> Size {}",
+        "fn f(Size { width, height }: Size) {}",
+        "fn f(width: usize, row_stride: usize) {}",
+        "fn f(height: usize, out_width: usize) {}",
+        "fn f(shape: (usize, usize)) {}",
+        "fn shape(self) -> (usize, usize) {}",
+        "fn f((y, x): (usize, usize), nodes: (usize, usize)) -> (usize, usize) {}",
+        "fn f((columns, rows): ((u32, u32), (u32, u32))) {}",
+        "// fn f(height: usize, width: usize)",
+        "fn frame(&self, progress: &dyn Fn(usize, usize)) {}",
+    ] {
+        assert_eq!(faults(text), Vec::<String>::new(), "{text}");
+    }
+}
