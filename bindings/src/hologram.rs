@@ -148,8 +148,11 @@ impl RawHologram {
     #[uniffi::constructor]
     pub fn from_levels(levels: &[u8], info: HologramInfo, target: Arc<Target>) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
-            let shape = (info.height, info.width);
-            let core = session::Hologram::from_levels(levels, shape, info.scale, &target.core)?;
+            let size = Size {
+                width: info.width,
+                height: info.height,
+            };
+            let core = session::Hologram::from_levels(levels, size, info.scale, &target.core)?;
             Ok(RawHologram::new(core))
         })
     }

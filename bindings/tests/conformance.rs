@@ -666,13 +666,14 @@ mod write {
         )]);
         cases.push(one);
 
-        let (width, height) = (96, 72);
+        let size = Size { width: 96, height: 72 };
+        let half = Size { width: 48, height: 36 };
         for (name, format) in [("sharp", "metres-f32"), ("soft", "soft-metres-f32")] {
             let mut one = case(&format!("the default method, {name} edges"), vec![]);
             one["method"] = json!("default");
-            one["display"] = json!(format!("width = {width}\nheight = {height}\n"));
-            let colour = frames.colour("rgba", width, height, "bt601", false, 0.0);
-            let mut depth = frames.depth(format, width / 2, height / 2, 0.0);
+            one["display"] = json!(format!("width = {}\nheight = {}\n", size.width, size.height));
+            let colour = frames.colour("rgba", size, "bt601", false, 0.0);
+            let mut depth = frames.depth(format, half, 0.0);
             depth["format"] = json!("metres-f32");
             one["frames"] = json!([still(colour, depth)]);
             cases.push(one);

@@ -27,6 +27,9 @@ const SIZES: [&str; 12] = [
 /// The names of a width and of a height.
 const SIDES: [[&str; 2]; 3] = [["width", "height"], ["columns", "rows"], ["w", "h"]];
 
+/// The types of integers that count pixels.
+const INTEGERS: [&str; 5] = ["usize", "u32", "i32", "u64", "i64"];
+
 /// The folders without sources of the project.
 const OTHERS: [&str; 6] = ["target", ".git", "node_modules", "build", ".venv", "Generated"];
 
@@ -128,9 +131,7 @@ fn ends_with(name: &str, word: &str) -> bool {
 
 /// Returns whether `text` has a pair of integers.
 fn has_pair(text: &str) -> bool {
-    ["(usize, usize)", "(u32, u32)", "(i32, i32)", "[usize; 2]", "[u32; 2]"]
-        .iter()
-        .any(|pair| text.contains(pair))
+    (INTEGERS.iter()).any(|kind| text.contains(&format!("({kind}, {kind})")) || text.contains(&format!("[{kind}; 2]")))
 }
 
 /// Returns what is wrong with the sizes of a function of Rust.
@@ -143,7 +144,7 @@ fn wrong(name: &str, parameters: &[String], returned: &str) -> Option<String> {
         else {
             continue;
         };
-        if ["usize", "u32", "i32"].contains(&kind) {
+        if INTEGERS.contains(&kind) {
             sides.push(pattern);
         }
         let names: Vec<_> = pattern.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
@@ -213,6 +214,7 @@ fn bare_sizes_are_found() {
     for text in [
         "fn f(height: usize, width: usize) {}",
         "fn f(width: u32, name: &str, height: u32);",
+        "fn f(width: u64, height: u64, most: u64) {}",
         "fn f(out_height: usize, out_width: usize) {}",
         "fn f(&self, rows: usize, columns: usize) -> Result<()> {}",
         "fn f((height, width): (usize, usize)) {}",

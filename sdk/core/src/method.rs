@@ -245,7 +245,7 @@ impl MethodPlan {
 
     /// Updates the state in `scratch` as [`Self::field_after`] does, without computing the field of `frame`.
     pub(crate) fn skip(&self, follows: bool, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
-        frame.check(self.shape, self.colours)?;
+        frame.check(self.size, self.colours)?;
         if let Scratch::Auto { was_soft, .. } = &mut scratch.0 {
             choose(was_soft, follows, frame);
         }

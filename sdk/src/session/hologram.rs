@@ -201,27 +201,27 @@ impl Hologram {
         })
     }
 
-    /// Returns the hologram whose levels, (C, H, W) for (H, W) = `shape`, are known, for example from a file. `scale`
+    /// Returns the hologram whose levels, (C, H, W) for the height H and the width W of `size`, are
+    /// known, for example from a file. `scale`
     /// is the amplitude that full light represents. C is the number of the target's lasers. Its depth is not known.
     ///
     /// # Errors
     /// Returns an error if the target is invalid or has more than 8 bits, if there is another number of levels or the
-    /// shape is larger than the modulator, or if the scale is not positive and finite.
-    pub fn from_levels(levels: &[u8], shape: (usize, usize), scale: f32, target: &Target) -> Result<Self> {
+    /// size is larger than the modulator, or if the scale is not positive and finite.
+    pub fn from_levels(levels: &[u8], size: Size, scale: f32, target: &Target) -> Result<Self> {
         target.check()?;
-        let (height, width) = target.modulator();
+        let most = target.modulator();
         let (bits, colours) = (target.display.bits(), target.display.colours());
         if bits > 8 {
             return Err(Error::Setting(format!(
                 "levels of a byte each; the display has {bits} bits, at most 8 are right"
             )));
         }
-        if shape.0 > height || shape.1 > width || levels.len() != colours * shape.0 * shape.1 || levels.is_empty() {
+        let fits = size.width <= most.width && size.height <= most.height;
+        if !fits || levels.len() != colours * size.pixels() || levels.is_empty() {
             return Err(Error::Setting(format!(
-                "{} levels of {}×{} pixels and {colours} colours; the modulator has {width}×{height} pixels at most",
-                levels.len(),
-                shape.1,
-                shape.0
+                "{} levels of {size} pixels and {colours} colours; the modulator has {most} pixels at most",
+                levels.len()
             )));
         }
         if !(scale.is_finite() && scale > 0.0) {
@@ -233,11 +233,11 @@ impl Hologram {
         own.values.copy_from_slice(levels);
         Ok(Hologram {
             timestamp_ns: 0,
-            shape,
+            size,
             levels: own,
             words: None,
             depth: Pool::default().take(0),
-            depth_shape: (0, 0),
+            depth_size: Size { width: 0, height: 0 },
             scale,
             times: FrameTimes::default(),
             range_m: None,

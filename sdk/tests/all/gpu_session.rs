@@ -136,8 +136,8 @@ fn sweeps_are_those_of_the_cpu() {
 /// Chooses the method of each frame as the CPU does, from depth of the frame's size and from readings.
 #[test]
 fn the_automatic_choice_is_that_of_the_cpu() {
-    let (height, width) = (96, 128);
-    let mut plain = options(width, height);
+    let size = Size { width: 128, height: 96 };
+    let mut plain = options(size);
     // Where the modulator is at the midpoint, either method alone ends there too.
     plain.target.display = Display::from_toml("width = 128\nheight = 96\noffset_mm = 0").unwrap();
     let Method::Network(network) = plain.quality_levels[0].method.clone() else {
@@ -151,7 +151,7 @@ fn the_automatic_choice_is_that_of_the_cpu() {
         options
     };
     let methods = [Method::Sweep(sweep), Method::Network(network)];
-    let scene = Scene::new(height, width, 40);
+    let scene = Scene::new(size, 40);
     let gpu = VideoSession::new(on_gpu(plain.clone())).unwrap();
     let cpu = VideoSession::new(plain.clone()).unwrap();
     let resumed = VideoSession::new(on_gpu(plain.clone())).unwrap();
@@ -173,7 +173,14 @@ fn the_automatic_choice_is_that_of_the_cpu() {
         let bytes: Vec<u8> = (0..rows * columns)
             .flat_map(|i| metres(i % columns, i / columns).to_le_bytes())
             .collect();
-        let depth = depth(&bytes, DepthFormat::MetresF32, columns, rows);
+        let depth = depth(
+            &bytes,
+            DepthFormat::MetresF32,
+            Size {
+                width: columns,
+                height: rows,
+            },
+        );
         let time = (i as u64 + 1) * 33_000_000;
         let frame = CameraFrame::new(time, scene.colour(), depth);
         let expected = cpu.process(&frame).unwrap();

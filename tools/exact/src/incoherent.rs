@@ -12,7 +12,7 @@
 
 use crate::sm_lbm::plane_of_depth;
 use ndarray::{Array2, Array3, Axis};
-use phasefront::Display;
+use phasefront::{Display, Size};
 use phasefront_core::optics::aperture::Opening;
 use phasefront_io::Result;
 use phasefront_io::ldi::Ldi;
@@ -106,7 +106,7 @@ impl Planes {
     const GAP: usize = 12;
 
     fn of(ldi: &Ldi, display: &Display) -> Self {
-        let (height, width) = ldi.shape();
+        let Size { width, height } = ldi.size();
         let mut scene = Planes {
             coverage: vec![0.0],
             light: std::array::from_fn(|_| vec![0.0]),
@@ -148,7 +148,7 @@ impl Planes {
     /// Returns the places of all hits, plane by plane and row by row from the back, each with its layer. Of two hits at
     /// one place the front one stays, and one on its own plane before one that is continued there.
     fn hits(ldi: &Ldi) -> impl Iterator<Item = (usize, usize)> {
-        let (height, width) = ldi.shape();
+        let Size { width, height } = ldi.size();
         let count = ldi.layers.len();
         let mut hits: Vec<(usize, usize)> = Vec::new();
         for (l, layer) in ldi.layers.iter().enumerate() {
@@ -232,8 +232,8 @@ struct View {
 }
 
 impl View {
-    fn new((height, width): (usize, usize), margin: usize) -> Self {
-        let (height, width) = (height + 2 * margin, width + 2 * margin);
+    fn new(size: Size, margin: usize) -> Self {
+        let (width, height) = (size.width + 2 * margin, size.height + 2 * margin);
         View {
             width,
             margin,
@@ -297,7 +297,7 @@ pub fn stack(ldi: &Ldi, display: &Display, pupil: Pupil, z_m: &[f64]) -> Result<
         .into_par_iter()
         .map(|(z_m, colour)| {
             let optics = Optics::new(display, colour, pupil);
-            plane(&scene, ldi.shape(), optics, z_m, optics.pinholes(&scene, z_m))
+            plane(&scene, ldi.size(), optics, z_m, optics.pinholes(&scene, z_m))
         })
         .collect();
     Ok(planes
@@ -348,18 +348,17 @@ impl Optics {
 }
 
 /// Returns the amplitudes of one colour, in focus at z.
-fn plane(scene: &Planes, shape: (usize, usize), optics: Optics, z_m: f64, pinholes: usize) -> Array2<f32> {
-    let (height, width) = shape;
+fn plane(scene: &Planes, size: Size, optics: Optics, z_m: f64, pinholes: usize) -> Array2<f32> {
     let edge = optics.pupil.centre.map(|c| c.abs() + optics.pupil.radius);
     let most = optics.slope(edge).into_iter().fold(0.0, f64::max);
     let margin = (scene.farthest_m(z_m) * most).ceil() as usize + 2;
-    let mut view = View::new(shape, margin);
-    let mut light = Array2::<f32>::zeros(shape);
+    let mut view = View::new(size, margin);
+    let mut light = Array2::<f32>::zeros(size.shape());
     for slope in optics.slopes(pinholes) {
         view.draw(scene, optics.colour, z_m, slope);
-        let seen = view.seen.chunks_exact(view.width).skip(margin).take(height);
+        let seen = view.seen.chunks_exact(view.width).skip(margin).take(size.height);
         for (mut light, seen) in light.rows_mut().into_iter().zip(seen) {
-            for (light, seen) in light.iter_mut().zip(&seen[margin..margin + width]) {
+            for (light, seen) in light.iter_mut().zip(&seen[margin..margin + size.width]) {
                 *light += seen;
             }
         }
@@ -373,7 +372,7 @@ fn plane(scene: &Planes, shape: (usize, usize), optics: Optics, z_m: f64, pinhol
 /// Returns an error if the pupil passes nothing.
 pub fn reference(ldi: &Ldi, display: &Display, pupil: Pupil, z_m: f64, pinholes: usize) -> Result<Array3<f32>> {
     pupil.check()?;
-    let (height, width) = ldi.shape();
+    let Size { width, height } = ldi.size();
     // The nearest hit of each pixel on each plane: its own, or else one that is continued from the plane before.
     let on_plane = |k: usize, y: isize, x: isize| {
         let inside = (0..height as isize).contains(&y) && (0..width as isize).contains(&x);
@@ -427,7 +426,7 @@ mod tests {
     use phasefront_io::dice::Dice;
     use phasefront_io::ldi::LdiLayer;
 
-    fn layer((height, width): (usize, usize), of: impl Fn(usize, usize) -> ([f32; 3], f32)) -> LdiLayer {
+    fn layer(Size { width, height }: Size, of: impl Fn(usize, usize) -> ([f32; 3], f32)) -> LdiLayer {
         LdiLayer {
             rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| of(y, x).0[c]),
             depth: Array2::from_shape_fn((height, width), |(y, x)| of(y, x).1),
@@ -442,9 +441,9 @@ mod tests {
 
     #[test]
     fn the_fast_drawing_equals_rays() {
-        let (display, shape) = (Display::default(), (21, 26));
+        let (display, size) = (Display::default(), Size { width: 26, height: 21 });
         let mut dice = Dice::new(7);
-        let random: Vec<([f32; 3], f32)> = (0..2 * shape.0 * shape.1)
+        let random: Vec<([f32; 3], f32)> = (0..2 * size.pixels())
             .map(|_| {
                 (
                     [0, 1, 2].map(|_| dice.range(0.0, 1.0) as f32),
@@ -452,11 +451,11 @@ mod tests {
                 )
             })
             .collect();
-        let of = |y: usize, x: usize, l: usize| random[(l * shape.0 + y) * shape.1 + x];
-        let front = layer(shape, |y, x| {
+        let of = |y: usize, x: usize, l: usize| random[(l * size.height + y) * size.width + x];
+        let front = layer(size, |y, x| {
             (of(y, x, 0).0, if y < 14 { of(y / 5, x / 5, 0).1 } else { f32::NAN })
         });
-        let back = layer(shape, |y, x| {
+        let back = layer(size, |y, x| {
             (of(y, x, 1).0, if y + x > 9 { 0.5 + x as f32 / 60.0 } else { f32::NAN })
         });
         let ldi = Ldi::new(vec![front, back]).unwrap();
@@ -468,7 +467,7 @@ mod tests {
             let expected = reference(&ldi, &display, pupil, z_m, 13).unwrap();
             let scene = Planes::of(&ldi, &display);
             for colour in 0..3 {
-                let seen = plane(&scene, shape, Optics::new(&display, colour, pupil), z_m, 13);
+                let seen = plane(&scene, size, Optics::new(&display, colour, pupil), z_m, 13);
                 let expected = expected.index_axis(Axis(0), colour);
                 let error = seen
                     .iter()
@@ -484,9 +483,9 @@ mod tests {
     #[test]
     fn an_edge_hides_a_segment_of_the_pupil() {
         // So tall that no light passes above or below the edge.
-        let (display, shape) = (Display::default(), (71, 120));
-        let near = layer(shape, |_, x| ([0.0; 3], if x < 60 { 0.0 } else { f32::NAN }));
-        let wall = layer(shape, |_, _| ([1.0, 0.8, 0.5], 1.0));
+        let (display, size) = (Display::default(), Size { width: 120, height: 71 });
+        let near = layer(size, |_, x| ([0.0; 3], if x < 60 { 0.0 } else { f32::NAN }));
+        let wall = layer(size, |_, _| ([1.0, 0.8, 0.5], 1.0));
         let ldi = Ldi::new(vec![near, wall]).unwrap();
         let z_of = |plane: usize| display.z_of_depth((plane as f64 + 0.5) / PLANES as f64);
         // The edge is on its plane and on the one behind it.
@@ -513,9 +512,9 @@ mod tests {
 
     #[test]
     fn a_plane_in_focus_is_itself_and_out_of_focus_a_disc() {
-        let (display, shape) = (Display::default(), (61, 61));
+        let (display, size) = (Display::default(), Size { width: 61, height: 61 });
         let depth = (20.0 + 0.5) / PLANES as f32;
-        let point = layer(shape, |y, x| {
+        let point = layer(size, |y, x| {
             (if (y, x) == (30, 30) { [1.0; 3] } else { [0.0; 3] }, depth)
         });
         let ldi = Ldi::new(vec![point]).unwrap();

@@ -159,7 +159,7 @@ struct SeededColour<'a> {
 
 impl Source for SeededColour<'_> {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
-        let width = self.frame.shape().1;
+        let width = self.frame.size().width;
         let values = into.iter_mut().zip(&self.seed[row * width + from..]);
         match plane {
             0 => self.frame.read(self.colour, row, from, into),

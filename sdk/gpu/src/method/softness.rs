@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::device::{Device, Dispatch, copy_mapped};
+use phasefront_core::Size;
 use phasefront_core::depth::softness::{self, EDGE, LINES, ONE_STEP};
 
 /// The columns of a workgroup.
@@ -17,8 +18,9 @@ pub(crate) struct Softness {
 
 impl Softness {
     /// Plans the measure of the depth in `surfaces`, (H, W) of red, green, blue and depth.
-    pub(crate) fn new(device: &Device, surfaces: &wgpu::Buffer, (height, width): (usize, usize)) -> Result<Self> {
-        let (window, every) = softness::scale(height, width);
+    pub(crate) fn new(device: &Device, surfaces: &wgpu::Buffer, size: Size) -> Result<Self> {
+        let Size { width, height } = size;
+        let (window, every) = softness::scale(size);
         let header = format!(
             "const HEIGHT: u32 = {height}u;
             const WIDTH: u32 = {width}u;
@@ -91,7 +93,7 @@ mod tests {
             let rgb = Array3::from_elem((3, height, width), 0.5);
             let expected = softness::sharp_edges(&RgbdFrame::new(rgb, depth).unwrap());
             let buffer = device.buffer("surfaces", 16 * height * width).unwrap();
-            let plan = (device.guarded(|| Softness::new(&device, &buffer, (height, width)))).unwrap();
+            let plan = (device.guarded(|| Softness::new(&device, &buffer, Size { width, height }))).unwrap();
             device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&surfaces));
             // The counts of one frame must not add to the next one's.
             for _ in 0..2 {

@@ -45,8 +45,7 @@ impl Sweeper {
     /// Plans the sweep of `plan`, made for `display`, on a frame's `surfaces`: (H, W) of red, green, blue and depth,
     /// f32. It writes to new memory.
     pub(crate) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
-        let (height, width) = plan.shape();
-        let field = device.buffer("the field", 24 * height * width)?;
+        let field = device.buffer("the field", 24 * plan.size().pixels())?;
         Self::into_field(device, plan, display, surfaces, field)
     }
 

@@ -67,8 +67,8 @@ pub fn sides(path: &Path) -> Result<Sides> {
     let mut film = Film::survey(path, Pixels::Rgb, None, MOST_PICTURES)?;
     let mut columns: Option<Columns> = None;
     while let Some(picture) = film.read()? {
-        let columns = columns.get_or_insert_with(|| Columns::new(picture.shape.1));
-        if columns.width() != picture.shape.1 {
+        let columns = columns.get_or_insert_with(|| Columns::new(picture.size.width));
+        if columns.width() != picture.size.width {
             break; // The reader of the frames reports that the size changes.
         }
         columns.add(&picture);
@@ -187,13 +187,14 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use phasefront::Size;
 
     /// Returns the margin that is found in pictures of `height` rows of these pixels.
     fn margin(width: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> usize {
         let mut columns = Columns::new(width);
         let pixels = (0..32 * width).flat_map(|i| pixel(i / width, i % width));
         columns.add(&Picture {
-            shape: (32, width),
+            size: Size { width, height: 32 },
             bytes: pixels.collect(),
         });
         columns.margin()

@@ -2,6 +2,7 @@
 
 use crate::input::decode::{MOST_PIXELS, Numbers, Plane, Said, broken, check};
 use ndarray::Array2;
+use phasefront::Size;
 
 /// Checks whether a file is in one of these formats, of grey or of colour.
 pub(crate) fn is(head: &[u8]) -> bool {
@@ -15,9 +16,12 @@ pub(crate) fn read_plane(file: &[u8]) -> Said<Plane> {
     if !["P2", "P5", "Pf"].contains(&kind) {
         return Err("is a PPM or PFM of colours; depth is grey (P2, P5 or Pf)".into());
     }
-    let (width, height): (u64, u64) = (rest.number()?, rest.number()?);
-    check(width, height, MOST_PIXELS)?;
-    let (shape, count) = ((height as usize, width as usize), (width * height) as usize);
+    let size = Size {
+        width: rest.number()?,
+        height: rest.number()?,
+    };
+    check(size, MOST_PIXELS)?;
+    let count = size.pixels();
     let cut = || broken(&"it ends too early");
     let (values, numbers) = if kind == "Pf" {
         let scale: f32 = rest.number()?;
@@ -28,7 +32,7 @@ pub(crate) fn read_plane(file: &[u8]) -> Said<Plane> {
             true => f32::from_le_bytes(*bytes),
             false => f32::from_be_bytes(*bytes),
         };
-        let rows = numbers.chunks(width.max(1) as usize).rev();
+        let rows = numbers.chunks(size.width.max(1)).rev();
         (rows.flatten().map(value).collect(), Numbers::Floats)
     } else {
         let most: u16 = rest.number()?;
@@ -51,7 +55,7 @@ pub(crate) fn read_plane(file: &[u8]) -> Said<Plane> {
         }
         (values, Numbers::Integers { most: most.into() })
     };
-    let values = Array2::from_shape_vec(shape, values).map_err(|e| broken(&e))?;
+    let values = Array2::from_shape_vec(size.shape(), values).map_err(|e| broken(&e))?;
     Ok(Plane { values, numbers })
 }
 

@@ -199,9 +199,9 @@ pub(crate) fn broken(why: &dyn std::fmt::Display) -> String {
 }
 
 /// Checks the number of pixels, because a small file may hold a large image.
-pub(crate) fn check(width: u64, height: u64, most: u64) -> Said<()> {
-    if width.saturating_mul(height) > most {
-        return Err(format!("has {width}×{height} pixels; {most} in all are the most"));
+pub(crate) fn check(size: Size, most: u64) -> Said<()> {
+    if (size.width as u64).saturating_mul(size.height as u64) > most {
+        return Err(format!("has {size} pixels; {most} in all are the most"));
     }
     Ok(())
 }
@@ -236,7 +236,11 @@ fn image<R: BufRead + Seek>(mut from: R, format: ImageFormat, how: Reading) -> S
 
 fn decoded(mut decoder: impl ImageDecoder, limits: image::Limits, how: Reading) -> Said<Decoded> {
     let (width, height) = decoder.dimensions();
-    check(width.into(), height.into(), how.most_pixels)?;
+    let size = Size {
+        width: width as usize,
+        height: height as usize,
+    };
+    check(size, how.most_pixels)?;
     decoder.set_limits(limits).map_err(|e| broken(&e))?;
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let image = DynamicImage::from_decoder(decoder).map_err(|e| broken(&e))?;
@@ -253,11 +257,11 @@ fn tiff<R: BufRead + Seek>(from: R, how: Reading) -> Said<Decoded> {
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     let mut decoder = Decoder::new(from).map_err(broken)?.with_limits(limits);
     let (width, height) = decoder.dimensions().map_err(broken)?;
-    check(width.into(), height.into(), how.most_pixels)?;
     let size = Size {
         width: width as usize,
         height: height as usize,
     };
+    check(size, how.most_pixels)?;
     let colours = decoder.colortype().map_err(broken)?;
     let number = |decoder: &mut Decoder<R>, tag| decoder.find_tag_unsigned::<u16>(tag).map_err(broken);
     let orientation = number(&mut decoder, Tag::Orientation)?

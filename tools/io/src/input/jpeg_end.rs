@@ -49,10 +49,11 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use image::{DynamicImage, ImageFormat, RgbImage};
+    use phasefront::Size;
     use std::io::Cursor;
 
-    fn jpeg(width: u32, height: u32) -> Vec<u8> {
-        let picture = RgbImage::from_fn(width, height, |x, y| {
+    fn jpeg(size: Size) -> Vec<u8> {
+        let picture = RgbImage::from_fn(size.width as u32, size.height as u32, |x, y| {
             image::Rgb([(7 * x) as u8, (5 * y) as u8, (x * y) as u8])
         });
         let mut bytes = Cursor::new(Vec::new());
@@ -64,7 +65,7 @@ mod tests {
 
     #[test]
     fn a_cut_picture_is_found_wherever_it_ends() {
-        let whole = jpeg(40, 30);
+        let whole = jpeg(Size { width: 40, height: 30 });
         assert!(is_whole(&whole));
         for end in 0..whole.len() {
             assert!(!is_whole(&whole[..end]), "{end}");
@@ -77,7 +78,7 @@ mod tests {
 
     #[test]
     fn a_thumbnail_and_what_follows_do_not_count() {
-        let (whole, thumbnail) = (jpeg(40, 30), jpeg(8, 8));
+        let (whole, thumbnail) = (jpeg(Size { width: 40, height: 30 }), jpeg(Size { width: 8, height: 8 }));
         let length = (thumbnail.len() as u16 + 2).to_be_bytes();
         let with = [&whole[..2], &[0xFF, 0xE1], &length, &thumbnail, &whole[2..]].concat();
         assert!(is_whole(&with));

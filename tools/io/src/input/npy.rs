@@ -9,6 +9,7 @@ use crate::{Error, Result};
 use half::f16;
 use ndarray::{Array, Array3, ArrayD, Dimension};
 use num_complex::{Complex, Complex32, Complex64};
+use phasefront::Size;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -271,7 +272,7 @@ pub(crate) fn read_field<R: Read>(npy: Npy<R>) -> Said<Array3<Complex32>> {
         _ => return Err(format!("has shape {:?}; a field is (H, W) or (C, H, W)", npy.shape())),
     };
     let (_, height, width) = shape;
-    decode::check(width as u64, height as u64, MOST_PIXELS)?;
+    decode::check(Size { width, height }, MOST_PIXELS)?;
     let field: ArrayD<Complex32> = match npy.kind() {
         Complex32::NAME => npy.array(),
         Complex64::NAME => npy.converted(|v: Complex64| Complex32::new(v.re as f32, v.im as f32)),
@@ -300,7 +301,7 @@ pub(crate) fn read_plane<R: Read>(npy: Npy<R>) -> Said<Plane> {
             ));
         }
     };
-    decode::check(width as u64, height as u64, MOST_PIXELS)?;
+    decode::check(Size { width, height }, MOST_PIXELS)?;
     let (values, numbers) = numbers(npy)?;
     let values = values.into_shape_with_order(shape).map_err(|e| e.to_string())?;
     Ok(Plane { values, numbers })

@@ -7,6 +7,7 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use ndarray::Array2;
+use phasefront::Size;
 use std::io::{Read, Seek};
 
 /// The maximum number of bytes of all channels of a part, and of one of its blocks, which is decoded whole.
@@ -31,7 +32,7 @@ pub(crate) fn depth<R: Read + Seek>(from: R, most_pixels: u64) -> Said<Plane> {
             "is OpenEXR whose depth has fewer pixels than its picture; save it with a value for each pixel".into(),
         );
     }
-    let mut planes = vec![Array2::from_elem(window.shape, f32::NAN); indices.len()];
+    let mut planes = vec![Array2::from_elem(window.size.shape(), f32::NAN); indices.len()];
     let chunks = reader.filter_chunks(false, |_, tile, block| {
         block.layer == part && tile.level_index == Vec2(0, 0)
     });
@@ -71,7 +72,7 @@ pub(crate) fn depth<R: Read + Seek>(from: R, most_pixels: u64) -> Said<Plane> {
 /// Checks the number of pixels of an part and the bytes of all its channels, which are decoded together.
 fn check_part(header: &Header, most_pixels: u64) -> Said<()> {
     let Vec2(width, height) = header.layer_size;
-    check(width as u64, height as u64, most_pixels)?;
+    check(Size { width, height }, most_pixels)?;
     let bytes = |width: usize, height: usize| {
         (width as u64 * height as u64).saturating_mul(header.channels.bytes_per_pixel as u64)
     };
@@ -91,8 +92,8 @@ fn check_part(header: &Header, most_pixels: u64) -> Said<()> {
 
 /// The data window of a part within the display window.
 struct Window {
-    /// The shape of the display window, (H, W).
-    shape: (usize, usize),
+    /// The size of the display window.
+    size: Size,
     /// The first pixel of the data window in the display window, (x, y).
     at: (i64, i64),
 }
@@ -100,12 +101,15 @@ struct Window {
 impl Window {
     fn of(header: &Header, most_pixels: u64) -> Said<Self> {
         let display = header.shared_attributes.display_window;
-        let (width, height) = (display.size.width(), display.size.height());
-        check(width as u64, height as u64, most_pixels)?;
+        let size = Size {
+            width: display.size.width(),
+            height: display.size.height(),
+        };
+        check(size, most_pixels)?;
         let data = header.own_attributes.layer_position;
         let apart = |data: i32, display: i32| i64::from(data) - i64::from(display);
         Ok(Window {
-            shape: (height, width),
+            size,
             at: (
                 apart(data.x(), display.position.x()),
                 apart(data.y(), display.position.y()),

@@ -51,7 +51,7 @@ impl Read {
     /// Checks a frame that is no file of its own, and swaps its near and far if it is `inverted`.
     fn checked(mut frame: VideoFrame, inverted: bool) -> Result<Self> {
         let doubts = frame.check(inverted)?.into_iter().collect();
-        if inverted && frame.depth_shape().is_some() {
+        if inverted && frame.depth_size().is_some() {
             frame.invert()?;
         }
         Ok(Read {
@@ -93,7 +93,7 @@ impl Source {
     /// Opens the source that `flags` name, and returns it with the size of its first frame. Completes the flags by
     /// what a folder's layout defines.
     pub(super) fn open(flags: &mut Video) -> Result<(Source, Size)> {
-        let (input, shape) = Input::open(flags)?;
+        let (input, size) = Input::open(flags)?;
         let source = Source {
             input,
             path: flags.input.clone(),
@@ -102,7 +102,7 @@ impl Source {
             range_m: flags.depth.range()?,
             told: Vec::new(),
         };
-        Ok((source, shape))
+        Ok((source, size))
     }
 
     /// Returns the next frame, or `None` at the end.
@@ -218,7 +218,7 @@ impl Input {
     }
 }
 
-fn open_folder(flags: &mut Video) -> Result<(Input, (usize, usize))> {
+fn open_folder(flags: &mut Video) -> Result<(Input, Size)> {
     let Sequence { frames: paths, unit } = match &flags.pairs {
         None => sequence::of_folder(&flags.input)?,
         Some(pattern) => {
@@ -238,7 +238,7 @@ fn open_folder(flags: &mut Video) -> Result<(Input, (usize, usize))> {
     for folder in folders {
         output::reading(folder)?;
     }
-    let shape = video::read_frame(&paths[0].0, &paths[0].1, depth, &mut |_| ())?.shape();
+    let size = video::read_frame(&paths[0].0, &paths[0].1, depth, &mut |_| ())?.size();
     let total = paths.len() * flags.repeat as usize;
     let folder = Folder {
         paths,
@@ -247,7 +247,7 @@ fn open_folder(flags: &mut Video) -> Result<(Input, (usize, usize))> {
         next: 0,
         total,
     };
-    Ok((Input::Folder(folder), shape))
+    Ok((Input::Folder(folder), size))
 }
 
 impl Folder {
