@@ -129,7 +129,7 @@ impl MethodPlan {
     ///
     /// # Errors
     /// Returns an error if a network is for layered input or for another display, or if the method cannot be planned
-    /// for this shape.
+    /// for this size.
     pub fn new(size: Size, method: Method, display: &Display) -> Result<Self> {
         method.check(display)?;
         let plan = match method {
@@ -153,7 +153,7 @@ impl MethodPlan {
         })
     }
 
-    /// Returns the frame shape (H, W).
+    /// Returns the size of a frame.
     pub fn size(&self) -> Size {
         self.size
     }

@@ -175,7 +175,7 @@ enum Dark {
 const DARK: [f32; 2] = [FRAC_PI_2, 3.0 * FRAC_PI_2];
 
 impl Output {
-    /// Plans images at the modulator's resolution for holograms of (H, W) and for `target`.
+    /// Plans images at the modulator's resolution for holograms of a size and for `target`.
     ///
     /// # Errors
     /// Returns an error if the hologram is larger than the modulator or a per-pixel table is for a smaller one.
@@ -221,7 +221,7 @@ impl Output {
         self.modulator.width * self.placement.layout.pixel_bytes()
     }
 
-    /// Returns the shape (H, W) of an image.
+    /// Returns the size of an image.
     pub fn size(&self) -> Size {
         self.modulator
     }

@@ -108,7 +108,7 @@ impl Pipeline {
         self.display.colours()
     }
 
-    /// Returns the frame shape (H, W).
+    /// Returns the size of a frame.
     pub fn size(&self) -> Size {
         self.method.size()
     }

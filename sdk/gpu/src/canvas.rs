@@ -18,7 +18,7 @@ struct Canvas {
     element: JsValue,
     surface: wgpu::Surface<'static>,
     device: wgpu::Device,
-    /// (H, W).
+    /// The size of the canvas.
     size: Size,
 }
 
@@ -28,7 +28,7 @@ thread_local! {
 }
 
 /// Copies `texture`, 8-bit RGBA, to the middle of `canvas`, an `HTMLCanvasElement` or an `OffscreenCanvas`, which
-/// becomes `size` (H, W), at least that of the texture. `around`, pixels of that size, is what surrounds it. The
+/// becomes `size`, at least that of the texture. `around`, pixels of that size, is what surrounds it. The
 /// browser shows it at the end of the task.
 ///
 /// # Errors

@@ -49,7 +49,7 @@ impl LevelsBuffers {
 pub(super) struct EncoderJob<'a> {
     /// (3, H, W) complex f32.
     pub(super) field: &'a wgpu::Buffer,
-    /// (H, W).
+    /// The size of a hologram.
     pub(super) size: Size,
     pub(super) options: &'a EncoderOptions,
     /// The options for computing a pre-filter.

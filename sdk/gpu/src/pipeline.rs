@@ -31,7 +31,7 @@ const STAMPS: u32 = 10;
 /// A description of the holograms to compute.
 #[derive(Clone)]
 pub struct Job {
-    /// (H, W).
+    /// The size of a frame.
     pub size: Size,
     /// The method that computes the midpoint hologram.
     pub method: Method,
@@ -99,7 +99,7 @@ pub struct GpuReport {
 /// The levels of a frame that stay on the GPU.
 pub struct GpuLevels {
     pub(crate) device: Arc<Device>,
-    /// (H, W).
+    /// The size of a frame.
     pub(crate) size: Size,
     /// 8-bit RGBA, with the levels of red, green and blue.
     pub(crate) texture: wgpu::Texture,
@@ -242,7 +242,7 @@ impl GpuPipeline {
         })
     }
 
-    /// Returns (H, W).
+    /// Returns the size of a frame.
     pub fn size(&self) -> Size {
         self.size
     }

@@ -106,7 +106,7 @@ pub struct Hologram {
     pub(super) words: Option<Pooled<u16>>,
     /// Normalized depth as d·65535. Empty if the hologram was made of a field, whose depth is not known.
     pub(super) depth: Pooled<u16>,
-    /// The shape of `depth`, which covers the hologram at any resolution.
+    /// The size of `depth`, which covers the hologram at any resolution.
     pub(super) depth_size: Size,
     pub(super) scale: f32,
     pub(super) times: FrameTimes,
@@ -254,7 +254,7 @@ impl Hologram {
         self.timestamp_ns
     }
 
-    /// Returns the shape (H, W).
+    /// Returns the size of the hologram.
     pub fn size(&self) -> Size {
         self.size
     }

@@ -137,7 +137,7 @@ impl Check {
     }
 }
 
-/// (H, W) of the test frames: odd, and larger than a strip of any kernel.
+/// The size of the test frames: odd, and larger than a strip of any kernel.
 const SIZE: Size = Size { width: 67, height: 45 };
 
 /// Tests the CPU's results.

@@ -187,7 +187,7 @@ pub struct Film {
 /// One decoded picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// The height and width, (H, W).
+    /// The size in pixels.
     pub size: Size,
     /// The pixels row by row, in the requested format.
     pub bytes: Vec<u8>,

@@ -209,14 +209,14 @@ pub fn check_aspect(depth: Size, colour: Size) -> std::result::Result<(), String
     ))
 }
 
-/// Checks whether two shapes, (H, W), have the same aspect ratio.
+/// Checks whether two sizes have the same aspect ratio.
 fn has_aspect(Size { width: w, height: h }: Size, Size { width, height }: Size) -> bool {
     let cross = |a: usize, b: usize| a as f64 * b as f64;
     let ratio = cross(width, h) / cross(height, w);
     (ratio - 1.0).abs() <= ASPECT_TOLERANCE
 }
 
-/// Checks whether Exif data turned the colour image, of `size`, but not its depth, while both shapes still match.
+/// Checks whether Exif data turned the colour image, of `size`, but not its depth, while both sizes still match.
 ///
 /// # Errors
 /// Returns an error if the depth matches the colour only as it is stored.

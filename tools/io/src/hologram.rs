@@ -155,7 +155,7 @@ pub enum Levels {
 }
 
 impl Levels {
-    /// Returns levels 0 for a hologram of (H, W) pixels on `display`.
+    /// Returns levels 0 for a hologram of a size on `display`.
     pub fn zeros(display: &Display, Size { width, height }: Size) -> Self {
         let shape = (display.colours(), height, width);
         if display.bits() <= 8 {

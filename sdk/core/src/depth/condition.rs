@@ -112,7 +112,7 @@ impl Conditioner {
         })
     }
 
-    /// Returns (H, W) of the conditioned depth.
+    /// Returns the size of the conditioned depth.
     pub fn size(&self) -> Size {
         self.out
     }

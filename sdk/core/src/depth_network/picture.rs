@@ -33,9 +33,9 @@ impl ColourScale {
 /// The conversion of a picture to what a network takes.
 pub(super) struct Picture {
     colours: ColourScale,
-    /// (H, W) of the picture.
+    /// The size of the picture.
     from: Size,
-    /// (h, w) of the network.
+    /// The size of the network's input.
     to: Size,
     rows: Axis,
     columns: Axis,

@@ -256,7 +256,7 @@ impl Model {
         self.nodes
     }
 
-    /// Returns L and Q of `colour` at pixel (`x`, `y`) of a modulator of (H, W) pixels.
+    /// Returns L and Q of `colour` at pixel (`x`, `y`) of a modulator.
     pub fn light(&self, colour: usize, y: usize, x: usize, modulator: Size) -> [Complex32; 2] {
         let of = &self.colours[colour];
         let (row, column) = (

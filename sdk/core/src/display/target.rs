@@ -122,7 +122,7 @@ impl Target {
         self.registration.check(colours)
     }
 
-    /// Returns (H, W) of the modulator.
+    /// Returns the size of the modulator.
     pub fn modulator(&self) -> Size {
         self.display.size()
     }

@@ -23,7 +23,7 @@ pub struct Encoder {
     prefilter: Prefilter,
     dark_threshold: f32,
     local: Option<Local>,
-    /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
+    /// The illumination and the modulator's size. The hologram is in the middle of the modulator.
     illumination: Option<(Illumination, Size)>,
     response: Response,
 }

@@ -92,7 +92,7 @@ impl PrefilterScratch {
 }
 
 impl Prefilter {
-    /// Plans the filter of `encoding` for fields of (H, W) and the colours of `display`.
+    /// Plans the filter of `encoding` for fields of a size and the colours of `display`.
     pub(super) fn new(Size { width, height }: Size, encoding: &Encoding, display: &Display) -> Result<Self> {
         Ok(match encoding {
             Encoding::DoublePhase => Prefilter::None,

@@ -40,7 +40,7 @@ pub struct MidpointSteps {
     /// The propagation from the modulator to the midpoint, and from there to the modulator.
     back: Vec<Propagator>,
     forth: Vec<Propagator>,
-    /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
+    /// The illumination and the modulator's size. The hologram is in the middle of the modulator.
     illumination: Option<(Illumination, Size)>,
 }
 

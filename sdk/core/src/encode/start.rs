@@ -18,7 +18,7 @@ pub(super) struct Start<'a> {
     pub(super) colour: usize,
     pub(super) dark_threshold: Option<DarkThreshold>,
     pub(super) blur: Option<&'a AntiAlias>,
-    /// The light and the modulator's (H, W).
+    /// The light and the modulator's size.
     pub(super) light: Option<(&'a Illumination, Size)>,
 }
 

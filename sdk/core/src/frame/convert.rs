@@ -107,7 +107,7 @@ impl ColourPlan {
         (self.format, self.sensor, self.orientation) == (image.format(), image.size(), orientation)
     }
 
-    /// Returns (H, W) of the amplitudes.
+    /// Returns the size of the amplitudes.
     pub fn size(&self) -> Size {
         self.out
     }

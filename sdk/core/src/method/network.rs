@@ -515,7 +515,7 @@ impl NetworkPlan {
         NetworkScratch::default()
     }
 
-    /// Returns the frame's height and width in pixels.
+    /// Returns the size of a frame.
     pub fn size(&self) -> Size {
         Size {
             width: self.width,

@@ -90,7 +90,7 @@ impl BitPlanes {
         }
     }
 
-    /// Returns the shape (H, W) of a frame, which has two cells for each pixel along each axis.
+    /// Returns the size of a frame, which has two cells for each pixel along each axis.
     pub fn frame_size(&self) -> Size {
         Size {
             width: 2 * self.size.width,

@@ -83,7 +83,7 @@ impl DisplayPlan {
     /// of the offset's transfer function, so it costs no extra time.
     ///
     /// # Errors
-    /// Returns an error if the shape, offset or correction cannot be planned, a scale is not positive, the pre-filter
+    /// Returns an error if the size, offset or correction cannot be planned, a scale is not positive, the pre-filter
     /// is for another display or offset, or a table is for another modulator.
     pub fn new(size: Size, target: &Target, options: &EncoderOptions) -> Result<Self> {
         Self::from_z(size, 0.0, target, options)
@@ -129,7 +129,7 @@ impl DisplayPlan {
         self.colours
     }
 
-    /// Returns the shape (H, W).
+    /// Returns the size of a hologram.
     pub fn size(&self) -> Size {
         Size {
             width: self.width,

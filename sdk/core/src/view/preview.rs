@@ -33,7 +33,7 @@ pub struct Preview {
     factor: usize,
     /// `None` if the hologram is already at z.
     propagators: Option<Vec<Propagator>>,
-    /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
+    /// The illumination and the modulator's size. The hologram is in the middle of the modulator.
     illumination: Option<(Illumination, Size)>,
     response: Response,
     panel: Option<PanelPlan>,
@@ -42,7 +42,7 @@ pub struct Preview {
     y: Axis,
 }
 
-/// Checks that the (H, W) of `screen` is small enough, before memory is allocated for the image.
+/// Checks that the size of a screen is small enough, before memory is allocated for the image.
 ///
 /// # Errors
 /// Returns an error if the image has more than [`MOST_PIXELS`] in all or more than 2¹⁴ pixels along a side.
@@ -109,12 +109,12 @@ impl Preview {
         self.factor
     }
 
-    /// Returns the shape (H, W) of the image.
+    /// Returns the size of the image.
     pub fn screen(&self) -> Size {
         self.screen
     }
 
-    /// Returns the shape (H, W) of the field after averaging, (h, w).
+    /// Returns the size of the field after averaging.
     pub fn small(&self) -> Size {
         self.small
     }

@@ -43,7 +43,7 @@ impl Device {
         }))
     }
 
-    /// Creates a texture of 8-bit RGBA and (H, W) for copies, for programs that read it, and for `usage`.
+    /// Creates a texture of 8-bit RGBA for copies, for programs that read it, and for `usage`.
     pub(crate) fn picture(
         &self,
         what: &str,

@@ -17,7 +17,7 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// Plans images of a `sensor` (height, width). Also returns their largest size in bytes and the constants of a
+    /// Plans images of a `sensor`'s size. Also returns their largest size in bytes and the constants of a
     /// program that reads them.
     pub(super) fn new(
         device: &Device,

@@ -57,7 +57,7 @@ impl Pattern {
         Pattern { dark, ..self }
     }
 
-    /// Returns the height and width, (H, W).
+    /// Returns the size in pixels.
     pub fn size(&self) -> Size {
         Size {
             width: self.width,

@@ -54,8 +54,8 @@ pub enum What {
     Missing,
     /// The file cannot be read.
     Unreadable(String),
-    /// The size differs: (H, W) of this photograph and of the first.
-    Size([usize; 2], [usize; 2]),
+    /// The size of this photograph differs from that of the first.
+    Size(Size, Size),
     /// The photograph is saturated. The value is the fraction of pixels at the sensor's limit.
     Saturated(f64),
     /// The marks were not found.
@@ -83,8 +83,8 @@ impl What {
                 format!("is missing; photograph pattern_{k:03}.png and name it capture_{k:03}.png or .tif")
             }
             What::Unreadable(why) => format!("{why}; photograph pattern_{k:03}.png again"),
-            What::Size([h, w], [first_h, first_w]) => {
-                format!("is {w}×{h}, others are {first_w}×{first_h}; photograph all with one setting of the camera")
+            What::Size(size, first) => {
+                format!("is {size}, others are {first}; photograph all with one setting of the camera")
             }
             What::Saturated(share) => format!(
                 "{:.1} % of its pixels are saturated; shorten the exposure and photograph all patterns again",
@@ -265,8 +265,8 @@ pub fn measure(
 /// The checks of photographs against the first good one.
 #[derive(Debug, Default)]
 pub struct Checks {
-    /// Its size, (H, W), and where it shows the modulator.
-    first: Option<([usize; 2], Registration)>,
+    /// Its size, and where it shows the modulator.
+    first: Option<(Size, Registration)>,
 }
 
 impl Checks {
@@ -280,7 +280,10 @@ impl Checks {
         pattern: &Pattern,
         k: usize,
     ) -> std::result::Result<Registration, What> {
-        let size = [photograph.height, photograph.width];
+        let size = Size {
+            width: photograph.width,
+            height: photograph.height,
+        };
         if let Some((others, _)) = self.first
             && others != size
         {

@@ -53,7 +53,7 @@ pub struct Fitted {
     pub misfit: [f64; 2],
 }
 
-/// Returns the number of rows and columns of nodes for a modulator of (H, W) pixels.
+/// Returns the number of rows and columns of nodes for a modulator of a size.
 pub fn nodes(Size { width, height }: Size) -> (usize, usize) {
     let nodes = |pixels: usize| (pixels / SPACING + 1).clamp(2, MOST_NODES);
     (nodes(height), nodes(width))

@@ -45,7 +45,7 @@ pub enum Range {
     Other,
 }
 
-/// Makes the pattern of (H, W) pixels.
+/// Makes the pattern of a size.
 pub fn pattern(Size { width, height }: Size) -> Image {
     let mut bytes = Vec::with_capacity(3 * height * width);
     for y in 0..height {

@@ -160,7 +160,7 @@ const DEFAULT_RATE_HZ: f64 = 60.0;
 
 struct Player {
     frames: Vec<Vec<u32>>,
-    /// (H, W) of a frame.
+    /// The size of a frame.
     size: Size,
     showing: Showing,
     window: Option<Open>,

@@ -34,7 +34,7 @@ pub fn colour(name: &str, colours: usize) -> Result<usize> {
 /// The pixels of one image file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
-    /// The height and width, (H, W).
+    /// The size in pixels.
     pub size: Size,
     /// The rows of pixels, with 16-bit values big-endian.
     pub bytes: Vec<u8>,
@@ -132,7 +132,7 @@ fn output(display: &DisplayFile, size: Size, layout: Layout) -> Result<Output> {
     Ok(Output::new(&display.target, size, placement)?)
 }
 
-/// Plans the bit planes of a modulator of `cells` for a hologram of (H, W) that covers every pixel.
+/// Plans the bit planes of a modulator of `cells` for a hologram of `size` that covers every pixel.
 ///
 /// # Errors
 /// Returns an error if the hologram has another size.

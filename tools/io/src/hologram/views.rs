@@ -20,7 +20,7 @@ impl AberratedOptics {
     /// Plans the optics whose aberration `correction` corrects.
     ///
     /// # Errors
-    /// Returns an error if the shape is empty or the correction has another number of colours.
+    /// Returns an error if the size is empty or the correction has another number of colours.
     pub fn new(Size { width, height }: Size, display: &Display, correction: &Aberration) -> Result<Self> {
         let pitch_m = display.pitch_m();
         let plans = Propagator::for_colours_corrected(
@@ -45,7 +45,7 @@ impl AberratedOptics {
 }
 
 impl Hologram {
-    /// Returns the height and width, (H, W).
+    /// Returns the size in pixels.
     pub fn size(&self) -> Size {
         let (_, height, width) = match self {
             Hologram::Levels(levels, _) => levels.dim(),

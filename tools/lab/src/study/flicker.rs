@@ -16,12 +16,12 @@ use serde::Serialize;
 /// A function that makes a hologram of a frame, in a session of either kind.
 type Process = dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>;
 
-/// The shape, (H, W), of the depth sensor, which is ARKit's.
+/// The size of the depth sensor, which is ARKit's.
 const SENSOR: Size = Size {
     width: 256,
     height: 192,
 };
-/// The shape, (H, W), of the scenes.
+/// The size of the scenes.
 pub const SIZE: Size = Size {
     width: 4 * SENSOR.width,
     height: 4 * SENSOR.height,
@@ -115,7 +115,7 @@ pub struct Row {
 
 /// A scene that does not move, and a reading of its depth for each frame.
 pub struct Standing {
-    /// (H, W) of the frames.
+    /// The size of the frames.
     size: Size,
     /// The colours, interleaved.
     rgb: Vec<u8>,

@@ -53,7 +53,7 @@ pub(super) struct Decider<'a> {
 }
 
 impl Pixels {
-    /// Creates the memory for `rows` rows of readings and (H, W) pixels.
+    /// Creates the memory for `rows` rows of readings and the pixels of a size.
     pub(super) fn new(rows: usize, Size { width, height }: Size) -> Self {
         let square = |i: usize| (i as f32 - REACH as f32) * (i as f32 - REACH as f32);
         Pixels {

@@ -28,7 +28,7 @@ pub struct ReadingsAxis<'a> {
 }
 
 impl<'a> ConditionedReadings<'a> {
-    /// Returns (h, w), the number of readings.
+    /// Returns the number of readings along each axis.
     pub fn size(&self) -> Size {
         Size {
             width: self.x.pixels.len(),
@@ -36,7 +36,7 @@ impl<'a> ConditionedReadings<'a> {
         }
     }
 
-    /// Returns (H, W) of the display.
+    /// Returns the size of the display.
     pub fn out(&self) -> Size {
         Size {
             width: self.x.cell.len(),

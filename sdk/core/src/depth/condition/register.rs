@@ -59,13 +59,13 @@ pub struct Misfit {
 
 /// Finds the misfit of a sequence of frames.
 pub(super) struct Registration {
-    /// (H, W) of the readings.
+    /// The number of readings along each axis.
     size: Size,
     /// The number of samples per reading along each axis.
     samples: usize,
     /// The display's row of each row of samples, and the column of each column, where they lie in the display.
     pixels: [Vec<Option<u32>>; 2],
-    /// (H, W) of the display.
+    /// The size of the display.
     out: Size,
     /// The colour of each sample, (3, samples·h, samples·w).
     colour: Vec<f32>,

@@ -20,7 +20,7 @@ pub fn passes(fx: f64, fy: f64, k: f64) -> bool {
 }
 
 impl BandLimit {
-    /// Plans the filter for one shape and the bound `k`.
+    /// Plans the filter for one size and the bound `k`.
     ///
     /// # Errors
     /// Returns an error if `k` is not positive.

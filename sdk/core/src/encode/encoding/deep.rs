@@ -23,7 +23,7 @@ pub fn blur() -> Result<AntiAlias> {
 
 /// A pre-filter for one shape.
 pub struct Deep {
-    /// The frame shape (H, W).
+    /// The size of a frame.
     size: Size,
     blur: Option<AntiAlias>,
     network: FilterPlan,

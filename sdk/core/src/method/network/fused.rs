@@ -62,7 +62,7 @@ impl FusedChain {
         }
     }
 
-    /// Runs the chain on the current rayon pool. `input` and `output` are planes of `size` (height, width).
+    /// Runs the chain on the current rayon pool. `input` and `output` are planes of `size`.
     pub(super) fn run(&self, input: &[f32], output: &mut [f32], size: Size, scratch: &FusedScratch) {
         let tiling = self.tiling(size);
         match &self.kernels {

@@ -17,7 +17,7 @@ use std::mem::{Discriminant, discriminant};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// (H, W) of the colour, and of the depth if there is one.
+/// The size of the colour, and of the depth if there is one.
 type Sizes = (Size, Option<Size>);
 
 /// A source of frames that all have one size.
@@ -25,7 +25,7 @@ pub(super) struct Source {
     input: Input,
     /// The name of the input.
     path: PathBuf,
-    /// (H, W) of the colour and of the depth of the first frame.
+    /// The sizes of the first frame.
     sizes: Option<Sizes>,
     given: usize,
     /// Fixed near and far, in metres.
