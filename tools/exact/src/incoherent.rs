@@ -539,7 +539,7 @@ mod tests {
 
     #[test]
     fn a_pupil_without_an_area_is_refused() {
-        let ldi = Ldi::new(vec![layer((4, 4), |_, _| ([0.5; 3], 0.5))]).unwrap();
+        let ldi = Ldi::new(vec![layer(Size { width: 4, height: 4 }, |_, _| ([0.5; 3], 0.5))]).unwrap();
         for radius in [0.0, -1.0, f64::NAN] {
             let pupil = Pupil {
                 radius,

@@ -4,7 +4,6 @@ pub mod packed;
 mod views;
 
 use phasefront::Size;
-pub use views::AberratedOptics;
 pub use views::{AberratedOptics, check_z};
 
 use crate::display::{DisplayFile, lut_of};

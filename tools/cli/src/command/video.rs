@@ -10,7 +10,6 @@ use crate::flags::frame::{SeenDepthFlags, warn_of_size};
 use crate::flags::method::{CoreMethod, Parts};
 use crate::given::Flag;
 use crate::record::{Before, RunRecord};
-use clap::{Args, ValueEnum};
 use clap::{Args, ValueEnum, ValueHint};
 use phasefront::Size;
 use phasefront::input::DepthRange;
