@@ -88,7 +88,7 @@ pub struct VideoSession(Answering);
 /// ```no_run
 /// use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 /// use phasefront::session::{Event, LiveSession};
-/// use phasefront::{Display, Method, Network, SessionOptions};
+/// use phasefront::{Display, Method, Network, SessionOptions, Size};
 /// use std::sync::Arc;
 ///
 /// # fn camera() -> (u64, Vec<u8>, Vec<u8>) { unimplemented!() }
@@ -101,9 +101,10 @@ pub struct VideoSession(Answering);
 /// })?;
 /// loop {
 ///     let (timestamp_ns, colour, depth) = camera();
-///     let colour = Plane::new(&colour, 4 * 1920, 4);
-///     let colour = ColourImage::new(ColourFormat::Bgra, Size { width: 1920, height: 1440 }, &[colour])?;
-///     let depth = DepthImage::new(DepthFormat::MetresF32, Size { width: 256, height: 192 }, Plane::new(&depth, 4 * 256, 4))?;
+///     let size = Size { width: 1920, height: 1440 };
+///     let colour = ColourImage::new(ColourFormat::Bgra, size, &[Plane::new(&colour, 4 * 1920, 4)])?;
+///     let size = Size { width: 256, height: 192 };
+///     let depth = DepthImage::new(DepthFormat::MetresF32, size, Plane::new(&depth, 4 * 256, 4))?;
 ///     session.submit(&CameraFrame::new(timestamp_ns, colour, depth))?;
 /// }
 /// # #[allow(unreachable_code)]

@@ -33,7 +33,7 @@
 //!
 //! ```no_run
 //! use phasefront_gpu::{Deliver, Device, DeviceOptions, Frame, GpuError, GpuPipeline, Job, probe};
-//! use phasefront::{Method, Network, RgbdFrame, Target};
+//! use phasefront::{Method, Network, RgbdFrame, Size, Target};
 //! use std::sync::Arc;
 //!
 //! fn show(network: Arc<Network>, frame: &RgbdFrame) -> Result<(), GpuError> {

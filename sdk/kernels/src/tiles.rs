@@ -39,9 +39,9 @@ impl<T> TileRows<'_, T> {
     }
 }
 
-/// Divides the rows of tiles of `plane`, whose tiles have the `shape` (rows, columns), into as many parts as `work` has pieces of `piece` values, and calls `then`
-/// with each part and its piece. Tiles are stored column by column: the tile in row `r` and column `c` is at c·rows +
-/// r.
+/// Divides the rows of tiles of `plane`, whose tiles have the `shape` (rows, columns), into as many parts as `work` has
+/// pieces of `piece` values, and calls `then` with each part and its piece. Tiles are stored column by column: the tile
+/// in row `r` and column `c` is at c·rows + r.
 ///
 /// # Panics
 /// Panics if `plane` does not have rows·columns tiles.

@@ -137,11 +137,12 @@ impl Hologram {
     ///
     /// ```
     /// use phasefront::num_complex::Complex32;
-    /// use phasefront::{Display, EncoderOptions, Hologram, Target};
+    /// use phasefront::{Display, EncoderOptions, Hologram, Size, Target};
     ///
+    /// let size = Size { width: 64, height: 48 };
     /// let target = Target::from(Display::from_toml("width = 64\nheight = 48\nwavelengths_nm = [532]")?);
     /// let field: Vec<_> = (0..48 * 64).map(|i| Complex32::from_polar(0.5, 0.01 * i as f32)).collect();
-    /// let hologram = Hologram::of_field(&field, Size { width: 64, height: 48 }, 0.0, &target, &EncoderOptions::default())?;
+    /// let hologram = Hologram::of_field(&field, size, 0.0, &target, &EncoderOptions::default())?;
     /// assert_eq!(hologram.levels().len(), 48 * 64);
     /// # Ok::<(), phasefront::Error>(())
     /// ```

@@ -95,9 +95,9 @@ impl Illumination {
         top + (bottom - top) * fy
     }
 
-    /// Divides `field` by the laser's amplitude. `field` is (C, H, W), a plane of `size` for each colour, and lies in the
-    /// middle of a `modulator` of that size. If an axis of the modulator is shorter than the field, the field's
-    /// length is used. Does not allocate.
+    /// Divides `field` by the laser's amplitude. `field` is (C, H, W), a plane of `size` for each colour, and lies in
+    /// the middle of a modulator of the size `modulator`. If an axis of the modulator is shorter than the field, the
+    /// field's length is used. Does not allocate.
     ///
     /// # Panics
     /// Panics if `field` does not have C·H·W values.

@@ -263,6 +263,7 @@ fn band_limit(
 ///
 /// ```
 /// use num_complex::Complex32;
+/// use phasefront_core::Size;
 /// use phasefront_core::optics::asm::{Padding, Propagator};
 ///
 /// let plan = Propagator::new(Size { width: 48, height: 64 }, 8e-6, 520e-9, 3e-3, Padding::Reach)?;

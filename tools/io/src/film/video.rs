@@ -72,8 +72,8 @@ impl VideoFrame {
         }
     }
 
-    /// Creates a frame from a picture of `size`, rows of RGB bytes, with colour at its left and normalized grey depth at its
-    /// right, each `side` columns wide.
+    /// Creates a frame from a picture of `size`, rows of RGB bytes, with colour at its left and normalized grey depth
+    /// at its right, each `side` columns wide.
     ///
     /// # Errors
     /// Returns an error if the picture is narrower.
