@@ -111,7 +111,7 @@ impl Canvas {
         let (CurrentSurfaceTexture::Success(to) | CurrentSurfaceTexture::Suboptimal(to)) =
             self.surface.get_current_texture()
         else {
-            self.size = (0, 0);
+            self.size = Size { width: 0, height: 0 };
             return Err(GpuError::Refused("the browser gives no texture for the canvas".into()));
         };
         if let Some(around) = around {
