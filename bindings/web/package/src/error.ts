@@ -40,9 +40,12 @@ export async function guardAsync<T>(call: () => Promise<T>): Promise<T> {
   // A panic after a pause ends no promise; the browser reports it to the page or the worker.
   let panicked: (event: ErrorEvent) => void = () => {};
   const panic = new Promise<never>((_, reject) => {
-    panicked = ({ error }) => {
-      const said = ofModule(error);
-      if (said === state) reject(said);
+    panicked = (event) => {
+      const said = ofModule(event.error);
+      if (said !== state) return;
+      // The promise tells it. The page that owns a worker would hear of it first by the worker's event.
+      event.preventDefault();
+      reject(said);
     };
   });
   // Node has no such events.
