@@ -98,7 +98,7 @@ DOCUMENTS = {
     'RawPlanes.share': 'Returns another handle to the same planes. Each reader of their memory holds one.',
     'RawPlanes.width': 'Returns the width in pixels.',
     'RawHologram': 'The hologram of one frame: modulator levels of three colours. The layers written by hand keep it alive while its\nplanes are read.',
-    'RawHologram.from_levels': "Restores a hologram from its levels, the planes of the target's colours one after another without gaps, and its\nproperties, of which it keeps the size and the scale.\n\nErrors: Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target\nhas more than 8 bits.",
+    'RawHologram.from_levels': "Restores a hologram from its levels, the planes of the target's colours one after another without gaps, and its\nproperties, of which it keeps the size and the scale.\n\nErrors: Returns an error if there is another number of levels, if the size or the scale is not possible, or if the\ntarget has more than 8 bits.",
     'RawHologram.of_field': "Makes the hologram of a complex field of `height` × `width` pixels at `z_mm`, 0 the midpoint: the real and the\nimaginary part of each pixel as 32-bit floats, planes of the target's colours row by row without gaps, one after\nanother.\n\nErrors: A field of another size, one that is larger than the modulator, dark or not finite; a z too far away; options\nout of their range.",
     'RawHologram.field': 'Returns the complex field that the levels produce behind the aperture at `z_mm`, where 0 is the midpoint: the\nreal and the imaginary part of each pixel. The carrier is left out.\n\nErrors: Returns an error if z is too far away.',
     'RawHologram.info': 'Returns the properties of the hologram.',

@@ -992,8 +992,8 @@ class RawHologram:
         """Restores a hologram from its levels, the planes of the target's colours one after another without gaps, and its
         properties, of which it keeps the size and the scale.
 
-        Errors: Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target
-        has more than 8 bits.
+        Errors: Returns an error if there is another number of levels, if the size or the scale is not possible, or if the
+        target has more than 8 bits.
         """
     @classmethod
     def of_field(cls, field: bytes, width: int, height: int, z_mm: float, target: Target, options: EncoderOptions) -> RawHologram:

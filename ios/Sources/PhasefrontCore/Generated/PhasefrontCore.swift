@@ -1522,8 +1522,8 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
      * properties, of which it keeps the size and the scale.
      *
      * # Errors
-     * Returns an error if there is another number of levels, if the size or the scale is not possible, or if the target
-     * has more than 8 bits.
+     * Returns an error if there is another number of levels, if the size or the scale is not possible, or if the
+     * target has more than 8 bits.
      */
 public static func fromLevels(levels: Data, info: HologramInfo, target: HologramTarget)throws  -> RawHologram  {
     return try  FfiConverterTypeRawHologram_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -8602,7 +8602,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 39953) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_from_levels() != 11793) {
+    if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_from_levels() != 49332) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_rawhologram_of_field() != 1349) {
