@@ -5,7 +5,7 @@
 //! use phasefront::{Display, Target};
 //!
 //! let target = Target::from(Display::from_toml("width = 3840\nheight = 2160\npitch_um = 3.74")?);
-//! assert_eq!(target.display.width(), 3840);
+//! assert_eq!(target.display.size().width, 3840);
 //! # Ok::<(), phasefront::Error>(())
 //! ```
 

@@ -5,7 +5,7 @@
 //! use phasefront::output::ModulatorSpec;
 //!
 //! let device = ModulatorSpec::shipped("ti-plm-p47")?;
-//! assert_eq!((device.display.width(), device.display.bits()), (960, 4));
+//! assert_eq!((device.display.size().width, device.display.bits()), (960, 4));
 //! # Ok::<(), phasefront::Error>(())
 //! ```
 
