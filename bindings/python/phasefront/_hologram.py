@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import struct
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,11 +42,13 @@ class Purpose:
         """Returns the purpose of holograms for `target` by `encoding`."""
         return cls(target, _encoder(encoding))
 
-    def told(self, scale: float) -> str:
+    def told(self, scale: float, levels: NDArray[numpy.uint8]) -> str:
         """Returns the metadata of a hologram's file in the format of the command `phasefront`."""
         target = self.target
         display = target.display()
         told: dict[str, object] = {"display": _display(display), "encoder": self.encoder, "scale": scale}
+        # The command sees by it whether another program changed the levels.
+        told["levels"] = f"{zlib.crc32(levels.tobytes(), zlib.crc32(struct.pack('<3Q', *levels.shape))):08x}"
         if isinstance(target, Target) and target._table is not None:
             told["lut"] = list(target._table)
         if not isinstance(target, Target) or target._calibrated:
@@ -216,7 +220,7 @@ class Hologram:
         if file.suffix.lower() != ".png":
             raise FileError(f"{file}: the name must end in .png")
         self._check_bits("save writes")
-        texts = {"phasefront": self._purpose.told(self.info.scale)}
+        texts = {"phasefront": self._purpose.told(self.info.scale, self.levels)}
         try:
             _png.write(file, _png.encoded(self.levels.transpose(1, 2, 0), texts))
         except OSError as error:

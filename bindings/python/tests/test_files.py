@@ -52,7 +52,7 @@ def test_a_file_has_the_levels_and_what_they_are_for(display, tmp_path):
     info = told(tmp_path / "hologram.png")
     assert info["display"]["wavelengths_nm"] == [638, 520, 450] and info["display"]["width"] == 64
     assert info["encoder"] == "anti-alias" and info["scale"] == pytest.approx(hologram.info.scale)
-    assert info.keys() == {"display", "encoder", "scale"}
+    assert info.keys() == {"display", "encoder", "levels", "scale"}
     assert os.listdir(tmp_path) == ["hologram.png"]
 
 
@@ -108,3 +108,15 @@ def test_the_command_sees_what_a_view_shows(tmp_path):
     assert numpy.corrcoef(seen.ravel(), shown.ravel())[0, 1] > 0.9
     whole = hologram.refocus(1).clip(0, 1).transpose(1, 2, 0)
     numpy.testing.assert_allclose(seen, whole, atol=0.6 / 255)
+
+
+def test_the_command_refuses_levels_that_another_program_changed(tmp_path):
+    hologram = saved(tmp_path / "hologram.png", target=phasefront.Display(width=64, height=48))
+    levels = hologram.levels.transpose(1, 2, 0).copy()
+    levels[5, 7, 1] ^= 1
+    changed = phasefront._png.encoded(levels, {"phasefront": json.dumps(told(tmp_path / "hologram.png"))})
+    (tmp_path / "changed.png").write_bytes(changed)
+    view = [COMMAND, "refocus", "--z-mm", "1", "-o", "view.png"]
+    assert subprocess.run([*view, "hologram.png"], cwd=tmp_path).returncode == 0
+    run = subprocess.run([*view, "changed.png"], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 1 and "holds other levels" in run.stderr

@@ -132,9 +132,8 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
             normalized.holes
         );
         let is_chosen = options.near_m.is_some() && options.far_m.is_some();
-        if let Some(crowd) = crowd(&normalized.depth, shown).filter(|_| !is_chosen) {
-            log::warn!("{}: {crowd}", depth_path.display());
-        }
+        let crowded = Doubt::of_crowded(&normalized.depth, shown.near_m, shown.far_m);
+        crowded.filter(|_| !is_chosen).into_iter().for_each(warn);
     }
     Ok(Captured {
         rgb,
@@ -157,43 +156,6 @@ fn check_normalized(depth: &Array2<f32>) -> std::result::Result<(), String> {
         ));
     }
     Ok(())
-}
-
-/// Describes where most of `depth` lies if that is a small part of the range, as when numbers that stand for background
-/// or no reading make the range too large.
-fn crowd(depth: &Array2<f32>, shown: ShownDepth) -> Option<String> {
-    /// The number of parts of the range.
-    const PARTS: usize = 1000;
-    /// The number of parts that are little of it, 3 %.
-    const FEW: usize = 30;
-    /// A plain background at the far end is common. It does not make the range this many times its near end.
-    const DEEP: f32 = 8.0;
-    let (near, far) = (shown.near_m, shown.far_m);
-    let mut counts = [0usize; PARTS];
-    for d in depth.iter().filter(|d| !d.is_nan()) {
-        counts[((d * PARTS as f32) as usize).min(PARTS - 1)] += 1;
-    }
-    let all: usize = counts.iter().sum();
-    let windows = counts
-        .windows(FEW)
-        .map(|window| window.iter().sum::<usize>())
-        .enumerate();
-    let (start, most) = windows.max_by_key(|(start, count)| (*count, PARTS - start))?;
-    let is_background = start + FEW == PARTS && far < DEEP * near;
-    if near >= far || 2 * most <= all || is_background {
-        return None;
-    }
-    let occupied = |at: &usize| counts[*at] > 0;
-    let first = (start..start + FEW).find(occupied)?;
-    let last = (start..start + FEW).rev().find(occupied)?;
-    let metres = |part: usize| near + (far - near) * part as f32 / PARTS as f32;
-    Some(format!(
-        "{:.0} % of the depth lies from {:.3} m to {:.3} m, in {:.1} % of the range from {near:.3} m to {far:.3} m that is shown; if farther numbers mean background or no reading, --far says what is farthest",
-        100.0 * most as f64 / all as f64,
-        metres(first),
-        metres(last + 1),
-        100.0 * (last + 1 - first) as f64 / PARTS as f64
-    ))
 }
 
 /// Checks that colour and depth have the same aspect ratio.
@@ -259,6 +221,16 @@ pub enum Doubt {
         /// Far in metres.
         far_m: f32,
     },
+    /// Most of the depth shares a small part of the range, as when numbers that stand for background or no reading make
+    /// the range too large.
+    Crowded {
+        /// The share of the depth.
+        share: f64,
+        /// The ends of the part in metres.
+        part_m: [f32; 2],
+        /// The ends of the range in metres.
+        range_m: [f32; 2],
+    },
 }
 
 impl Doubt {
@@ -288,6 +260,39 @@ impl Doubt {
         const DOUBTFUL: f64 = 0.9;
         (share > DOUBTFUL).then_some(Doubt::Clipped { share, near_m, far_m })
     }
+
+    /// Returns the reason to doubt the range from `near_m` to `far_m`, in which `depth` is normalized, if there is one.
+    pub fn of_crowded(depth: &Array2<f32>, near_m: f32, far_m: f32) -> Option<Self> {
+        /// The number of parts of the range.
+        const PARTS: usize = 1000;
+        /// The number of parts that are little of it, 3 %.
+        const FEW: usize = 30;
+        /// A plain background at the far end is common. It does not make the range this many times its near end.
+        const DEEP: f32 = 8.0;
+        let mut counts = [0usize; PARTS];
+        for d in depth.iter().filter(|d| !d.is_nan()) {
+            counts[((d * PARTS as f32) as usize).min(PARTS - 1)] += 1;
+        }
+        let all: usize = counts.iter().sum();
+        let windows = counts
+            .windows(FEW)
+            .map(|window| window.iter().sum::<usize>())
+            .enumerate();
+        let (start, most) = windows.max_by_key(|(start, count)| (*count, PARTS - start))?;
+        let is_background = start + FEW == PARTS && far_m < DEEP * near_m;
+        if near_m >= far_m || 2 * most <= all || is_background {
+            return None;
+        }
+        let occupied = |at: &usize| counts[*at] > 0;
+        let first = (start..start + FEW).find(occupied)?;
+        let last = (start..start + FEW).rev().find(occupied)?;
+        let metres = |part: usize| near_m + (far_m - near_m) * part as f32 / PARTS as f32;
+        Some(Doubt::Crowded {
+            share: most as f64 / all as f64,
+            part_m: [metres(first), metres(last + 1)],
+            range_m: [near_m, far_m],
+        })
+    }
 }
 
 impl Display for Doubt {
@@ -311,6 +316,16 @@ impl Display for Doubt {
                 to,
                 "{:.0} % of the depth lies before near {near_m} m or beyond far {far_m} m and is shown there; both are metres",
                 100.0 * share
+            ),
+            Doubt::Crowded {
+                share,
+                part_m: [from, to_m],
+                range_m: [near, far],
+            } => write!(
+                to,
+                "{:.0} % of the depth lies from {from:.3} m to {to_m:.3} m, in {:.1} % of the range from {near:.3} m to {far:.3} m that is shown; if farther numbers mean background or no reading, --far says what is farthest",
+                100.0 * share,
+                100.0 * (to_m - from) / (far - near)
             ),
         }
     }
@@ -370,11 +385,6 @@ mod tests {
 
     #[test]
     fn a_range_that_most_of_the_depth_leaves_empty_is_named() {
-        let shown = |near_m, far_m| ShownDepth {
-            near_m,
-            far_m,
-            holes: 0.0,
-        };
         // A scene from 1 m to 2 m, as part of a range to `far`, and a share of pixels at its far end.
         let scene = |far: f32, background: usize| {
             Array2::from_shape_fn((10, 100), |(y, x)| match 10 * x < background {
@@ -382,18 +392,20 @@ mod tests {
                 false => (x + 100 * y) as f32 / 1000.0 / (far - 1.0),
             })
         };
-        assert_eq!(crowd(&scene(2.0, 0), shown(1.0, 2.0)), None);
-        assert_eq!(crowd(&scene(2.0, 700), shown(1.0, 2.0)), None);
-        assert_eq!(crowd(&scene(4.0, 600), shown(1.0, 4.0)), None);
+        let crowded =
+            |depth: &Array2<f32>, near, far| Doubt::of_crowded(depth, near, far).map(|doubt| doubt.to_string());
+        assert_eq!(crowded(&scene(2.0, 0), 1.0, 2.0), None);
+        assert_eq!(crowded(&scene(2.0, 700), 1.0, 2.0), None);
+        assert_eq!(crowded(&scene(4.0, 600), 1.0, 4.0), None);
         for far in [65.535, 100.0, 1000.0, 65535.0] {
-            let crowd = crowd(&scene(far, 50), shown(1.0, far)).unwrap_or_default();
+            let why = crowded(&scene(far, 50), 1.0, far).unwrap_or_default();
             assert!(
-                crowd.starts_with("95 % of the depth") && crowd.contains(&format!("{far:.3} m")),
-                "{crowd}"
+                why.starts_with("95 % of the depth") && why.contains(&format!("{far:.3} m")),
+                "{why}"
             );
         }
-        assert!(crowd(&scene(1000.0, 600), shown(1.0, 1000.0)).is_some_and(|crowd| crowd.starts_with("60 %")));
-        assert_eq!(crowd(&Array2::from_elem((4, 4), 0.5), shown(2.0, 2.0)), None);
+        assert!(crowded(&scene(1000.0, 600), 1.0, 1000.0).is_some_and(|why| why.starts_with("60 %")));
+        assert_eq!(crowded(&Array2::from_elem((4, 4), 0.5), 2.0, 2.0), None);
     }
 
     #[test]

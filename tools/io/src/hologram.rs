@@ -7,7 +7,6 @@ use phasefront::Size;
 pub use views::{AberratedOptics, check_z};
 
 use crate::display::{DisplayFile, lut_of};
-use crate::fingerprint::Fingerprint;
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PICTURE, npy};
 use crate::output::{self, Pending, has_extension};
@@ -65,7 +64,7 @@ const MOST_NAME: usize = 64;
 struct Description {
     #[serde(flatten)]
     info: HologramInfo,
-    /// The fingerprint of the levels, which reveals a picture that was resized, turned or edited but kept the chunk.
+    /// The checksum of the levels, which reveals a picture that was resized, turned or edited but kept the chunk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     levels: Option<String>,
 }
@@ -75,7 +74,7 @@ impl HologramInfo {
     fn chunk(&self, path: &Path, levels: &Levels) -> Result<(&'static str, String)> {
         let description = Description {
             info: self.clone(),
-            levels: Some(levels.fingerprint().to_string()),
+            levels: Some(levels.checksum()),
         };
         let text = serde_json::to_string(&description).map_err(|e| Error::file(path, e))?;
         Ok((PNG_CHUNK, text))
@@ -172,16 +171,19 @@ impl Levels {
         }
     }
 
-    /// Returns a fingerprint of the shape and the levels.
-    fn fingerprint(&self) -> Fingerprint {
+    /// Returns the CRC-32 of PNG over C, H, W, as 64 bits each, and the levels, little-endian and one colour after
+    /// another, as eight hexadecimal digits.
+    fn checksum(&self) -> String {
         let (colours, height, width) = self.dim();
-        let mut all = Fingerprint::default();
-        all.numbers(&[colours, height, width]);
-        match self.view() {
-            levels::Levels::Bytes(levels) => all.bytes(levels),
-            levels::Levels::Words(levels) => levels.iter().for_each(|level| all.bytes(&level.to_le_bytes())),
+        let mut all = crc32fast::Hasher::new();
+        for number in [colours, height, width] {
+            all.update(&(number as u64).to_le_bytes());
         }
-        all
+        match self.view() {
+            levels::Levels::Bytes(levels) => all.update(levels),
+            levels::Levels::Words(levels) => levels.iter().for_each(|level| all.update(&level.to_le_bytes())),
+        }
+        format!("{:08x}", all.finalize())
     }
 
     /// Returns the levels in memory.
@@ -362,7 +364,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
     // Levels are for the pixels of a modulator, so that Exif data that viewers add turn nothing.
     let (image, _) = decode::open_picture(path, Reading::AS_STORED)?;
     let levels = levels_of(image, &info).map_err(|why| Error::file(path, why))?;
-    if written.is_some_and(|written| written != levels.fingerprint().to_string()) {
+    if written.is_some_and(|written| written != levels.checksum()) {
         return Err(Error::file(
             path,
             "holds other levels than it was written with: another program resized, turned or edited it; take the file as `phasefront` wrote it",

@@ -114,11 +114,23 @@ fn video_doubts_what_a_hologram_doubts() {
             .for_each(|(.., v)| v.0[0] = 0);
         depth
     };
+    // A far plane of numbers that no rule knows.
+    let crowded = Grey16::from_fn(WIDTH, HEIGHT, |x, y| match x % 4 {
+        0 => image::Luma([60_000]),
+        _ => *millimetres(0).get_pixel(x, y),
+    });
     let turned = jpeg(&colour(0).into(), 3);
     for (name, depth, turns, flags, word) in [
         ("millimetres", millimetres(0), false, &[][..], "say so by --depth-unit"),
         ("zeros", zeros(0), false, &[], "25 % of it is 0"),
         ("turned", normalized(0), true, &[], "Exif data turn the colour"),
+        (
+            "crowded",
+            crowded,
+            false,
+            &["--depth-unit", "mm"],
+            "75 % of the depth lies",
+        ),
         (
             "clipped",
             millimetres(0),

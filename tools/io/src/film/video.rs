@@ -6,7 +6,7 @@ use crate::{Error, Result};
 use ndarray::Array2;
 use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
-use phasefront_core::depth::DepthUnit;
+use phasefront_core::depth::{self, DepthUnit};
 use std::io::Read;
 use std::path::Path;
 
@@ -149,6 +149,16 @@ impl VideoFrame {
             beyond += usize::from(!(near_m..=far_m).contains(&metres));
         }
         beyond as f64 / all.max(1) as f64
+    }
+
+    /// Returns the reason to doubt the range of the frame's depth, if it is in metres and there is one.
+    pub fn crowded(&self) -> Option<Doubt> {
+        let depth = (self.depth.as_ref()).filter(|depth| depth.format != DepthFormat::NormalizedU16)?;
+        let metres = Array2::from_shape_vec(depth.size.shape(), depth.readings().collect()).ok()?;
+        // A frame without a reading is refused elsewhere.
+        let normalized = depth::normalize(metres.view(), DepthUnit::Metres, None, None).ok()?;
+        let (near_m, far_m) = normalized.range_m?;
+        Doubt::of_crowded(&normalized.depth, near_m, far_m)
     }
 
     /// Returns the frame as a view that a session accepts.

@@ -127,8 +127,11 @@ impl Source {
                 said(first)
             )));
         }
-        if let Some((near_m, far_m)) = self.range_m.filter(|_| self.given == 0) {
-            doubts.extend(Doubt::of_clipped(frame.beyond(near_m, far_m), near_m, far_m));
+        if self.given == 0 {
+            doubts.extend(match self.range_m {
+                Some((near_m, far_m)) => Doubt::of_clipped(frame.beyond(near_m, far_m), near_m, far_m),
+                None => frame.crowded(),
+            });
         }
         for doubt in doubts {
             let kind = discriminant(&doubt);
