@@ -12,7 +12,9 @@ mod encoding;
 pub mod local;
 pub mod midpoint;
 pub mod modelled;
+pub mod natural;
 mod start;
+mod still;
 
 use crate::encode::brightness::Brightness;
 use crate::runtime::error::{Error, Result};
@@ -36,6 +38,10 @@ pub struct EncoderOptions {
     /// sharper at the midpoint and cost four transforms for each colour and step. Three steps bring nearly all of the
     /// gain.
     pub midpoint_steps: usize,
+    /// The number of steps of natural focus that follow the local steps, at most 1000. They bring the displayed light
+    /// to the focal stack of incoherent light of an RGB-D frame ([`natural`]), so that what is out of focus is soft. 30
+    /// bring most of the gain. They take the place of [`Self::midpoint_steps`]. Fields without a frame have none.
+    pub focus_steps: usize,
 }
 
 impl EncoderOptions {
@@ -78,6 +84,19 @@ impl EncoderOptions {
                 midpoint::MAX_STEPS
             )));
         }
+        if self.focus_steps > natural::MAX_STEPS {
+            return Err(Error::Setting(format!(
+                "{} steps of natural focus; there must be at most {}, and 30 bring most of the gain",
+                self.focus_steps,
+                natural::MAX_STEPS
+            )));
+        }
+        if self.focus_steps > 0 && self.midpoint_steps > 0 {
+            return Err(Error::Setting(
+                "steps at the midpoint make the focus coherent, steps of natural focus soft; give one of the two"
+                    .into(),
+            ));
+        }
         Ok(())
     }
 }
@@ -103,6 +122,7 @@ impl From<Encoding> for EncoderOptions {
             dark_threshold: dark,
             local_steps,
             midpoint_steps: 0,
+            focus_steps: 0,
         }
     }
 }

@@ -16,6 +16,7 @@
 //! | [`frame`] | colour images, depth planes, conversion, resampling |
 //! | [`depth`] | units, hole filling, alignment, temporal smoothing, range, conditioning |
 //! | [`method`] | from a frame to a complex field: networks, the plane sweep, both combined |
+//! | [`focus`] | the focal stack of incoherent light that natural focus aims at |
 //! | `depth_network` | depth from colour alone, by a network that the user supplies |
 //! | [`encode`] | from a field to phases: double phase, its filters, corrections, brightness |
 //! | [`pipeline`] | one frame through all stages |
@@ -27,6 +28,7 @@ pub mod depth;
 pub mod depth_network;
 pub mod display;
 pub mod encode;
+pub mod focus;
 pub mod frame;
 pub mod method;
 pub mod optics;

@@ -99,7 +99,7 @@ impl Pipeline {
     pub fn new(size: Size, method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
         let method = MethodPlan::new(size, method, &target.display)?;
         // The display plan covers the remaining distance to the modulator.
-        let display = DisplayPlan::from_z(size, method.z_m(), target, options)?;
+        let display = DisplayPlan::for_frames(size, method.z_m(), target, options)?;
         Ok(Pipeline { method, display })
     }
 
@@ -157,6 +157,7 @@ impl Pipeline {
         if !self.display.keeps_phase() {
             remove_mean_phase(field, self.display.colours());
         }
+        self.display.aim(frame, &mut scratch.display);
         let method = stage.end();
         let stage = stage!("propagate");
         self.display.propagate(field, &mut scratch.display);

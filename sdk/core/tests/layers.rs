@@ -29,6 +29,7 @@ const LAYERS: &[&str] = &[
     "method::network",
     "method::seeded",
     "method",
+    "focus",
     "depth_network",
     "encode::brightness",
     "encode",

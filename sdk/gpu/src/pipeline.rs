@@ -173,6 +173,9 @@ impl GpuPipeline {
                     .into(),
             ));
         }
+        if job.encoder.focus_steps > 0 {
+            return Err(GpuError::Refused("steps of natural focus, which are the CPU's".into()));
+        }
         if let Encoding::Deep(network) = &job.encoder.encoding {
             network.check_prefilter(display)?;
         }

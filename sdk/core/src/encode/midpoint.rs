@@ -10,6 +10,7 @@
 //! λ = 0 corrects only the amplitude, as in Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
 //! focus. λ = 1 corrects the whole wave, including the phase, which the eye does not see.
 
+use super::still::Still;
 use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::target::Target;
@@ -26,8 +27,7 @@ use rayon::prelude::*;
 pub const WAVE: f32 = 0.5;
 /// γ, the length of a step.
 pub const GAIN: f32 = 1.5;
-/// The largest change of a pixel's field, as a share of full light, at which the pixel counts as unchanged.
-pub const STILL: f32 = 0.1;
+pub use super::still::STILL;
 /// The largest number of steps. Steps after the third bring little gain.
 pub(super) const MAX_STEPS: usize = 100;
 
@@ -47,10 +47,7 @@ pub struct MidpointSteps {
 /// The working memory of [`MidpointSteps`] for one call at a time.
 pub struct MidpointScratch {
     wave: ConvolveScratch,
-    /// The field at the modulator in all colours, of this frame or, between frames, of the previous one.
-    field: Vec<Complex32>,
-    /// The phases of the previous frame in all colours. NaN where this frame cannot start from them.
-    before: Vec<f32>,
+    still: Still,
     /// T of one colour.
     wanted: Vec<Complex32>,
     /// u, then r.
@@ -114,8 +111,7 @@ impl MidpointSteps {
         let values = self.back.len() * self.height * self.width;
         MidpointScratch {
             wave: self.back[0].scratch(),
-            field: vec![Complex32::ZERO; values],
-            before: vec![f32::NAN; values],
+            still: Still::new(values, self.width),
             wanted: plane(),
             missing: plane(),
             shown: plane(),
@@ -130,18 +126,7 @@ impl MidpointSteps {
     /// # Panics
     /// Panics if `field` does not have C·H·W values.
     pub fn keep(&self, field: &[Complex32], past: Option<f32>, scratch: &mut MidpointScratch) {
-        assert_eq!(field.len(), scratch.field.len());
-        let bound = past.map_or(-1.0, |scale| (STILL * scale).powi(2));
-        let rows = (scratch.field.par_chunks_exact_mut(self.width))
-            .zip(scratch.before.par_chunks_exact_mut(self.width))
-            .zip(field.par_chunks_exact(self.width));
-        rows.for_each(|((kept, before), field)| {
-            for ((kept, before), field) in kept.iter_mut().zip(before).zip(field) {
-                let still = (field - *kept).norm_sqr() <= bound;
-                *before = if still { *before } else { f32::NAN };
-                *kept = *field;
-            }
-        });
+        scratch.still.keep(field, past);
     }
 
     /// Corrects `phases`, (C, H, W) in \[0, 2π), toward the stored field. `scale` is the amplitude that maps to full
@@ -150,30 +135,22 @@ impl MidpointSteps {
     /// # Panics
     /// Panics if `phases` does not have C·H·W values.
     pub fn correct(&self, scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
-        assert_eq!(phases.len(), scratch.field.len());
+        assert_eq!(phases.len(), scratch.still.field.len());
         if scale <= 0.0 {
-            scratch.before.fill(f32::NAN);
+            scratch.still.forget();
             return; // Darkness needs no correction.
         }
-        let rows = phases
-            .par_chunks_exact_mut(self.width)
-            .zip(scratch.before.par_chunks_exact(self.width));
-        rows.for_each(|(phases, before)| {
-            for (phase, before) in phases.iter_mut().zip(before) {
-                *phase = if before.is_nan() { *phase } else { *before };
-            }
-        });
+        scratch.still.start(phases);
         for (colour, phases) in phases.chunks_exact_mut(self.height * self.width).enumerate() {
             self.correct_colour(colour, 1.0 / scale, phases, scratch);
         }
-        scratch.before.copy_from_slice(phases);
+        scratch.still.end(phases);
     }
 
     fn correct_colour(&self, colour: usize, per_scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
         let MidpointScratch {
             wave,
-            field,
-            before: _,
+            still,
             wanted,
             missing,
             shown,
@@ -185,7 +162,7 @@ impl MidpointSteps {
             let rows = light.par_chunks_exact_mut(width).enumerate();
             rows.for_each(|(y, row)| illumination.light_row(row, colour * self.height + y, self.height, *modulator));
         }
-        wanted.copy_from_slice(&field[colour * phases.len()..][..phases.len()]);
+        wanted.copy_from_slice(&still.field[colour * phases.len()..][..phases.len()]);
         self.back[colour].propagate(wanted, wave);
         if !wanted.par_iter().all(|value| value.is_finite()) {
             return; // A transform would spread such a value over the whole frame.

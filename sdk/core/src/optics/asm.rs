@@ -204,15 +204,27 @@ impl Transfer {
 
     /// Multiplies column `x` of a spectrum by the transfer function.
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
-        wide!(self.multiply(x, column));
+        wide!(self.each(x, column, |value, factor| *value *= factor));
     }
 
+    /// Multiplies column `x` of a spectrum by the conjugate of the transfer function and adds it to `sum`: the adjoint
+    /// of the propagation.
+    pub fn add_adjoint(&self, x: usize, column: &mut [Complex32], sum: &mut [Complex32]) {
+        wide!({
+            self.each(x, column, |value, factor| *value *= factor.conj());
+            for (sum, value) in sum.iter_mut().zip(column) {
+                *sum += *value;
+            }
+        });
+    }
+
+    /// Calls `change` with each value of column `x` and its factor.
     #[inline(always)]
-    fn multiply(&self, x: usize, column: &mut [Complex32]) {
+    fn each(&self, x: usize, column: &mut [Complex32], change: impl Fn(&mut Complex32, &Complex32)) {
         if !self.even {
             let factors = &self.factors[x * self.padded_height..][..self.padded_height];
             for (value, factor) in column.iter_mut().zip(factors) {
-                *value *= factor;
+                change(value, factor);
             }
             return;
         }
@@ -221,10 +233,10 @@ impl Transfer {
         let transfer = &self.factors[x * rows..][..rows];
         let (near, far) = column.split_at_mut(rows);
         for (value, factor) in near.iter_mut().zip(transfer) {
-            *value *= factor;
+            change(value, factor);
         }
         for (value, factor) in far.iter_mut().rev().zip(&transfer[1..]) {
-            *value *= factor;
+            change(value, factor);
         }
     }
 }

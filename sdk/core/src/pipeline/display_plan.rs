@@ -12,11 +12,13 @@ use crate::display::target::Target;
 use crate::encode::brightness::{Brightness, Past, Percentile};
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::modelled::{ModelScratch, ModelSteps};
+use crate::encode::natural::{NaturalScratch, NaturalSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
+use crate::frame::RgbdFrame;
 use crate::optics::asm::Propagator;
 use crate::optics::fft::ConvolveScratch;
 use crate::runtime::cancel::Cancel;
-use crate::runtime::error::Result;
+use crate::runtime::error::{Error, Result};
 use crate::runtime::stage::stage;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
@@ -35,6 +37,8 @@ pub struct DisplayPlan {
     midpoint: Option<MidpointSteps>,
     /// Takes the place of `midpoint` on a display with a learned model.
     modelled: Option<ModelSteps>,
+    /// Needs the frame of each field ([`DisplayPlan::aim`]).
+    natural: Option<NaturalSteps>,
     panel: Option<PanelPlan>,
     bits: u32,
     keeps_phase: bool,
@@ -49,6 +53,7 @@ pub struct DisplayScratch {
     encoder: EncoderScratch,
     midpoint: Option<MidpointScratch>,
     modelled: Option<ModelScratch>,
+    natural: Option<NaturalScratch>,
     /// Phases in memory before they are converted to levels. Empty if the encoder writes levels directly.
     phases: Vec<f32>,
     percentile: Percentile,
@@ -64,6 +69,9 @@ impl DisplayScratch {
         }
         if let Some(modelled) = &mut self.modelled {
             modelled.set_cancel(cancel);
+        }
+        if let Some(natural) = &mut self.natural {
+            natural.set_cancel(cancel);
         }
         self.cancel = cancel.clone();
     }
@@ -94,6 +102,20 @@ impl DisplayPlan {
     /// # Errors
     /// Returns the same errors as [`Self::new`].
     pub fn from_z(size: Size, z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
+        if options.focus_steps > 0 {
+            return Err(Error::Setting(
+                "steps of natural focus need the RGB-D frame of a field; leave them out for a field alone".into(),
+            ));
+        }
+        Self::for_frames(size, z_m, target, options)
+    }
+
+    /// Works like [`Self::from_z`] for fields whose frames are known: [`Self::aim`] takes each.
+    ///
+    /// # Errors
+    /// Returns the same errors as [`Self::new`].
+    #[doc(hidden)]
+    pub fn for_frames(size: Size, z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
         if let Encoding::Deep(network) = &options.encoding {
             network.check_prefilter(&target.display)?;
         }
@@ -111,6 +133,10 @@ impl DisplayPlan {
                 _ => None,
             },
             modelled: ModelSteps::new(size, target, options.midpoint_steps)?,
+            natural: match options.focus_steps {
+                0 => None,
+                steps => Some(NaturalSteps::new(size, target, steps)?),
+            },
             panel: PanelPlan::new(&target.panel, &target.display, size)?,
             bits: target.display.bits(),
             keeps_phase: options.encoding.keeps_phase(),
@@ -148,6 +174,7 @@ impl DisplayPlan {
             },
             midpoint: self.midpoint.as_ref().map(MidpointSteps::scratch),
             modelled: self.modelled.as_ref().map(ModelSteps::scratch),
+            natural: self.natural.as_ref().map(|natural| natural.scratch(1)),
             phases: if self.needs_phases() || self.bits > 8 {
                 vec![0.0; self.colours * self.height * self.width]
             } else {
@@ -160,7 +187,18 @@ impl DisplayPlan {
 
     /// Returns whether bytes are made from phases in memory rather than directly from the field.
     fn needs_phases(&self) -> bool {
-        self.midpoint.is_some() || self.modelled.is_some() || self.panel.is_some()
+        self.midpoint.is_some() || self.modelled.is_some() || self.natural.is_some() || self.panel.is_some()
+    }
+
+    /// Stores the frame of the next field for the steps of natural focus.
+    ///
+    /// # Panics
+    /// Panics if `scratch` belongs to another plan or the frame has another shape or other colours.
+    #[doc(hidden)]
+    pub fn aim(&self, frame: &RgbdFrame, scratch: &mut DisplayScratch) {
+        if let (Some(plan), Some(of)) = (&self.natural, &mut scratch.natural) {
+            plan.aim(frame, of);
+        }
     }
 
     /// Propagates `field`, (C, H, W), to the modulator in place. Allocates nothing.
@@ -245,7 +283,15 @@ impl DisplayPlan {
         if let Some((plan, of)) = &mut modelled {
             plan.keep(field, of);
         }
+        let mut natural = self.natural.as_ref().zip(scratch.natural.as_mut());
+        if let Some((plan, of)) = &mut natural {
+            plan.keep(field, past.map(|past| past.scale), of);
+        }
         let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
+        if let Some((plan, of)) = natural {
+            let _stage = stage!("natural focus");
+            plan.correct(scale, phases, of);
+        }
         if let Some((plan, of)) = midpoint {
             let _stage = stage!("midpoint");
             plan.correct(scale, phases, of);

@@ -221,7 +221,7 @@ fn each_stage_brings_what_is_shown_nearer_to_the_field() {
 }
 
 /// Propagates a colour of that size over `distance_m` without the carrier, through an aperture of `radius`.
-fn through_aperture(
+pub(crate) fn through_aperture(
     plane: &[Complex64],
     Size { width: w, height: h }: Size,
     padded: Size,
