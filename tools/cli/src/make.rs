@@ -27,6 +27,8 @@ impl HologramRequest {
     /// Makes the hologram of `image` for `display`.
     pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<HologramResult> {
         let method = self.method();
+        let is_of_rgbd = matches!((method, image), (Method::Core(_), Image::Rgbd(_)));
+        self.encoder.check_focus(is_of_rgbd)?;
         let device = self.backend.device()?;
         if device.is_some()
             && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.ldi.is_some())

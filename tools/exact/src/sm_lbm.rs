@@ -162,6 +162,35 @@ pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_
     }
 }
 
+/// A plane wave of one colour, without the carrier.
+#[derive(Clone, Copy)]
+struct Tilted {
+    /// The frequency in cycles per pixel, (y, x).
+    frequency: [f64; 2],
+    /// √(λ⁻² − |f|²) − λ⁻¹, in cycles per metre.
+    per_m: f64,
+}
+
+impl Tilted {
+    /// Creates the wave toward `tilt`, (y, x) in shares of the Nyquist frequency, on a periodic plane of `padded`
+    /// pixels.
+    fn new(tilt: [f64; 2], padded: Size, pitch_m: f64, wavelength_m: f64) -> Self {
+        let rounded = |share: f64, n: usize| (share * 0.5 * n as f64).round() / n as f64;
+        let frequency = [rounded(tilt[0], padded.height), rounded(tilt[1], padded.width)];
+        let square = (frequency[0].powi(2) + frequency[1].powi(2)) / pitch_m.powi(2);
+        Tilted {
+            frequency,
+            per_m: -wavelength_m * square / (1.0 + (1.0 - wavelength_m.powi(2) * square).sqrt()),
+        }
+    }
+
+    fn at(&self, point: &Point, z_m: f64) -> Complex32 {
+        let [y, x] = self.frequency;
+        let turns = y * f64::from(point.y) + x * f64::from(point.x) + self.per_m * z_m;
+        Complex32::cis((turns.fract() * std::f64::consts::TAU) as f32)
+    }
+}
+
 /// Returns the complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` receives the
 /// number of finished planes and the total number of planes that hold points, over all colours.
 ///
@@ -175,6 +204,22 @@ pub fn hologram(
     ldi: &Ldi,
     display: &Display,
     planes: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Array3<Complex32>> {
+    tilted(ldi, display, planes, [0.0; 2], progress)
+}
+
+/// Works like [`hologram`] for a scene that is lit by plane waves toward the place `tilt` = (y, x) of the pupil, as
+/// shares of the Nyquist frequency: each point starts with the phase 2π(f·x + z·(√(λ⁻² − |f|²) − λ⁻¹)) of the wave of
+/// frequency f, rounded to one that the padded plane has. An eye's pupil then sees the scene from there.
+///
+/// # Errors
+/// Returns the errors of [`hologram`].
+pub fn tilted(
+    ldi: &Ldi,
+    display: &Display,
+    planes: usize,
+    tilt: [f64; 2],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
     check_planes(planes)?;
@@ -200,10 +245,12 @@ pub fn hologram(
         let Some((back, points)) = scene.occupied.first() else {
             break;
         };
+        let wave = Tilted::new(tilt, padded, display.pitch_m(), wavelength_m);
         // The columns are not in use yet, so their buffer holds the farthest plane.
         let plane = &mut scratch.columns;
-        let content = |point: &Point| Complex32::from(point.rgb[colour]);
-        place(&scene.points[points.clone()], plane, padded_width, content);
+        let z_m = |k: usize| plane_z_m(k, planes, display);
+        let content = |k: usize| move |point: &Point| wave.at(point, z_m(k)) * point.rgb[colour];
+        place(&scene.points[points.clone()], plane, padded_width, content(*back));
         fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         let mut at = *back;
         let done = colour * scene.occupied.len();
@@ -217,7 +264,7 @@ pub fn hologram(
                     &across
                 }
             };
-            cross(&fft, &mut scratch, transfer, points, content);
+            cross(&fft, &mut scratch, transfer, points, content(*k));
             at = *k;
             progress(done + i, total);
         }

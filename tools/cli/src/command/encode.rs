@@ -53,6 +53,7 @@ impl Encode {
         (self.phases.iter()).try_for_each(|path| output::file(path, &["npy"]))?;
         let display = self.display.read()?;
         self.outputs.declare(&display)?;
+        self.encoder.check_focus(false)?;
         let encoder = self.encoder.read()?;
         let start = Instant::now();
         let field = hologram::read_field(&self.field, &display)?;

@@ -1,6 +1,6 @@
 //! `phasefront judge`: compares methods and encoders on an image and a display.
 
-use crate::flags::encoder::EncoderFlags;
+use crate::flags::encoder::{EncoderFlags, FocusName};
 use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, shown_json, shown_text};
 use crate::flags::method::CoreMethod;
 use crate::make::{HologramRequest, HologramResult, Image, Method, infos};
@@ -43,6 +43,9 @@ pub(crate) struct Judge {
     /// Encoders, each as published, with the default correction, and with the correction for stills
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"], help_heading = "Method")]
     encoder: Vec<EncoderName>,
+    /// Focuses; natural adds a row of 30 steps for each method and encoder
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["coherent"], help_heading = "Method")]
+    focus: Vec<FocusName>,
     /// Number of planes of the exact wave
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..), help_heading = "Expert")]
     planes: u16,
@@ -227,15 +230,23 @@ impl Judge {
                     (EncoderOptions::DARK_THRESHOLD, steps, 0),
                     (EncoderOptions::DARK_THRESHOLD, steps, STILL_STEPS),
                 ];
-                combinations.extend(corrections.map(|(dark, local, midpoint)| Combination {
+                let mut flags = Vec::new();
+                if self.focus.contains(&FocusName::Coherent) {
+                    flags.extend(corrections.map(|(dark, local, last)| EncoderFlags::of(encoder, dark, local, last)));
+                }
+                if self.focus.contains(&FocusName::Natural) {
+                    let default = EncoderFlags::of(encoder, EncoderOptions::DARK_THRESHOLD, steps, 0);
+                    flags.push(default.with_focus(FocusName::Natural));
+                }
+                combinations.extend(flags.into_iter().map(|encoder| Combination {
                     method,
-                    encoder: EncoderFlags::of(encoder, dark, local, midpoint),
+                    encoder,
                     network: None,
                 }));
             }
         }
         let pair = phasefront_models::pair_for(display, networks::Precision::Int8).is_some();
-        if pair && methods.contains(&CoreMethod::Network) {
+        if pair && methods.contains(&CoreMethod::Network) && self.focus.contains(&FocusName::Coherent) {
             combinations.push(Combination {
                 method: CoreMethod::Network,
                 encoder: EncoderFlags::default(),

@@ -6,12 +6,11 @@ use crate::flags::method::{CoreMethod, Parts};
 use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::Pipeline;
-use phasefront::Size;
 use phasefront::output::Packing;
+use phasefront::{EncoderOptions, Pipeline, RgbdFrame, Size};
 use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
-use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, sweep_for};
-use phasefront_command::terminal;
+use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, check_used, sweep_for};
+use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{self, Hologram, HologramInfo, Levels, packed};
 use phasefront_io::{Error, Result, output};
@@ -58,6 +57,11 @@ pub(crate) struct MultiplexCommand {
     overwrite: OverwriteFlag,
 }
 
+/// The joint steps of natural focus.
+const JOINT_STEPS: usize = 10;
+/// The largest number of maps of natural focus, which are in memory together.
+const MOST_NATURAL: u16 = 24;
+
 impl MultiplexCommand {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if self.output.is_none() && self.packed.is_none() && !self.judge {
@@ -78,6 +82,7 @@ impl MultiplexCommand {
                 "maps are made for levels of up to 8 bits, without a carrier, a lens or a flatness map".into(),
             ));
         }
+        self.check_flags()?;
         let (frame, depth) = self.frame.read(&target.display, self.display.is_given())?;
         let network = self.network.as_deref();
         let method = CoreMethod::or_default(self.method, network, &self.encoder);
@@ -88,52 +93,62 @@ impl MultiplexCommand {
             sweep: sweep_for(&target.display, None, None),
             encoder: &self.encoder,
         })?;
-        let pipeline = Pipeline::new(frame.size(), method, &target, &encoder.options)?;
+        // Joint steps follow after all maps.
+        let options = EncoderOptions {
+            focus_steps: 0,
+            ..encoder.options
+        };
+        let pipeline = Pipeline::new(frame.size(), method, &target, &options)?;
         let Size { width, height } = frame.size();
         let mut wave = Array3::from_elem((pipeline.colours(), height, width), Complex32::ZERO);
         let values = wave.as_slice_mut().expect("standard layout");
         pipeline.field(&frame, values, &mut pipeline.scratch())?;
-        let plan = Multiplex::new(frame.size(), &target, &encoder.options)?;
-        let differ = Differ {
-            start: true,
-            feedback: !self.no_feedback,
+        let plan = Multiplex::new(frame.size(), &target, &options)?;
+        let maps = match self.encoder.focus_steps(JOINT_STEPS)? {
+            0 => {
+                let differ = Differ {
+                    start: true,
+                    feedback: !self.no_feedback,
+                };
+                plan.maps(&wave, self.maps.into(), differ)
+            }
+            steps => {
+                let bar = progress_bar(self.maps.into(), "maps");
+                let maps = plan.natural(&frame, self.maps.into(), steps, &|n| bar.set_position(n as u64))?;
+                bar.finish_and_clear();
+                maps
+            }
         };
-        let maps = plan.maps(&wave, self.maps.into(), differ);
         self.write(&file, encoder.name, &maps)?;
-        let counts: Vec<usize> = [1, 2, 4, 8, 12, 24, 48, 96]
-            .into_iter()
-            .filter(|n| *n <= maps.len())
-            .collect();
-        let figures = if self.judge {
-            plan.judge(&wave, &maps, &counts)?
-        } else {
-            Vec::new()
+        let (rows, text) = match self.judge {
+            true => judged(&plan, &frame, &wave, &maps)?,
+            false => (Vec::new(), String::new()),
         };
-        let rows: Vec<_> = (counts.iter().zip(&figures))
-            .map(|(n, f)| {
-                json!({
-                    "maps": n, "psnr_db": f.amplitude_psnr, "ssim": f.amplitude_ssim,
-                    "stack_psnr_db": f.focal_psnr, "stack_ssim": f.focal_ssim, "brightness": f.brightness,
-                })
-            })
-            .collect();
-        let text = (counts.iter().zip(&figures)).map(|(n, f)| {
-            format!(
-                "\n{n:3} maps: {:.2} dB, SSIM {:.3}, over the stack {:.2} dB, {:.3}, brightness {:.2}",
-                f.amplitude_psnr, f.amplitude_ssim, f.focal_psnr, f.focal_ssim, f.brightness
-            )
-        });
-        let text = format!(
-            "{} maps of {width}×{height}{}{}",
-            maps.len(),
-            shown_text(depth),
-            text.collect::<String>()
-        );
+        let text = format!("{} maps of {width}×{height}{}{text}", maps.len(), shown_text(depth));
         let value = json!({
             "output": self.output, "packed": self.packed, "width": width, "height": height,
             "depth": shown_json(depth), "shown": rows,
         });
         terminal::print(json, &value, text);
+        Ok(())
+    }
+
+    /// Refuses flags that natural focus does not use.
+    fn check_flags(&self) -> Result<()> {
+        let coherent = !self.encoder.is_natural();
+        let with = "--focus coherent";
+        check_used(&[
+            ("--method", self.method.is_some(), coherent, with),
+            ("--network", self.network.is_some(), coherent, with),
+            ("--precision", self.precision.is_some(), coherent, with),
+            ("--no-feedback", self.no_feedback, coherent, with),
+        ])?;
+        if !coherent && self.maps > MOST_NATURAL {
+            return Err(Error::Input(format!(
+                "--focus natural makes at most {MOST_NATURAL} maps, all at once; --maps is {}",
+                self.maps
+            )));
+        }
         Ok(())
     }
 
@@ -187,4 +202,28 @@ impl MultiplexCommand {
             .collect();
         packed::pack_maps(&plan, &planes)
     }
+}
+
+/// Compares the mean of the first 1, 2, 4 … of `maps` with `wave` and with what incoherent light shows of `frame`.
+fn judged(
+    plan: &Multiplex<'_>,
+    frame: &RgbdFrame,
+    wave: &Array3<Complex32>,
+    maps: &[Map],
+) -> Result<(Vec<serde_json::Value>, String)> {
+    let counts = [1, 2, 4, 8, 12, 24, 48, 96].into_iter();
+    let counts: Vec<usize> = counts.filter(|n| *n <= maps.len()).collect();
+    let natural = plan.judge_natural(frame, maps, &counts)?;
+    let (mut rows, mut text) = (Vec::new(), String::new());
+    for ((n, f), natural) in counts.iter().zip(plan.judge(wave, maps, &counts)?).zip(natural) {
+        rows.push(json!({
+            "maps": n, "psnr_db": f.amplitude_psnr, "ssim": f.amplitude_ssim,
+            "stack_psnr_db": f.focal_psnr, "stack_ssim": f.focal_ssim, "natural": natural, "brightness": f.brightness,
+        }));
+        text += &format!(
+            "\n{n:3} maps: {:.2} dB, SSIM {:.3}, over the stack {:.2} dB, {:.3}, natural {:.2} dB, {:.3}, brightness {:.2}",
+            f.amplitude_psnr, f.amplitude_ssim, f.focal_psnr, f.focal_ssim, natural.psnr, natural.ssim, f.brightness
+        );
+    }
+    Ok((rows, text))
 }

@@ -287,7 +287,7 @@ impl Video {
         bar: &indicatif::ProgressBar,
         rate: f64,
     ) -> Result<Statistics> {
-        let midpoint_steps = options.encoder.midpoint_steps;
+        let steps = options.encoder.midpoint_steps + options.encoder.focus_steps;
         let backend = options.backend;
         let session = VideoSession::new(options)?;
         warm_up(&session, backend)?;
@@ -299,8 +299,8 @@ impl Video {
             let written = if resuming { sink.written(&read)? } else { None };
             resuming = written.is_some();
             match written {
-                // Steps at the midpoint keep more state than a replay restores, so such frames are made again.
-                Some(scale) if midpoint_steps > 0 => {
+                // These steps keep more state than a replay restores, so such frames are made again.
+                Some(scale) if steps > 0 => {
                     session.process(&image).map_err(named)?;
                     sink.skip(scale);
                 }

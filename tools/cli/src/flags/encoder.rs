@@ -1,8 +1,8 @@
 //! The flags for the encoder that turns a field into phases.
 
-use clap::{Args, ValueHint};
+use clap::{Args, ValueEnum, ValueHint};
 use phasefront::{Display, EncoderOptions, Encoding, Network};
-use phasefront_command::flags::EncoderName;
+use phasefront_command::flags::{EncoderName, check_used};
 use phasefront_command::networks::{self, Precision};
 use phasefront_io::{Error, Result};
 use std::sync::Arc;
@@ -27,7 +27,26 @@ pub(crate) struct EncoderFlags {
     /// Further steps of correction at the midpoint, for stills; 1 brings most of the gain at the midpoint, 10 all of it
     #[arg(long, value_name = "N", default_value_t = 0)]
     midpoint_steps: usize,
+    /// How what is out of focus looks [default: coherent]
+    #[arg(long, value_enum, help_heading = "Method")]
+    focus: Option<FocusName>,
+    /// Steps of --focus natural, 1 to 1000, each of two transforms a plane, colour and map [default: 30; 10 for
+    /// several maps]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    focus_steps: Option<u16>,
 }
+
+/// How what is out of focus looks.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+pub(crate) enum FocusName {
+    /// As a laser shows it, with halos and rings
+    Coherent,
+    /// Soft, as in the world: by steps on each frame, for stills
+    Natural,
+}
+
+/// The steps of natural focus of a still.
+pub(crate) const FOCUS_STEPS: usize = 30;
 
 /// The options of an encoder, and its name.
 #[derive(Clone)]
@@ -42,11 +61,13 @@ impl Encoder {
             dark_threshold,
             local_steps,
             midpoint_steps,
+            focus_steps,
             ..
         } = &self.options;
-        let last = match midpoint_steps {
-            0 => String::new(),
-            steps => format!(", midpoint steps {steps}"),
+        let last = match (midpoint_steps, focus_steps) {
+            (0, 0) => String::new(),
+            (0, steps) => format!(", natural focus, {steps} steps"),
+            (steps, _) => format!(", midpoint steps {steps}"),
         };
         format!("{}, dark {dark_threshold}, local steps {local_steps}{last}", self.name)
     }
@@ -60,7 +81,42 @@ impl EncoderFlags {
             dark_threshold: Some(dark_threshold),
             local_steps: Some(local_steps),
             midpoint_steps,
+            focus: None,
+            focus_steps: None,
         }
+    }
+
+    /// Returns these flags for `focus`, with the default number of steps.
+    pub(crate) fn with_focus(self, focus: FocusName) -> Self {
+        EncoderFlags {
+            focus: Some(focus),
+            ..self
+        }
+    }
+
+    /// Checks whether --focus natural is given.
+    pub(crate) fn is_natural(&self) -> bool {
+        self.focus == Some(FocusName::Natural)
+    }
+
+    /// Returns the number of steps of natural focus, of which `default` are the default, or 0 for coherent focus.
+    pub(crate) fn focus_steps(&self, default: usize) -> Result<usize> {
+        check_used(&[(
+            "--focus-steps",
+            self.focus_steps.is_some(),
+            self.is_natural(),
+            "--focus natural",
+        )])?;
+        Ok(match self.is_natural() {
+            true => self.focus_steps.map_or(default, usize::from),
+            false => 0,
+        })
+    }
+
+    /// Refuses --focus natural where there is no RGB-D image.
+    pub(crate) fn check_focus(&self, is_of_rgbd: bool) -> Result<()> {
+        let with = "--method network, sweep or auto on an RGB-D image, whose depth it needs";
+        check_used(&[("--focus natural", self.is_natural(), is_of_rgbd, with)])
     }
 
     /// Makes the encoder for fields that are not made by the network of a pair.
@@ -75,20 +131,21 @@ impl EncoderFlags {
             EncoderName::ANTI_ALIAS
         };
         let name = self.encoder.unwrap_or(default);
-        Ok(self.encoder(name.encoding(prefilter)?, name))
+        self.encoder(name.encoding(prefilter)?, name)
     }
 
-    fn encoder(&self, encoding: Encoding, name: EncoderName) -> Encoder {
+    fn encoder(&self, encoding: Encoding, name: EncoderName) -> Result<Encoder> {
         let default = EncoderOptions::from(encoding);
-        Encoder {
+        Ok(Encoder {
             options: EncoderOptions {
                 dark_threshold: self.dark_threshold.unwrap_or(default.dark_threshold),
                 local_steps: self.local_steps.unwrap_or(default.local_steps),
                 midpoint_steps: self.midpoint_steps,
+                focus_steps: self.focus_steps(FOCUS_STEPS)?,
                 ..default
             },
             name: name.name(),
-        }
+        })
     }
 
     /// Checks whether --encoder deep is given.
@@ -112,7 +169,7 @@ impl EncoderFlags {
                     "the bundled networks for the deep encoder are for an offset of 0 mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias, which displays more".into(),
                 ));
             };
-            let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::DEEP);
+            let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::DEEP)?;
             return Ok((pair.hologram, encoder));
         }
         if by_name {

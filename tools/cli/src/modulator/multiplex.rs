@@ -4,15 +4,25 @@
 //! constant phase, which changes how levels round. With feedback, each map compensates for the error in the mean of the
 //! maps before it: after k maps of intensities I₁ … I_k, the next map aims at (k + 1)·I − ΣI_j at the midpoint, where I
 //! is the wave's intensity, with the wave's phase.
+//!
+//! For natural focus, each map is of the scene lit from its own direction, so that an eye's pupil adds sharp views from
+//! several places, as it does in the world. Joint steps then bring the mean intensity to the focal stack of incoherent
+//! light ([`phasefront_core::encode::natural`]).
 
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::RgbdFrame;
 use phasefront::Size;
 use phasefront::{EncoderOptions, Target};
 use phasefront_core::encode::Encoder;
+use phasefront_core::encode::natural::NaturalSteps;
+use phasefront_core::focus::disc;
 use phasefront_core::optics::aperture::Opening;
 use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::view::refocus::{Refocus, phase_only_field};
+use phasefront_exact::incoherent::{self, Natural, Pupil};
+use phasefront_exact::sm_lbm;
 use phasefront_exact::truth::{self, Figures};
 use phasefront_io::Result;
 use std::f32::consts::TAU;
@@ -43,6 +53,12 @@ pub struct Map {
     /// The amplitude that full light stands for.
     pub scale: f32,
 }
+
+/// The largest tilt, as a share of the aperture's radius. With larger ones, the noise of double phase enters the
+/// aperture.
+const LARGEST_TILT: f64 = 0.4;
+/// The number of planes of a tilted wave.
+const TILTED_PLANES: usize = 96;
 
 /// The limit of feedback: the largest intensity that a map aims at, relative to the wave's.
 const MOST: f32 = 4.0;
@@ -122,6 +138,52 @@ impl<'a> Multiplex<'a> {
         maps
     }
 
+    /// Makes `count` maps of `frame` for natural focus: tilted waves, then `steps` joint steps. `progress` receives the
+    /// number of finished waves.
+    ///
+    /// # Errors
+    /// Returns an error if the steps cannot be planned for the target.
+    pub fn natural(
+        &self,
+        frame: &RgbdFrame,
+        count: usize,
+        steps: usize,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<Map>> {
+        let display = &self.target.display;
+        let scene = truth::filled(frame, display)?;
+        let way = DisplayPlan::new(self.size, self.target, &EncoderOptions::default())?;
+        let (mut on_way, mut scratch) = (way.scratch(), self.encoder.scratch());
+        let (mut all, mut scale) = (Vec::with_capacity(count), None);
+        for (n, (y, x)) in tilts(count).into_iter().enumerate() {
+            let tilt = [y, x].map(|share| share * display.aperture_radius());
+            let mut field = sm_lbm::tilted(&scene, display, TILTED_PLANES, tilt, &|_, _| {})?;
+            let field = field.as_slice_mut().expect("standard layout");
+            way.propagate(field, &mut on_way);
+            let mut phases = vec![0.0; field.len()];
+            // Use the scale of the first map, so that all maps have the same brightness.
+            scale = Some(self.encoder.encode(field, scale, &mut phases, &mut scratch));
+            all.push(phases);
+            progress(n + 1);
+        }
+        let scale = scale.unwrap_or_default();
+        let plan = NaturalSteps::new(self.size, self.target, steps)?;
+        let mut scratch = plan.scratch(count);
+        plan.aim(frame, &mut scratch);
+        let mut maps: Vec<_> = all.iter_mut().map(Vec::as_mut_slice).collect();
+        plan.correct_maps(scale, &mut maps, &mut scratch);
+        let shape = (display.colours(), self.size.height, self.size.width);
+        let map = |phases: Vec<f32>| {
+            let level = |(at, phase)| self.target.response.level(phase, at);
+            let levels = phases.into_iter().enumerate().map(level).collect();
+            Map {
+                levels: Array3::from_shape_vec(shape, levels).expect("as many levels as phases"),
+                scale,
+            }
+        };
+        Ok(all.into_iter().map(map).collect())
+    }
+
     /// Computes the light behind the modulator.
     fn shown(&self, map: &Map) -> Vec<Complex32> {
         let mut field = vec![Complex32::ZERO; map.levels.len()];
@@ -146,38 +208,60 @@ impl<'a> Multiplex<'a> {
     /// # Errors
     /// Returns an error if a depth is too far away.
     pub fn judge(&self, wave: &Array3<Complex32>, maps: &[Map], counts: &[usize]) -> Result<Vec<Figures>> {
-        let Size { width, height } = self.size;
         let display = &self.target.display;
         let z_m = truth::judged_z_m(display);
-        let opening = Opening::centred(display.aperture_radius());
-        let plan = Refocus::new(self.size, display, &z_m, Some(opening))?;
-        let stack = |plan: &Refocus, field: &[Complex32]| -> Result<Vec<Array3<f32>>> {
-            let views = plan.focal_stack(field, &z_m)?.into_iter();
-            Ok(views
-                .map(|view| {
-                    Array3::from_shape_vec((display.colours(), height, width), view)
-                        .expect("a view of the wave's shape")
-                })
-                .collect())
-        };
         let free = Refocus::new(self.size, display, &z_m, None)?;
-        let truth = stack(&free, wave.as_slice().expect("standard layout"))?;
-        let mut sums = vec![Array3::<f32>::zeros(wave.dim()); z_m.len()];
-        let mut figures = Vec::new();
+        let truth = self.views(&free, wave.as_slice().expect("standard layout"), &z_m)?;
+        let seen = self.seen(maps, counts, &z_m)?;
+        seen.iter().map(|seen| truth::judge(seen, &truth, 0)).collect()
+    }
+
+    /// Compares the mean of the first n of `maps` with what incoherent light shows of `frame`, for each n in `counts`.
+    ///
+    /// # Errors
+    /// Returns an error if a depth is too far away.
+    pub fn judge_natural(&self, frame: &RgbdFrame, maps: &[Map], counts: &[usize]) -> Result<Vec<Natural>> {
+        let display = &self.target.display;
+        let truth = incoherent::Judge::of(&truth::filled(frame, display)?, display, Pupil::of_aperture(display))?;
+        let seen = self.seen(maps, counts, &incoherent::Judge::z_m(display))?;
+        seen.iter().map(|seen| truth.judge(seen, 0)).collect()
+    }
+
+    /// Returns the amplitudes of `field` at each of `z_m`, (C, H, W).
+    fn views(&self, plan: &Refocus, field: &[Complex32], z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
+        let shape = (self.target.display.colours(), self.size.height, self.size.width);
+        let views = plan.focal_stack(field, z_m)?.into_iter();
+        Ok(views
+            .map(|view| Array3::from_shape_vec(shape, view).expect("a view of the wave's shape"))
+            .collect())
+    }
+
+    /// Returns the amplitudes that the first n of `maps` show at each of `z_m`, for each n in `counts`.
+    fn seen(&self, maps: &[Map], counts: &[usize], z_m: &[f64]) -> Result<Vec<Vec<Array3<f32>>>> {
+        let display = &self.target.display;
+        let opening = Opening::centred(display.aperture_radius());
+        let plan = Refocus::new(self.size, display, z_m, Some(opening))?;
+        let mut sums = vec![Array3::<f32>::zeros(maps[0].levels.dim()); z_m.len()];
+        let mut seen = Vec::new();
         for (n, map) in maps.iter().enumerate() {
-            let views = stack(&plan, &self.shown(map))?;
+            let views = self.views(&plan, &self.shown(map), z_m)?;
             for (sum, view) in sums.iter_mut().zip(views) {
                 *sum += &(&view * &view);
             }
             if counts.contains(&(n + 1)) {
-                let seen: Vec<_> = sums
-                    .iter()
-                    .map(|sum| sum.mapv(|sum| (sum / (n + 1) as f32).sqrt()))
-                    .collect();
-                figures.push(truth::judge(&seen, &truth, 0)?);
+                let mean = |sum: &Array3<f32>| sum.mapv(|sum| (sum / (n + 1) as f32).sqrt());
+                seen.push(sums.iter().map(mean).collect());
             }
         }
-        Ok(figures)
+        Ok(seen)
+    }
+}
+
+/// Returns the tilts (y, x) of `count` maps, as shares of the aperture's radius.
+fn tilts(count: usize) -> Vec<(f64, f64)> {
+    match count {
+        1 => vec![(0.0, 0.0)],
+        _ => disc(count).map(|(y, x)| (LARGEST_TILT * y, LARGEST_TILT * x)).collect(),
     }
 }
 

@@ -21,6 +21,7 @@ mod devices;
 mod doctor;
 mod encode;
 mod films;
+mod focus;
 mod inputs;
 mod kernels;
 mod misuse;
