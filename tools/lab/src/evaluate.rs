@@ -14,7 +14,7 @@ use crate::sensor::Sensor;
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
 use phasefront::Size;
-use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
+use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::method::MethodPlan;
 use phasefront_core::method::network::InputKind;
@@ -306,11 +306,13 @@ fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
         dark_threshold,
         local_steps,
         midpoint_steps,
+        focus_steps,
         ..
     } = options;
-    let more = match midpoint_steps {
-        0 => String::new(),
-        more => format!(" + {more}"),
+    let more = match (midpoint_steps, focus_steps) {
+        (0, 0) => String::new(),
+        (0, more) => format!(", natural {more}"),
+        (more, _) => format!(" + {more}"),
     };
     format!("{encoder}, dark {dark_threshold}, steps {local_steps}{more}")
 }
@@ -373,7 +375,7 @@ impl<'a> Truths<'a> {
         let display = &manifest.display;
         let mut z_m = vec![0.0];
         z_m.extend(depths.iter().map(|d| display.z_of_depth(*d)));
-        let coherent = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
+        let coherent = viewer.views(None, &pair.hologram, &Shown::complex(), &z_m)?.views;
         z_m.extend(incoherent::Judge::z_m(display));
         Ok(Truths {
             ldi: &pair.ldi,
@@ -494,27 +496,35 @@ impl Viewer {
     }
 
     /// Returns the amplitudes of the midpoint hologram `field`, (C, H, W), at each of `z_m`, in metres, when `shown`
-    /// displays it.
+    /// displays it. Natural focus needs the `frame` of the field.
     ///
     /// # Errors
     /// Returns an error if a z lies outside the volume or the levels cannot be planned.
-    pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Seen> {
-        let size = self.size;
+    pub fn views(
+        &self,
+        frame: Option<&RgbdFrame>,
+        field: &Array3<Complex32>,
+        shown: &Shown,
+        z_m: &[f64],
+    ) -> Result<Seen> {
+        let size = Size {
+            width: self.size,
+            height: self.size,
+        };
         let mut values = field.iter().copied().collect::<Vec<_>>();
         let mut light = 1.0;
         let of_levels;
         let refocus = match &shown.levels {
             None => &self.complex,
             Some((target, options)) => {
-                let modulator = DisplayPlan::new(
-                    Size {
-                        width: size,
-                        height: size,
-                    },
-                    target,
-                    options,
-                )?;
+                let modulator = match frame {
+                    Some(_) => DisplayPlan::for_frames(size, 0.0, target, options)?,
+                    None => DisplayPlan::new(size, target, options)?,
+                };
                 let mut scratch = modulator.scratch();
+                if let Some(frame) = frame {
+                    modulator.aim(frame, &mut scratch);
+                }
                 if !modulator.keeps_phase() {
                     remove_mean_phase(&mut values, field.dim().0);
                 }
@@ -527,15 +537,7 @@ impl Viewer {
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
                 let opening = (shown.through).unwrap_or(Opening::centred(target.display.aperture_radius()));
                 light = self.light(&values, opening)?;
-                of_levels = Refocus::new(
-                    Size {
-                        width: size,
-                        height: size,
-                    },
-                    &target.display,
-                    &self.ends_m,
-                    Some(opening),
-                )?;
+                of_levels = Refocus::new(size, &target.display, &self.ends_m, Some(opening))?;
                 &of_levels
             }
         };
@@ -691,8 +693,9 @@ pub fn evaluate(
                 let Sensed { scene, wrong } = Sensed::new(&pair.ldi, *sensor, (seed << 32) + index as u64)?;
                 for (method, ways) in &each {
                     let field = (method.field)(&scene)?;
+                    let frame = visible_frame(&scene, &manifest.display)?;
                     for shown in ways {
-                        let seen = viewer.views(&field, shown, &truths.z_m)?;
+                        let seen = viewer.views(Some(&frame), &field, shown, &truths.z_m)?;
                         let judged = truths.judge(&seen, shown.pupil(&manifest.display), *margin)?;
                         figures.push((judged, wrong));
                     }
@@ -737,14 +740,16 @@ pub fn write_picture(
 ) -> Result<()> {
     let viewer = Viewer::new(manifest)?;
     let pair = dataset::read_pair(manifest, dir, index)?;
+    let frame = visible_frame(&pair.ldi, &manifest.display)?;
     let ours = viewer
-        .views(&(method.field)(&pair.ldi)?, shown, &[0.0])?
+        .views(Some(&frame), &(method.field)(&pair.ldi)?, shown, &[0.0])?
         .views
         .remove(0);
-    let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.views.remove(0);
+    let complex = Shown::complex();
+    let truth = viewer.views(None, &pair.hologram, &complex, &[0.0])?.views.remove(0);
     let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
     let gap = Array3::from_elem((ours.dim().0, manifest.size, 4), 1.0);
-    let input = visible_frame(&pair.ldi, &manifest.display)?.rgb().to_owned();
+    let input = frame.rgb().to_owned();
     let panels = [&input, &gap, &ours, &gap, &truth, &gap, &difference].map(|panel| panel.view());
     let strip = concatenate(Axis(2), &panels).expect("panels of one height");
     picture::write_amplitude(path, strip.view())

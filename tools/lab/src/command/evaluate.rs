@@ -54,6 +54,9 @@ pub(crate) struct Evaluate {
     /// Numbers of midpoint steps to evaluate with each encoder
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0], requires = "encoder")]
     midpoint_steps: Vec<usize>,
+    /// Numbers of steps of natural focus to evaluate with each encoder, without midpoint steps
+    #[arg(long, value_name = "N,…", value_delimiter = ',', requires = "encoder")]
+    focus_steps: Vec<usize>,
     /// Also evaluate the ceiling of every encoder: the end of a gradient descent with this number of steps from the
     /// last of these settings, which takes some seconds per scene
     #[arg(long, value_name = "N", requires = "encoder")]
@@ -246,11 +249,14 @@ impl Evaluate {
             })?;
             for &dark_threshold in &self.dark_threshold {
                 for &local_steps in &self.local_steps {
-                    shown.extend(self.midpoint_steps.iter().map(|&midpoint_steps| {
+                    let steps = (self.midpoint_steps.iter().map(|midpoint| (*midpoint, 0)))
+                        .chain(self.focus_steps.iter().map(|focus| (0, *focus)));
+                    shown.extend(steps.map(|(midpoint_steps, focus_steps)| {
                         let options = EncoderOptions {
                             dark_threshold,
                             local_steps,
                             midpoint_steps,
+                            focus_steps,
                             ..encoding.clone().into()
                         };
                         Shown {

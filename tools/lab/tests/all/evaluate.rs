@@ -239,7 +239,8 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let see = |data: &Data| {
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
         let viewer = Viewer::new(&data.manifest).unwrap();
-        viewer.views(&pair.hologram, &Shown::complex(), &z_m).unwrap().views
+        let complex = Shown::complex();
+        viewer.views(None, &pair.hologram, &complex, &z_m).unwrap().views
     };
     let inner = ndarray::s![.., 12..SIZE - 12, 12..SIZE - 12];
     for (there, here) in see(&corrected).iter().zip(&see(&plain)) {
