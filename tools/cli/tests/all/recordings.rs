@@ -129,7 +129,7 @@ fn video_doubts_what_a_hologram_doubts() {
             crowded,
             false,
             &["--depth-unit", "mm"],
-            "75 % of the depth lies",
+            "71 % of the depth lies",
         ),
         (
             "clipped",
