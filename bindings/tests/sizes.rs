@@ -3,6 +3,8 @@
 //! A signature is wrong if it has a width and a height as two integers, whatever they are called (`width` and `height`,
 //! `columns` and `rows`, `w` and `h`), or a pair of integers that its name or its pattern makes a size. An array keeps
 //! its shape, (H, W), and says so: `shape`. A number of nodes or tiles, a place (y, x) and a range are no sizes.
+//!
+//! Other languages have no such type (docs/decisions.md). There the width comes first, and Python takes both by name.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
@@ -48,7 +50,12 @@ fn sources(folder: &Path, ending: &str, found: &mut Vec<PathBuf>) {
 /// Returns the code of `text` without comments.
 fn code(text: &str) -> String {
     let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
-    lines.collect::<Vec<_>>().join("\n")
+    let text = lines.collect::<Vec<_>>().join("\n");
+    let mut parts = text.split("/*");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |code, part| {
+        code + part.split_once("*/").map_or("", |(_, rest)| rest)
+    })
 }
 
 /// Returns the index after the bracket that closes the one at `open`.
@@ -189,7 +196,7 @@ fn faults(text: &str) -> Vec<String> {
 fn signatures_have_no_bare_sizes() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut files = Vec::new();
-    // The bindings still hand on widths and heights of other languages as two numbers.
+    // The bindings hand on the widths and heights of other languages.
     for folder in ["sdk", "models", "tools", "examples", "fuzz", "tests"] {
         sources(&root.join(folder), "rs", &mut files);
     }
@@ -240,5 +247,83 @@ fn bare_sizes_are_found() {
         "fn frame(&self, progress: &dyn Fn(usize, usize)) {}",
     ] {
         assert_eq!(faults(text), Vec::<String>::new(), "{text}");
+    }
+}
+
+/// Returns the lists in parentheses of `code` that have a width and a height as separate parameters, in another order
+/// than `(…, width, height, …)`.
+fn out_of_order(code: &str) -> Vec<String> {
+    let mut all = Vec::new();
+    for (open, _) in code.match_indices('(') {
+        let Some(end) = after(code.as_bytes(), open) else {
+            continue;
+        };
+        let list = &code[open + 1..end - 1];
+        let names: Vec<_> = (split(list).iter())
+            .map(|parameter| {
+                let name = parameter.split([':', '=']).next().unwrap_or_default().trim();
+                name.split([' ', '*', '&']).next_back().unwrap_or_default().to_owned()
+            })
+            .collect();
+        let place = |word: &str| names.iter().position(|name| name == word);
+        if let (Some(width), Some(height)) = (place("width"), place("height"))
+            && height != width + 1
+        {
+            all.push(list.split_whitespace().collect::<Vec<_>>().join(" "));
+        }
+    }
+    all
+}
+
+#[test]
+fn other_languages_take_the_width_first() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut files = Vec::new();
+    for (folder, ending) in [
+        ("bindings/src", "rs"),
+        ("bindings/c/src", "rs"),
+        ("bindings/web/src", "rs"),
+        ("bindings/web/package/src", "ts"),
+        ("bindings/c/include", "h"),
+        ("bindings/c/include", "hpp"),
+        ("bindings/unity/Runtime", "cs"),
+        ("android/phasefront/src/core", "kt"),
+        ("android/phasefront/src/main", "kt"),
+        ("ios/Sources/PhasefrontCore", "swift"),
+    ] {
+        let before = files.len();
+        sources(&root.join(folder), ending, &mut files);
+        assert!(files.len() > before, "{folder} has no .{ending}");
+    }
+    let mut all = Vec::new();
+    for path in files {
+        let name = path.strip_prefix(root).unwrap().display().to_string();
+        let text = fs::read_to_string(&path).unwrap();
+        all.extend(
+            out_of_order(&code(&text))
+                .iter()
+                .map(|list| format!("{name}: ({list})")),
+        );
+    }
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+#[test]
+fn widths_behind_heights_are_found() {
+    for text in [
+        "void f(uint32_t height, uint32_t width);",
+        "void F(int width, double z, int height) {}",
+        "fun f(height: Int, width: Int = 1) {}",
+        "f(uint32_t *height, uint32_t *width)",
+    ] {
+        assert_eq!(out_of_order(text).len(), 1, "{text}");
+    }
+    for text in [
+        "void f(double z, uint32_t width, uint32_t height, void *to);",
+        "fun f(zMm: Double, width: Int, height: Int = 2) {}",
+        "preview(zMm: number, { width, height }: Size): void",
+        "f(uint32_t *width, uint32_t *height)",
+    ] {
+        assert_eq!(out_of_order(text), Vec::<String>::new(), "{text}");
     }
 }

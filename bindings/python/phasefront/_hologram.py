@@ -105,8 +105,8 @@ class Hologram:
         """Returns the preview in the middle of the volume as a PNG. Notebooks call it."""
         _, height, width = self._shape
         part = min(1, _NOTEBOOK / max(height, width))
-        size = (max(1, round(part * side)) for side in (width, height))
-        return _png.encoded(self.preview(0.0, *size), {})
+        width, height = (max(1, round(part * side)) for side in (width, height))
+        return _png.encoded(self.preview(width=width, height=height), {})
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Returns the levels and their metadata. `pickle` and `copy` call it.
@@ -130,9 +130,9 @@ class Hologram:
     def preview(
         self,
         z_mm: float = 0.0,
+        *,
         width: int | None = None,
         height: int | None = None,
-        *,
         layout: Layout = Layout.RGB,
         out: NDArray[numpy.uint8] | None = None,
     ) -> NDArray[numpy.uint8]:

@@ -54,7 +54,7 @@ def test_a_frame_allocates_no_image(count):
         hologram = session.process(phasefront.Frame(colour, depth))
         image = numpy.empty((HEIGHT, WIDTH, 3), numpy.uint8)
         count("output", lambda: hologram.output(out=image))
-        count("preview", lambda: hologram.preview(0.0, WIDTH, HEIGHT, out=image))
+        count("preview", lambda: hologram.preview(0.0, width=WIDTH, height=HEIGHT, out=image))
         count("pack", lambda: modulator.pack(hologram, out=[image]))
 
     made, times = threading.Semaphore(0), itertools.count(33_000_000, 33_000_000)

@@ -104,7 +104,7 @@ def test_the_command_sees_what_a_view_shows(tmp_path):
     run = subprocess.run(view, cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     seen = matplotlib.image.imread(tmp_path / "view.png")[..., :3]
-    shown = hologram.preview(1, 64, 48) / 255
+    shown = hologram.preview(1, width=64, height=48) / 255
     assert numpy.corrcoef(seen.ravel(), shown.ravel())[0, 1] > 0.9
     whole = hologram.refocus(1).clip(0, 1).transpose(1, 2, 0)
     numpy.testing.assert_allclose(seen, whole, atol=0.6 / 255)

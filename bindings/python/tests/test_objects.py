@@ -165,9 +165,9 @@ def test_what_cannot_be_meant_of_a_hologram_is_refused_in_one_line(session):
         lambda: session.process(None),
         lambda: session.set_quality("best"),
         lambda: session.set_thermal("hot"),
-        lambda: hologram.preview(0, 1e9, 1e9),
-        lambda: hologram.preview(0, 10**9, 10**9),
-        lambda: hologram.preview(0, 0, 3),
+        lambda: hologram.preview(0, width=1e9, height=1e9),
+        lambda: hologram.preview(0, width=10**9, height=10**9),
+        lambda: hologram.preview(0, width=0, height=3),
         lambda: hologram.preview("near"),
         lambda: hologram.preview(layout="cmyk"),
         lambda: hologram.refocus("near"),
@@ -247,7 +247,7 @@ def test_holograms_are_arrays_and_pictures(session):
     assert levels.ctypes.data == hologram.levels.ctypes.data and levels.shape == (3, 48, 64)
     assert numpy.array(hologram).flags.writeable
     assert numpy.asarray(hologram, numpy.float32).dtype == numpy.float32
-    assert (hologram.preview() == hologram.preview(0.0, 64, 48)).all()
+    assert (hologram.preview() == hologram.preview(0.0, width=64, height=48)).all()
     assert (hologram.preview(layout="rgba") == hologram.preview(layout=Layout.RGBA)).all()
     png = hologram._repr_png_()
     assert png.startswith(b"\x89PNG") and int.from_bytes(png[16:20], "big") == 64

@@ -111,21 +111,24 @@ def test_views_with_strides_are_taken_as_they_are(options):
 def test_a_preview_shows_the_picture_and_a_tap_gives_z(options):
     with Session(options) as session:
         hologram = session.process(still())
-    image = hologram.preview(0.0, 32, 24)
+    image = hologram.preview(0.0, width=32, height=24)
     assert image.shape == (24, 32, 3) and image.std() > 10
     # Into every second row of an array of the caller.
     rows = numpy.full((48, 32, 4), 7, numpy.uint8)
-    assert hologram.preview(0.0, 32, 24, layout=phasefront.Layout.BGRA, out=rows[::2]).base is rows
+    assert hologram.preview(0.0, width=32, height=24, layout=phasefront.Layout.BGRA, out=rows[::2]).base is rows
     numpy.testing.assert_array_equal(rows[::2, :, 2::-1], image)
     assert (rows[::2, :, 3] == 255).all() and (rows[1::2] == 7).all()
     for wrong in (rows, rows[::2, :, :3], rows[::2].astype(float), rows[::-2], hologram.levels):
         with pytest.raises(SettingError, match="out must be"):
-            hologram.preview(0.0, 32, 24, layout=phasefront.Layout.BGRA, out=wrong)
+            hologram.preview(0.0, width=32, height=24, layout=phasefront.Layout.BGRA, out=wrong)
     assert hologram.z_at(0.5, 0.5) > hologram.z_at(0.02, 0.02)
     with pytest.raises(SettingError, match="0×24"):
-        hologram.preview(0.0, 0, 24)
+        hologram.preview(0.0, width=0, height=24)
     with pytest.raises(SettingError, match="67108864×1 is too large"):
-        hologram.preview(0.0, 67108864, 1)
+        hologram.preview(0.0, width=67108864, height=1)
+    # Beside arrays of the shape (H, W), two bare numbers would be swapped.
+    with pytest.raises(TypeError):
+        hologram.preview(0.0, 32, 24)
 
 
 def seen_by_equation(hologram, display, z_mm):
@@ -389,20 +392,20 @@ def test_in_a_fork_what_is_the_parents_is_refused_and_what_is_new_works(options)
     live = Session(options, RunningMode.LIVE, lambda _: None)
     with live, Session(options) as session:
         hologram = session.process(still())
-        hologram.preview(0.0, 8, 8)
+        hologram.preview(0.0, width=8, height=8)
         child = os.fork()
         if child == 0:
             signal.alarm(60)  # a test that hangs must fail
             result = 1
             try:
                 calls = [lambda: session.process(still()), session.warm_up, lambda: live.submit(still())]
-                for call in [*calls, lambda: hologram.preview(0.0, 8, 8)]:
+                for call in [*calls, lambda: hologram.preview(0.0, width=8, height=8)]:
                     with pytest.raises(SessionError, match="forked"):
                         call()
                 session.close()
                 live.close()
                 with Session(options) as own:
-                    assert own.process(still()).preview(0.0, 8, 8).shape == (8, 8, 3)
+                    assert own.process(still()).preview(0.0, width=8, height=8).shape == (8, 8, 3)
                 result = 0
             finally:
                 os._exit(result)
@@ -650,14 +653,14 @@ def test_tensors_go_in_and_out_in_place(options):
         assert given._colour[0].address == colour.ctypes.data and given._depth.address == metres.ctypes.data
         hologram = session.process(given)
         numpy.testing.assert_array_equal(hologram.levels, expected.levels)
-        seen = hologram.preview(0.0, 64, 48)
+        seen = hologram.preview(0.0, width=64, height=48)
         into = numpy.zeros((48, 64, 3), numpy.uint8)
-        assert hologram.preview(0.0, 64, 48, out=into) is into
+        assert hologram.preview(0.0, width=64, height=48, out=into) is into
         numpy.testing.assert_array_equal(seen, into)
         numpy.testing.assert_array_equal(numpy.from_dlpack(hologram.field()), hologram.field())
         with pytest.raises(FrameError, match="colour is no array: use detach"):
             Frame(NoArray(), metres)
         with pytest.raises(SettingError, match="out is no array: use detach"):
-            hologram.preview(0.0, 64, 48, out=NoArray())
+            hologram.preview(0.0, width=64, height=48, out=NoArray())
         with pytest.raises(FrameError, match="the field is no array: use detach"):
             phasefront.encode(NoArray())

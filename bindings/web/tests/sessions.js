@@ -29,12 +29,12 @@ async function results(session) {
   const hologram = await session.process(frame());
   const [levels, output] = [await hologram.levels(), await hologram.output({ layout: "grey" }, 1)];
   equal(levels.subarray(64 * 48, 2 * 64 * 48), output, "levels and output");
-  const view = await hologram.preview(await hologram.zAt(0.5, 0.5), 32, 24);
+  const view = await hologram.preview(await hologram.zAt(0.5, 0.5), { width: 32, height: 24 });
   const [seen, field] = [await hologram.refocus(1), await hologram.field(1)];
   const sizes = [view.width, seen.length, field.length, (await hologram.outputSize("rgba")).width];
   if (sizes.join() !== [32, levels.length, 2 * levels.length, 64].join()) throw new Error(`sizes ${sizes}`);
   await refused("setting", "no layout 'cyan'", hologram.output({ layout: "cyan" }));
-  await refused("setting", "the width of a preview is -1", hologram.preview(0, -1, 8));
+  await refused("setting", "the width of a preview is -1", hologram.preview(0, { width: -1, height: 8 }));
   hologram.close();
   await refused("session", "hologram is closed", hologram.levels());
 }

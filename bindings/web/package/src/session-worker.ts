@@ -120,7 +120,7 @@ const calls = {
   field: (id: number, zMm: number) => hologram(id).field(zMm) as Float32Array<ArrayBuffer>,
   outputSize: (id: number, layout: Layout): OutputSize => hologram(id).outputSize(layout),
 
-  preview(id: number, zMm: number, width: number, height: number) {
+  preview(id: number, zMm: number, { width, height }: Size) {
     const [w, h] = [whole("the width of a preview", width), whole("the height of a preview", height)];
     const data = new Uint8ClampedArray(4 * w * h);
     hologram(id).writePreview(zMm, { width, height, data });

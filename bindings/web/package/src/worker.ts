@@ -7,7 +7,7 @@
  *
  * const session = await WorkerSession.open({ target: { width: 640, height: 480 } });
  * const hologram = await session.process(new Frame(picture, { width: 160, height: 120, data: metres }));
- * context.putImageData(await hologram.preview(0, 640, 480), 0, 0);
+ * context.putImageData(await hologram.preview(0, { width: 640, height: 480 }), 0, 0);
  * hologram.close();
  * ```
  */
@@ -340,12 +340,12 @@ export class WorkerHologram {
   }
 
   /**
-   * Returns the view of an eye focused at `zMm`, of `width`×`height` pixels.
+   * Returns the view of an eye focused at `zMm` as an image of `size`.
    *
    * @throws PhasefrontError `setting`: the image is empty or too large, or z is too far away.
    */
-  async preview(zMm: number, width: number, height: number): Promise<ImageData> {
-    return new ImageData(await this.#ask("preview", [zMm, width, height]), width, height);
+  async preview(zMm: number, { width, height }: Size): Promise<ImageData> {
+    return new ImageData(await this.#ask("preview", [zMm, { width, height }]), width, height);
   }
 
   /**
