@@ -44,7 +44,7 @@ fuzz_target!(|data: &[u8]| {
             std::fs::write(folder.join("a.json"), r#"{"display": {}}"#).expect("a file");
             told(hologram::read_hologram(&write("a.npy")).map(|_| ()));
         }
-        9 => told(picture::photo::read(&write("a.jpg")).map(|_| ())),
+        9 => told(picture::photo::read(&write("a.jpg"), None).map(|_| ())),
         10 => told(picture::depth_map::read_depth(&write("a.exr"), false).map(|_| ())),
         _ => {
             write("a.lut");

@@ -7,4 +7,5 @@ pub use phasefront_core::depth::range::DepthRange;
 pub use phasefront_core::depth::stream::DepthOptions;
 #[cfg(feature = "tract")]
 pub use phasefront_core::depth_network::{ColourScale, DepthNetwork};
+pub use phasefront_core::frame::encoding::RgbEncoding;
 pub use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix};

@@ -88,6 +88,7 @@ pub mod target {
     //! The parts of a hologram's target besides its [`Display`](crate::Display): modulator response, laser light and
     //! correction of the optics.
     pub use phasefront_core::display::illumination::Illumination;
+    pub use phasefront_core::display::primaries::Balance;
     pub use phasefront_core::display::response::Response;
     pub use phasefront_core::optics::zernike::Aberration;
 }

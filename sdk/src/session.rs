@@ -9,6 +9,7 @@
 //! a frame; `engine` chooses between CPU and GPU; `quality` chooses the quality level.
 //! [`phasefront_core::pipeline::Pipeline`] processes a single frame without a camera's formats.
 
+mod colour_stage;
 mod computing;
 #[cfg(feature = "tract")]
 mod depth_estimates;

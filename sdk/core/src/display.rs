@@ -6,6 +6,7 @@ pub mod illumination;
 pub mod levels;
 pub mod model;
 pub mod panel;
+pub mod primaries;
 pub mod registration;
 pub mod response;
 pub mod target;
@@ -13,6 +14,7 @@ pub mod target;
 use crate::Size;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::keys;
+use primaries::{Balance, Matrix};
 use serde::{Deserialize, Serialize};
 
 /// The largest number of pixels of a modulator, 8192²: twice as many as the largest modulators have.
@@ -32,6 +34,7 @@ pub struct Display {
     offset_m: f64,
     bits: u32,
     aperture_radius: f64,
+    balance: Balance,
 }
 
 /// The TOML form of a [`Display`]. Missing keys take the values of [`Display::default`].
@@ -46,6 +49,12 @@ struct DisplayToml {
     offset_mm: f64,
     bits: u32,
     aperture_radius: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    white: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    powers: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    primaries: Option<Matrix>,
 }
 
 impl Default for Display {
@@ -63,6 +72,7 @@ impl Default for Display {
             offset_m: 0.0,
             bits: 8,
             aperture_radius: 1.0,
+            balance: Balance::Unknown,
         }
     }
 }
@@ -77,6 +87,12 @@ impl From<Display> for DisplayToml {
     fn from(d: Display) -> Self {
         // Multiplying by 1e9 gives 637.9999…; files should say 638.
         let round = |x: f64| (x * 1e6).round() / 1e6;
+        let (white, powers, primaries) = match d.balance {
+            Balance::Unknown => (None, None, None),
+            Balance::White(white) => (Some(white), None, None),
+            Balance::Powers(powers) => (None, Some(powers), None),
+            Balance::Primaries(primaries) => (None, None, Some(primaries)),
+        };
         DisplayToml {
             width: d.size.width,
             height: d.size.height,
@@ -86,6 +102,9 @@ impl From<Display> for DisplayToml {
             offset_mm: round(d.offset_m * 1e3),
             bits: d.bits,
             aperture_radius: d.aperture_radius,
+            white,
+            powers,
+            primaries,
         }
     }
 }
@@ -106,6 +125,17 @@ impl TryFrom<DisplayToml> for Display {
             offset_m: t.offset_mm / 1e3,
             bits: t.bits,
             aperture_radius: t.aperture_radius,
+            balance: match (t.white, t.powers, t.primaries) {
+                (None, None, None) => Balance::Unknown,
+                (Some(white), None, None) => Balance::White(white),
+                (None, Some(powers), None) => Balance::Powers(powers),
+                (None, None, Some(primaries)) => Balance::Primaries(primaries),
+                _ => {
+                    return Err(Error::Display(
+                        "at most one of white, powers and primaries may be given; they say the same".into(),
+                    ));
+                }
+            },
         };
         display.check()?;
         Ok(display)
@@ -202,7 +232,7 @@ impl Display {
                 self.aperture_radius
             ));
         }
-        Ok(())
+        self.balance.check(self.colours())
     }
 
     /// Returns the size of the modulator.
@@ -250,6 +280,28 @@ impl Display {
     /// resolution.
     pub fn aperture_radius(&self) -> f64 {
         self.aperture_radius
+    }
+
+    /// Returns what is known about the lasers' light relative to each other.
+    pub fn balance(&self) -> &Balance {
+        &self.balance
+    }
+
+    /// Returns X, Y and Z (rows; CIE 1931 2° observer) of the red, green and blue laser (columns) at full light, scaled
+    /// so that the brightest D65 that they mix has Y = 1. Returns `None` for one laser and for lasers that cannot mix
+    /// D65.
+    pub fn primaries(&self) -> Option<[[f64; 3]; 3]> {
+        self.balance.primaries(&self.wavelengths_m)
+    }
+
+    /// Returns this display with another balance of its lasers.
+    ///
+    /// # Errors
+    /// Returns an error if the display has one laser or the numbers cannot be those of three lasers.
+    pub fn with_balance(self, balance: Balance) -> Result<Self> {
+        let display = Display { balance, ..self };
+        display.check()?;
+        Ok(display)
     }
 
     /// Returns this display with its modulator at z = `offset_m`.

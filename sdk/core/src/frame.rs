@@ -5,12 +5,17 @@
 
 mod colour;
 mod convert;
+pub mod encoding;
+mod light;
 mod plane;
 pub mod reference;
 mod resample;
 
 use crate::Size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix, check_size};
+
+pub use encoding::RgbEncoding;
+pub use light::{LightConstants, LightPlan, light_to_srgb};
 
 pub use convert::{ColourPlan, ColourScratch, luminance, yuv_constants};
 pub use plane::{Orientation, Plane, Rotation, View};
@@ -99,6 +104,25 @@ impl RgbdFrame {
             _ => self.rgb,
         };
         RgbdFrame { rgb, depth: self.depth }
+    }
+
+    /// Converts a frame whose colours are encoded by `encoding` to amplitudes of the lasers of `display`
+    /// ([`LightPlan`]); those of [`RgbEncoding::Amplitude`] as [`Self::for_display`].
+    pub fn decoded(self, encoding: RgbEncoding, display: &Display) -> Self {
+        let Some(plan) = LightPlan::new(encoding, display) else {
+            return self.for_display(display);
+        };
+        let Size { width, height } = self.size();
+        let rgb = self.rgb.broadcast((3, height, width)).expect("three colours or one");
+        let rgb = rgb.as_standard_layout();
+        let mut amplitude = Array3::zeros((display.colours(), height, width));
+        let values = amplitude.as_slice_mut().zip(rgb.as_slice());
+        let (amplitude_values, rgb) = values.expect("both are made in standard layout");
+        plan.convert(rgb, amplitude_values);
+        RgbdFrame {
+            rgb: amplitude,
+            depth: self.depth,
+        }
     }
 
     /// Creates a black frame with `colours` colours at the far end of the volume.

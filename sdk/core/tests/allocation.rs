@@ -27,7 +27,7 @@ use phasefront_core::display::target::Target;
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::frame::RgbdFrame;
 use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
-use phasefront_core::frame::{ColourPlan, Crop};
+use phasefront_core::frame::{ColourPlan, Crop, LightPlan, RgbEncoding};
 use phasefront_core::method::Method;
 use phasefront_core::method::MethodPlan;
 use phasefront_core::method::network::Network;
@@ -71,6 +71,13 @@ fn camera_frames_and_previews() {
     let mut rgb = vec![0.0; 3 * h * w];
     let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
     assert_eq!(count(convert), 0);
+    let light = LightPlan::new(RgbEncoding::Srgb, &Display::default());
+    let plan = plan.with_light(light.clone());
+    let mut scratch = plan.scratch();
+    let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
+    assert_eq!(count(convert), 0);
+    let (light, picture) = (light.unwrap(), vec![0.5; 3 * h * w]);
+    assert_eq!(count(|| light.convert(&picture, &mut rgb)), 0);
     let plan = Conditioner::new(
         Size { width: 20, height: 15 },
         Crop::cover(Size { width: 20, height: 15 }, Size { width: w, height: h }),

@@ -38,6 +38,7 @@ const LAYERS: &[&str] = &[
     "pipeline",
     "output",
     "output::modulator",
+    "view::colours",
     "view::refocus",
     "view::preview",
 ];

@@ -4,6 +4,7 @@
 mod camera;
 mod condition;
 mod frame;
+mod light;
 mod rounding;
 mod source;
 
@@ -230,12 +231,16 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::testing::{device, run};
     use super::*;
-    use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding};
+    use phasefront_core::display::Display;
+    use phasefront_core::frame::{
+        ColourFormat, ColourImage, ColourPlan, LightConstants, LightPlan, Orientation, Plane, RgbEncoding, Rotation,
+        YuvEncoding,
+    };
     use phasefront_core::method::network::Network;
 
-    /// Checks camera images of odd sizes, rotated, enlarged and reduced, in the number formats of float chains.
+    /// Checks camera images of odd sizes, rotated, enlarged and reduced, in the number formats of float chains and in every
+    /// encoding.
     #[test]
-    #[expect(clippy::too_many_lines, reason = "a table of cases")]
     fn the_input_is_that_of_the_cpu() {
         let device = device();
         let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
@@ -244,34 +249,24 @@ mod tests {
             rotation: Rotation::Clockwise90,
             mirrored: true,
         };
-        for (size, sensor) in [
-            (Size { width: 47, height: 61 }, Size { width: 101, height: 75 }),
-            (
-                Size {
-                    width: 384,
-                    height: 384,
-                },
-                Size {
-                    width: 407,
-                    height: 301,
-                },
-            ),
-            (
-                Size {
-                    width: 960,
-                    height: 540,
-                },
-                Size {
-                    width: 607,
-                    height: 1081,
-                },
-            ),
+        let display = Display::default();
+        let size = |width, height| Size { width, height };
+        let (small, sensor) = (size(47, 61), size(101, 75));
+        for (size, sensor, encoding) in [
+            (small, sensor, RgbEncoding::Amplitude),
+            (small, sensor, RgbEncoding::Srgb),
+            (small, sensor, RgbEncoding::DisplayP3),
+            (small, sensor, RgbEncoding::Bt2020Hlg),
+            (small, sensor, RgbEncoding::Bt2020Pq),
+            (size(384, 384), size(407, 301), RgbEncoding::Amplitude),
+            (size(960, 540), size(607, 1081), RgbEncoding::Srgb),
         ] {
             let Size { width, height } = size;
             let colour = Colour::Camera {
                 format,
                 size: sensor,
                 orientation,
+                light: LightConstants::new(encoding, &display),
             };
             let byte = |i: usize| (i * 7 % 251) as u8;
             let luma: Vec<u8> = (0..sensor.pixels()).map(byte).collect();
@@ -284,8 +279,13 @@ mod tests {
                 colour: ColourData::Camera(image),
                 depth: DepthData::U16(&words),
             };
-            let twin = frame.read(orientation, size).unwrap();
-            for (numbers, most) in [(Numbers::F32, 1e-4), (Numbers::F16, 5e-4)] {
+            let mut twin = frame.read(orientation, size).unwrap();
+            let plan = ColourPlan::new(&image, orientation, size).unwrap();
+            let plan = plan.with_light(LightPlan::new(encoding, &display));
+            plan.convert(&image, twin.planes_mut().0, &mut plan.scratch()).unwrap();
+            // The root of the darkest light, and a curve by interpolation, are less exact.
+            let more = if encoding == RgbEncoding::Amplitude { 0.0 } else { 1e-3 };
+            for (numbers, most) in [(Numbers::F32, 1e-4 + more), (Numbers::F16, 5e-4 + more)] {
                 if numbers == Numbers::F16 && !device.has_half() {
                     continue;
                 }
@@ -314,7 +314,7 @@ mod tests {
                     for (value, expected) in pixel.iter().zip(rgbd) {
                         assert!(
                             (value - expected).abs() < most,
-                            "{numbers:?} {size:?} at {x}, {y}: {value} {expected}"
+                            "{numbers:?} {encoding:?} {size:?} at {x}, {y}: {value} {expected}"
                         );
                     }
                 }

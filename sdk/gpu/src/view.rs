@@ -5,6 +5,7 @@ use super::fft::{Convolution, Planes};
 use super::pipeline::GpuLevels;
 use super::{GpuError, Result};
 use phasefront_core::Size;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_core::view::preview::Preview;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -18,6 +19,7 @@ pub struct GpuView {
     /// The sizes of the hologram and of the screen.
     sizes: [Size; 2],
     small: Size,
+    colours: ViewColours,
     /// (3, h, w) complex f32.
     field: wgpu::Buffer,
     sum: Program,
@@ -58,6 +60,9 @@ impl GpuView {
             taps.extend_from_slice(starts);
             taps.extend(weights.iter().map(|weight| weight.to_bits()));
         }
+        let matrix = preview.view_colours().matrix();
+        let rows = matrix.unwrap_or_default();
+        let columns: Vec<_> = (0..9).map(|i| format!("{:?}", rows[i % 3][i / 3])).collect();
         let header = format!(
             "const FACTOR: u32 = {}u;
             const WIDTH: u32 = {}u;
@@ -67,6 +72,8 @@ impl GpuView {
             const COUNT_X: u32 = {}u;
             const AT_Y: u32 = {}u;
             const COUNT_Y: u32 = {}u;
+            const LIGHT: bool = {};
+            const TO_SRGB: mat3x3f = mat3x3f({});
             ",
             preview.factor(),
             small.width,
@@ -75,6 +82,8 @@ impl GpuView {
             counts[0].1,
             counts[1].0,
             counts[1].1,
+            matrix.is_some(),
+            columns.join(", "),
         );
         let source = header + include_str!("view.wgsl");
         let field = device.buffer("a view's field", 3 * area * 8)?;
@@ -96,6 +105,7 @@ impl GpuView {
             device: device.clone(),
             sizes: [size, screen],
             small,
+            colours: *preview.view_colours(),
             field,
             sum: device.program("a view's light", source, "sum"),
             lights: device.table("levels' light", bytemuck::cast_slice(&lights))?,
@@ -107,9 +117,11 @@ impl GpuView {
         })
     }
 
-    /// Checks whether this plan is for `levels` and the screen of `preview`, on the same device.
+    /// Checks whether this plan is for `levels` and the screen and the colours of `preview`, on the same device.
     pub fn fits(&self, levels: &GpuLevels, preview: &Preview) -> bool {
-        Arc::ptr_eq(&self.device, &levels.device) && self.sizes == [levels.size, preview.screen()]
+        Arc::ptr_eq(&self.device, &levels.device)
+            && self.sizes == [levels.size, preview.screen()]
+            && self.colours == *preview.view_colours()
     }
 
     /// Returns the device and the texture of the latest view, 8-bit RGBA of the screen's size.

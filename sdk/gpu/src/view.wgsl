@@ -32,6 +32,13 @@ fn sum(@builtin(global_invocation_id) at: vec3u) {
     }
 }
 
+// Returns the sRGB values of the lasers' light.
+fn srgb(light: vec3f) -> vec3f {
+    let linear = clamp(TO_SRGB * light, vec3f(0), vec3f(1));
+    let curved = 1.055 * pow(linear, vec3f(1.0 / 2.4)) - 0.055;
+    return select(curved, 12.92 * linear, linear <= vec3f(0.0031308));
+}
+
 @compute @workgroup_size(64)
 fn draw(@builtin(global_invocation_id) at: vec3u) {
     if (at.x >= SCREEN_WIDTH) { return; }
@@ -45,5 +52,6 @@ fn draw(@builtin(global_invocation_id) at: vec3u) {
             rgb += weight * vec3f(length(field[place]), length(field[PLANE + place]), length(field[2u * PLANE + place]));
         }
     }
-    textureStore(image, at.xy, vec4f(min(scale.x * rgb, vec3f(1)), 1));
+    rgb *= scale.x;
+    textureStore(image, at.xy, vec4f(select(min(rgb, vec3f(1)), srgb(rgb * rgb), LIGHT), 1));
 }

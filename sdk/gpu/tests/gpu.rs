@@ -20,7 +20,8 @@ use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::encode::brightness::Brightness;
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::frame::{
-    ColourFormat, ColourImage, Crop, Orientation, Plane, RgbdFrame, Rotation, YuvEncoding, YuvMatrix,
+    ColourFormat, ColourImage, Crop, LightConstants, Orientation, Plane, RgbEncoding, RgbdFrame, Rotation, YuvEncoding,
+    YuvMatrix,
 };
 use phasefront_core::method::Method;
 use phasefront_core::method::network::Network;
@@ -28,6 +29,7 @@ use phasefront_core::method::network::{Isa, reference};
 use phasefront_core::method::sweep::Sweep;
 use phasefront_core::optics::zernike::Aberration;
 use phasefront_core::output::Layout;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_core::view::preview::Preview;
 use phasefront_gpu::{
     self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Float, Frame, Fusion,
@@ -524,6 +526,7 @@ fn images_of_cameras_are_read_as_on_the_cpu() {
                     format: camera.format,
                     size: sensor,
                     orientation,
+                    light: LightConstants::new(RgbEncoding::Amplitude, &display),
                 },
                 depth: Depth::U16,
                 ..planar.clone()
@@ -990,6 +993,7 @@ fn every_program_agrees_with_the_cpu_on_a_camera_image() {
         format: camera.format,
         size: Size::from_shape(sensor),
         orientation,
+        light: LightConstants::new(RgbEncoding::Amplitude, &job.target.display),
     };
     let mut levels = vec![0; 3 * h * w];
     let mut plan = GpuPipeline::new(&device, &job).unwrap();
@@ -1128,20 +1132,24 @@ fn views_of_levels_on_the_gpu_are_those_of_the_cpu() {
         let words = pixels(on_gpu.texture());
         let same = |(i, pixel): (usize, &[u8])| (0..3).all(|c| pixel[c] == levels[c * area + i]) && pixel[3] == 255;
         assert!(words.chunks_exact(4).enumerate().all(same));
-        let mut view = None;
-        // One plan draws views at every z: the modulator's, one beside it, and one again.
-        for z_m in [-2e-3, 3e-3, 2.9e-3, -2e-3] {
-            let preview = Preview::new(size, &job.target, z_m, Size::from_shape(screen)).unwrap();
-            let view = view.get_or_insert_with(|| block_on(GpuView::new(&on_gpu, &preview)).unwrap());
-            assert!(view.fits(&on_gpu, &preview));
-            block_on(view.draw(&on_gpu, &preview, scale)).unwrap();
-            let drawn = pixels(view.texture());
-            let mut expected = vec![0; 4 * screen.0 * screen.1];
-            let image = (Layout::Rgba, &mut expected[..], 4 * screen.1);
-            preview.look(&levels, scale, image, &mut preview.scratch()).unwrap();
-            let most = drawn.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
-            println!("a view of {size} at {z_m} m: {most:?} of 255 apart");
-            assert!(most <= Some(1), "{size} {screen:?} {z_m}: {most:?}");
+        for encoding in [RgbEncoding::Amplitude, RgbEncoding::Srgb] {
+            let colours = ViewColours::new(encoding, &job.target.display);
+            let mut view = None;
+            // One plan draws views at every z: the modulator's, one beside it, and one again.
+            for z_m in [-2e-3, 3e-3, 2.9e-3, -2e-3] {
+                let preview = Preview::new(size, &job.target, z_m, Size::from_shape(screen)).unwrap();
+                let preview = preview.with_view_colours(colours);
+                let view = view.get_or_insert_with(|| block_on(GpuView::new(&on_gpu, &preview)).unwrap());
+                assert!(view.fits(&on_gpu, &preview));
+                block_on(view.draw(&on_gpu, &preview, scale)).unwrap();
+                let drawn = pixels(view.texture());
+                let mut expected = vec![0; 4 * screen.0 * screen.1];
+                let image = (Layout::Rgba, &mut expected[..], 4 * screen.1);
+                preview.look(&levels, scale, image, &mut preview.scratch()).unwrap();
+                let most = drawn.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
+                println!("a view of {size} at {z_m} m: {most:?} of 255 apart");
+                assert!(most <= Some(1), "{size} {screen:?} {z_m} {encoding:?}: {most:?}");
+            }
         }
     }
 }

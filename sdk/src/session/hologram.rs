@@ -9,11 +9,13 @@ use phasefront_core::Size;
 use phasefront_core::display::levels::{Levels, LevelsMut};
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
+use phasefront_core::frame::RgbEncoding;
 use phasefront_core::output::Layout;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::pipeline::{FrameTimes, field};
 use phasefront_core::runtime::error::{Error, Result};
 use phasefront_core::runtime::stage::stage;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_core::view::preview::{Preview, PreviewScratch};
 use phasefront_core::view::refocus::seen_field;
 #[cfg(feature = "gpu")]
@@ -113,6 +115,8 @@ pub struct Hologram {
     pub(super) range_m: Option<(f32, f32)>,
     pub(super) valid_depth: f32,
     pub(super) quality_level: usize,
+    /// The encoding of the picture's colours, in which views show them.
+    pub(super) encoding: RgbEncoding,
     pub(super) viewer: Arc<Viewer>,
     /// The levels, if they stayed on the GPU. `levels` is then arbitrary.
     #[cfg(feature = "gpu")]
@@ -195,6 +199,7 @@ impl Hologram {
                 range_m: None,
                 valid_depth: 0.0,
                 quality_level: 0,
+                encoding: RgbEncoding::default(),
                 viewer: Arc::new(Viewer::new(target.clone(), pool.clone())),
                 #[cfg(feature = "gpu")]
                 on_gpu: None,
@@ -244,6 +249,7 @@ impl Hologram {
             range_m: None,
             valid_depth: 0.0,
             quality_level: 0,
+            encoding: RgbEncoding::default(),
             viewer: Arc::new(Viewer::new(target.clone(), Threads::shared()?)),
             #[cfg(feature = "gpu")]
             on_gpu: None,
@@ -325,6 +331,22 @@ impl Hologram {
         self.quality_level
     }
 
+    /// Returns the encoding of the colours of the frame.
+    pub fn encoding(&self) -> RgbEncoding {
+        self.encoding
+    }
+
+    /// Returns this hologram as that of a frame of another encoding, in which views show it.
+    pub fn with_encoding(self, encoding: RgbEncoding) -> Self {
+        Hologram { encoding, ..self }
+    }
+
+    /// Returns how views become pictures: in sRGB, or as the amplitudes that the frame's values were.
+    #[doc(hidden)]
+    pub fn view_colours(&self) -> ViewColours {
+        ViewColours::new(self.encoding, &self.viewer.target.display)
+    }
+
     /// Returns the target of the hologram.
     pub fn target(&self) -> &Target {
         &self.viewer.target
@@ -358,7 +380,8 @@ impl Hologram {
     }
 
     /// Writes the view of an eye focused at `z_m` into `bytes`, an image of the size `screen` in `layout`, Rgb,
-    /// Rgba or Bgra, whose rows begin `row_stride` bytes apart. The plan is kept for the next call with the same z and
+    /// Rgba or Bgra, whose rows begin `row_stride` bytes apart. The pixels are sRGB; for a frame of
+    /// [`RgbEncoding::Amplitude`] they are amplitudes, where 255 is 1. The plan is kept for the next call with the same z and
     /// size, on this or another result of the session.
     ///
     /// # Errors
@@ -379,11 +402,17 @@ impl Hologram {
         // Lock the plan before entering the pool, whose threads could otherwise start another view while this one
         // waits.
         let mut plan = lock(&self.viewer.plan);
-        let fits = |plan: &&mut ViewPlan| plan.size == self.size && plan.z_m == z_m && plan.preview.screen() == screen;
+        let colours = self.view_colours();
+        let fits = |plan: &&mut ViewPlan| {
+            plan.size == self.size
+                && plan.z_m == z_m
+                && plan.preview.screen() == screen
+                && *plan.preview.view_colours() == colours
+        };
         if plan.as_mut().filter(fits).is_none() {
             let target = &self.viewer.target;
             *plan = Some(self.viewer.pool.install(|| -> Result<_> {
-                let preview = Preview::new(self.size, target, z_m, screen)?;
+                let preview = Preview::new(self.size, target, z_m, screen)?.with_view_colours(colours);
                 Ok(ViewPlan {
                     size: self.size,
                     z_m,
@@ -424,6 +453,7 @@ impl Hologram {
         take: impl AsyncFnOnce(&GpuView) -> std::result::Result<(), GpuError>,
     ) -> std::result::Result<(), GpuError> {
         let preview = Preview::new(self.size, &self.viewer.target, z_m, screen)?;
+        let preview = preview.with_view_colours(self.view_colours());
         // No lock is held while the GPU is awaited.
         let kept = lock(&self.viewer.gpu_plan).take();
         let mut view = match kept.filter(|view| view.fits(levels, &preview)) {

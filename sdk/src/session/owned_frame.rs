@@ -4,7 +4,7 @@
 use phasefront_core::Size;
 use phasefront_core::depth::camera::{Alignment, CameraFrame};
 use phasefront_core::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
-use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
+use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane, RgbEncoding};
 use phasefront_core::runtime::error::Result;
 
 /// The memory and strides of one plane.
@@ -33,6 +33,7 @@ impl OwnedPlane {
 struct Description {
     timestamp_ns: u64,
     colour: (ColourFormat, Size),
+    encoding: RgbEncoding,
     depth: Option<(DepthFormat, Size)>,
     confidence: Option<ConfidenceFormat>,
     orientation: Orientation,
@@ -54,6 +55,7 @@ impl OwnedFrame {
         let description = Description {
             timestamp_ns: frame.timestamp_ns,
             colour: (frame.colour.format(), frame.colour.size()),
+            encoding: frame.colour.encoding(),
             depth: frame.depth.map(|depth| (depth.format(), depth.size())),
             confidence: frame
                 .depth
@@ -92,6 +94,7 @@ impl OwnedFrame {
         let (format, size) = d.colour;
         let planes: [Plane<'_>; 3] = std::array::from_fn(|i| self.colour[i].plane());
         let colour = ColourImage::new(format, size, &planes[..format.planes()])?;
+        let colour = colour.with_encoding(d.encoding);
         let depth = match d.depth {
             Some((format, size)) => {
                 let depth = DepthImage::new(format, size, self.depth.plane())?;

@@ -2,6 +2,7 @@
 //! is next.
 
 use super::SessionOptions;
+use super::colour_stage::ColourStage;
 use super::depth_estimates::DepthEstimates;
 use super::engine::BrightnessTracker;
 use super::engine::FrameInput;
@@ -16,7 +17,7 @@ use phasefront_core::Size;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::{DepthReport, DepthStream};
 use phasefront_core::display::levels::LevelsMut;
-use phasefront_core::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
+use phasefront_core::frame::RgbdFrame;
 use phasefront_core::pipeline::FrameTimes;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::clock::Instant;
@@ -33,9 +34,7 @@ struct LevelPlan {
     engine: Engine,
     frame: RgbdFrame,
     depth: DepthStream,
-    colour: Option<(ColourPlan, ColourScratch)>,
-    /// The picture's red, green and blue, if the display has one laser. Depth is conditioned along its edges.
-    picture: Vec<f32>,
+    colour: ColourStage,
 }
 
 impl LevelPlan {
@@ -51,34 +50,15 @@ impl LevelPlan {
     ) -> Result<DepthReport> {
         let stage = stage!("colour");
         let size = self.frame.size();
-        let fits = |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
-        if self.colour.as_mut().filter(fits).is_none() {
-            let colour = ColourPlan::new(&frame.colour, frame.orientation, size)?;
-            let scratch = colour.scratch();
-            self.colour = Some((colour, scratch));
-        }
         let (amplitude, depth) = self.frame.planes_mut();
-        let rgb = if self.picture.is_empty() {
-            &mut *amplitude
-        } else {
-            &mut self.picture[..]
-        };
-        if let Some((colour, scratch)) = &mut self.colour {
-            colour.convert(&frame.colour, rgb, scratch)?;
-        }
-        if !self.picture.is_empty() {
-            luminance(&self.picture, amplitude);
-        }
-        let rgb = if self.picture.is_empty() {
-            &*amplitude
-        } else {
-            &self.picture
-        };
+        self.colour.read(frame, amplitude)?;
+        let rgb = self.colour.edges(amplitude);
         times.colour = stage.end();
         let stage = stage!("depth");
         let report = match estimates {
             Some(estimates) if frame.depth.is_none() => {
-                let estimate = estimates.estimate(rgb, size, elapsed.is_none(), cancel)?;
+                let picture = self.colour.picture(amplitude);
+                let estimate = estimates.estimate(picture, size, elapsed.is_none(), cancel)?;
                 self.depth.read_estimate(&estimate, elapsed, rgb)?
             }
             _ => self.depth.read(frame, elapsed, rgb)?,
@@ -204,6 +184,7 @@ impl Stages {
             pool,
             level_control,
             gpu,
+            estimates,
             cancel,
             ..
         } = self;
@@ -221,11 +202,7 @@ impl Stages {
             engine: pool.run(async || Engine::new(&mut context).await).await?,
             frame: RgbdFrame::black(colours, size),
             depth,
-            colour: None,
-            picture: match colours {
-                1 => vec![0.0; 3 * size.height * size.width],
-                _ => Vec::new(),
-            },
+            colour: ColourStage::new(&options.target.display, size, estimates.is_some()),
         })
     }
 
@@ -463,6 +440,7 @@ impl Stages {
             range_m: report.range_m,
             valid_depth: report.valid,
             quality_level: level_control.quality_level(),
+            encoding: frame.colour.encoding(),
             viewer: self.viewer.clone(),
             #[cfg(feature = "gpu")]
             on_gpu: self.gpu.kept.take(),

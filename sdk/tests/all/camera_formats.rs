@@ -4,8 +4,9 @@ use crate::camera;
 use phasefront::Size;
 
 use camera::{Noise, colour_formats};
-use phasefront::input::{Orientation, Rotation};
-use phasefront_core::frame::{ColourPlan, reference};
+use phasefront::Display;
+use phasefront::input::{Orientation, RgbEncoding, Rotation};
+use phasefront_core::frame::{ColourPlan, LightPlan, reference};
 use rand::{RngExt, SeedableRng};
 
 fn orientations() -> impl Iterator<Item = Orientation> {
@@ -79,4 +80,34 @@ fn a_plan_refuses_an_image_of_another_size_or_format() {
             .is_ok()
     );
     assert!(ColourPlan::new(&image, Orientation::default(), Size { width: 5, height: 0 }).is_err());
+}
+
+#[test]
+fn every_encoding_converts_as_the_definition_says() {
+    let display = Display::default();
+    let (size, out) = (Size { width: 23, height: 17 }, Size { width: 13, height: 19 });
+    for format in colour_formats() {
+        let noise = Noise::new(3, format, size, 1);
+        for encoding in RgbEncoding::ALL {
+            let image = noise.image().unwrap().with_encoding(encoding);
+            let naive = reference::convert(&image, Orientation::default(), out);
+            let plan = ColourPlan::new(&image, Orientation::default(), out).unwrap();
+            let plan = plan.with_light(LightPlan::new(encoding, &display));
+            let mut fast = vec![9.0; 3 * out.pixels()];
+            plan.convert(&image, &mut fast, &mut plan.scratch()).unwrap();
+            let area = out.pixels();
+            for i in 0..area {
+                let rgb = [0, 1, 2].map(|c| f64::from(naive[c * area + i]));
+                let right = match encoding {
+                    RgbEncoding::Amplitude => rgb.to_vec(),
+                    _ => reference::amplitudes(rgb, encoding, &display),
+                };
+                for (c, right) in right.into_iter().enumerate() {
+                    let apart = (f64::from(fast[c * area + i]) - right).abs();
+                    // Near black a small difference of the value is a larger one of its root.
+                    assert!(apart < 5e-3, "{format:?} {encoding:?} {rgb:?}: {apart}");
+                }
+            }
+        }
+    }
 }

@@ -13,6 +13,7 @@ mod network_models;
 mod on_gpu;
 
 mod camera_formats;
+mod colours;
 mod debug;
 #[cfg(feature = "tract")]
 mod depth_network;

@@ -5,7 +5,8 @@ use phasefront::Size;
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
 use num_complex::Complex32;
 use phasefront::input::{
-    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
+    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane,
+    RgbEncoding, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{DropReason, Event, Quality, QualityLevel, Thermal};
@@ -120,7 +121,8 @@ fn frames_are_turned_upright_colour_and_depth_together() {
         Size { width: W, height: H },
         &[Plane::new(&rgba, 4 * W, 4)],
     )
-    .unwrap();
+    .unwrap()
+    .with_encoding(RgbEncoding::Amplitude);
     let depth = depth(&depth_bytes, DepthFormat::MetresF32, Size { width: W, height: H });
     let mut half = CameraFrame::new(2, colour, depth);
     half.orientation = Orientation {

@@ -3,7 +3,8 @@
 
 use phasefront::Size;
 use phasefront::input::{
-    CameraFrame, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Plane, YuvEncoding, YuvMatrix,
+    CameraFrame, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Plane, RgbEncoding, YuvEncoding,
+    YuvMatrix,
 };
 use phasefront::{Display, Method, Network, Result, SessionOptions};
 use rand::{RngExt, SeedableRng};
@@ -93,7 +94,8 @@ impl Noise {
 
     pub(crate) fn image(&self) -> Result<ColourImage<'_>> {
         let planes: Vec<_> = self.planes.iter().map(Memory::plane).collect();
-        ColourImage::new(self.format, self.size, &planes)
+        let image = ColourImage::new(self.format, self.size, &planes)?;
+        Ok(image.with_encoding(RgbEncoding::Amplitude))
     }
 }
 
@@ -146,6 +148,7 @@ impl Scene {
             &[plane],
         )
         .expect("a whole image")
+        .with_encoding(RgbEncoding::Amplitude)
     }
 
     /// Returns the bytes of the depth in `format`.

@@ -6,6 +6,7 @@
 //! * [`optics::laser`] computes the map of the laser's amplitude.
 //! * [`optics::spot`] finds the coefficients of an aberration from photographs of a focused spot, using the model of
 //!   [`optics::pupil`].
+//! * [`white`] says what a meter's readings of three lasers mean.
 //! * [`learned`] fits a model of what is left to photographs of holograms.
 //! * [`rehearse`] does all of it on a simulated display.
 //!
@@ -19,6 +20,7 @@ pub mod learned;
 pub mod optics;
 pub mod rehearse;
 pub mod simulated_display;
+pub mod white;
 
 use phasefront::Display;
 

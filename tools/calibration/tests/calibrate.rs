@@ -268,7 +268,6 @@ fn boards(Size { width: w, height: h }: Size, planes: usize, in_focus: [usize; 3
 }
 
 #[test]
-#[expect(clippy::too_many_lines, reason = "two chains beside each other")]
 fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let display = Display::default();
     let size = Size {
@@ -312,12 +311,8 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
             &mut scratch,
         );
         let info = HologramInfo {
-            display: display.clone(),
-            encoder: None,
             scale: Some(modulation.scale),
-            lut: None,
-            levels_turns: None,
-            calibrated: Vec::new(),
+            ..HologramInfo::new(display.clone())
         };
         (levels, info)
     };

@@ -305,12 +305,8 @@ fn frame() -> Result<Check> {
     let bytes = levels.as_slice_mut().expect("standard layout");
     let report = pipeline.process(&frame, bytes, &mut pipeline.scratch())?;
     let info = HologramInfo {
-        display: target.display,
-        encoder: None,
         scale: Some(report.scale),
-        lut: None,
-        levels_turns: None,
-        calibrated: Vec::new(),
+        ..HologramInfo::new(target.display)
     };
     let seen = Hologram::Levels(Levels::Bytes(levels), info).views(&[0.0])?;
     let shown_db = metrics::compare(seen[0].view(), rgb.view())?.psnr_overall;

@@ -17,6 +17,7 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront_command::flags::sweep_for;
 use phasefront_core::method::network::Engine;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{Hologram, HologramInfo, Levels};
 use phasefront_io::ldi::{Ldi, LdiLayer};
@@ -38,7 +39,7 @@ impl HologramRequest {
                     .into(),
             ));
         }
-        match (method, image) {
+        let made = match (method, image) {
             (Method::Core(method), Image::Rgbd(frame)) => {
                 let (core, encoder) = method.of(&Parts {
                     network: self.network.as_deref(),
@@ -57,7 +58,11 @@ impl HologramRequest {
                 self.by_layers(method, &ldi, display, self.encoder.read()?)
             }
             (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.encoder.read()?),
-        }
+        }?;
+        Ok(HologramResult {
+            view_colours: self.view_colours(&display.target.display, image),
+            ..made
+        })
     }
 }
 
@@ -71,6 +76,8 @@ pub(crate) struct HologramResult {
     /// The stages and their times. The last stage is the encoder.
     pub(crate) stages: Vec<(&'static str, Duration)>,
     pub(crate) engine: Option<String>,
+    /// How views become pictures.
+    pub(crate) view_colours: ViewColours,
 }
 
 impl HologramResult {
@@ -108,6 +115,7 @@ pub(crate) fn infos(display: &DisplayFile, made: &HologramResult) -> (HologramIn
         scale: Some(made.scale),
         lut: display.lut.map(Vec::from),
         levels_turns: display.target.panel.levels_turns.clone(),
+        srgb_of_light: HologramInfo::light_rows(&made.view_colours, display.target.display.colours()),
     };
     let field = HologramInfo {
         encoder: None,

@@ -7,6 +7,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::{RgbImage, imageops};
 use ndarray::{Array2, ArrayView3};
+use phasefront_core::view::colours::ViewColours;
 use phasefront_io::input::{self, MOST_ARRAY};
 use phasefront_io::picture::{self, export};
 use phasefront_io::{Error, Result, output};
@@ -177,8 +178,8 @@ fn url(webp: &[u8]) -> String {
 }
 
 /// Makes a picture of a view's amplitudes, (C, H, W), no wider than pages show it.
-pub fn picture(view: ArrayView3<'_, f32>) -> RgbImage {
-    export::at_width(export::of_amplitude(view), WIDEST)
+pub fn picture(view: ArrayView3<'_, f32>, colours: &ViewColours) -> RgbImage {
+    export::at_width(export::of_view(view, colours), WIDEST)
 }
 
 /// Encodes `views` as data URLs that together have at most `most` bytes, at the best size and quality that fit.

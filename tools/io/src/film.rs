@@ -8,6 +8,7 @@ pub mod video;
 use crate::{Error, Result, output};
 use light::Light;
 use phasefront::Size;
+use phasefront::input::RgbEncoding;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
@@ -76,8 +77,17 @@ pub struct About {
     pub rate_hz: f64,
     /// The total number of pictures.
     pub frames: u64,
+    /// The meaning of the colours that [`Film`] gives: those of an HDR film become those of its SDR twin.
+    pub encoding: RgbEncoding,
     /// The transfer function of its light.
     light: Light,
+}
+
+impl About {
+    /// Returns whether the film is for HDR displays, whose light [`Film`] maps to that of SDR displays.
+    pub fn is_hdr(&self) -> bool {
+        self.light == Light::Hdr
+    }
 }
 
 /// Asks `ffprobe` about the film at `path`. Returns `None` if it cannot tell.
@@ -86,7 +96,7 @@ pub fn about(path: &Path) -> Option<About> {
         .args(["-v", "error", "-select_streams", "v:0", "-of", "compact"])
         .args([
             "-show_entries",
-            "stream=avg_frame_rate,color_transfer:packet=pts_time,duration_time,flags",
+            "stream=avg_frame_rate,color_primaries,color_transfer:packet=pts_time,duration_time,flags",
         ])
         .args(READS)
         .arg(url(path))
@@ -113,13 +123,14 @@ pub fn about(path: &Path) -> Option<About> {
             Some("stream") => {
                 let (over, under) = values.get("avg_frame_rate")?.split_once('/')?;
                 let rate_hz = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
-                stream = Some((rate_hz, Light::of(values.get("color_transfer").copied())));
+                let light = Light::of(values.get("color_transfer").copied());
+                stream = Some((rate_hz, light, encoding(values.get("color_primaries").copied(), light)));
             }
             _ => {}
         }
     }
     let _ = ffprobe.wait();
-    let (said, light) = stream?;
+    let (said, light, encoding) = stream?;
     let counted = times.rate_hz();
     // The container's rate is exact where pictures have a constant rate. Some containers state another one than their
     // pictures have.
@@ -128,8 +139,19 @@ pub fn about(path: &Path) -> Option<About> {
     (rate_hz.is_finite() && rate_hz > 0.0).then_some(About {
         rate_hz,
         frames: times.pictures,
+        encoding,
         light,
     })
+}
+
+/// Returns the meaning of the colours of a film for which ffprobe says these primaries, after its light became that of
+/// an SDR display. The curve of BT.709 is shown as that of sRGB is.
+fn encoding(primaries: Option<&str>, light: Light) -> RgbEncoding {
+    match (light, primaries) {
+        (Light::Sdr, Some("bt2020")) => RgbEncoding::Bt2020,
+        (Light::Sdr, Some("smpte432")) => RgbEncoding::DisplayP3,
+        _ => RgbEncoding::Srgb,
+    }
 }
 
 /// The times of a film's pictures in seconds.

@@ -3,15 +3,15 @@
 pub mod fit;
 
 use crate::frame::fit::Placement;
-use crate::input::decode::{self, Reading};
-use crate::picture;
+use crate::input::decode;
+use crate::picture::colours::{self, Colours};
 use crate::picture::depth_map::{self, DepthFile};
 use crate::{Error, Result};
-use image::DynamicImage;
 use image::metadata::Orientation;
 use ndarray::{Array2, Array3, ArrayView2};
 use phasefront::RgbdFrame;
 use phasefront::Size;
+use phasefront::input::RgbEncoding;
 use phasefront_core::depth;
 use phasefront_core::depth::DepthUnit;
 use phasefront_core::depth::condition::Conditioner;
@@ -37,8 +37,10 @@ pub struct DepthOptions {
 /// Colour and depth as files have them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Captured {
-    /// The amplitudes, (3, H, W).
+    /// The colours, (3, H, W).
     pub rgb: Array3<f32>,
+    /// The meaning of the colours.
+    pub encoding: RgbEncoding,
     /// The normalized depth of the same field of view, (h, w). NaN means no reading.
     pub depth: Array2<f32>,
     /// The distances that the depth shows, unless the file has normalized depth.
@@ -68,26 +70,24 @@ impl std::fmt::Display for ShownDepth {
 
 /// A colour picture, and the readings of the same field of view, as files hold them.
 pub(crate) struct Stored {
-    pub(crate) image: DynamicImage,
+    pub(crate) colours: Colours,
     /// The readings in the file's unit, (h, w).
     pub(crate) readings: Array2<f32>,
 }
 
-/// Reads the files of a still or of a frame of a video. `told` takes what is doubtful about them.
+/// Reads the files of a still or of a frame of a video, colour and depth. The colours mean `asked` or what the file says.
+/// `told` takes what is doubtful about them.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or if the files do not match.
 pub(crate) fn stored(
-    rgb_path: &Path,
-    depth_path: &Path,
+    [rgb_path, depth_path]: [&Path; 2],
     options: DepthOptions,
+    asked: Option<RgbEncoding>,
     told: &mut dyn FnMut(Doubt),
 ) -> Result<Stored> {
-    let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
-    let colour_size = Size {
-        width: image.width() as usize,
-        height: image.height() as usize,
-    };
+    let (colours, orientation) = colours::read(rgb_path, asked)?;
+    let colour_size = colours.size();
     let normalized = options.unit == DepthUnit::Normalized;
     let file = depth_map::read(depth_path, normalized)?;
     if is_turned_alone(depth_path, &file, orientation, colour_size)? {
@@ -101,17 +101,17 @@ pub(crate) fn stored(
         }
     }
     check_aspect(Size::from_shape(readings.dim()), colour_size).map_err(|why| Error::file(depth_path, why))?;
-    Ok(Stored { image, readings })
+    Ok(Stored { colours, readings })
 }
 
-/// Reads colour, and depth of the same aspect ratio.
+/// Reads colour, whose meaning is `asked` or what the file says, and depth of the same aspect ratio.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or if the files do not match.
-pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result<Captured> {
+pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions, asked: Option<RgbEncoding>) -> Result<Captured> {
     let warn = |doubt: Doubt| log::warn!("{}: {doubt}", depth_path.display());
-    let Stored { image, readings } = stored(rgb_path, depth_path, options, &mut { warn })?;
-    let rgb = picture::amplitudes(image);
+    let Stored { colours, readings } = stored([rgb_path, depth_path], options, asked, &mut { warn })?;
+    let Colours { rgb, encoding } = colours;
     let normalized = depth::normalize(readings.view(), options.unit, options.near_m, options.far_m)
         .map_err(|e| Error::file(depth_path, e))?;
     let shown = normalized.range_m.map(|(near_m, far_m)| ShownDepth {
@@ -137,6 +137,7 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     }
     Ok(Captured {
         rgb,
+        encoding,
         depth: normalized.depth,
         shown,
     })

@@ -21,6 +21,7 @@ use phasefront::output::ModulatorSpec;
 use phasefront::target::Response;
 use phasefront_core::display::levels::{self, LevelsMut};
 use phasefront_core::runtime::file;
+use phasefront_core::view::colours::ViewColours;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -51,6 +52,10 @@ pub struct HologramInfo {
     /// The keys of the display file that name other calibration files. Viewing the hologram needs the display file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibrated: Vec<String>,
+    /// The matrix from the lasers' light, the squares of the amplitudes, to linear sRGB, row by row. Absent if the
+    /// picture's values were amplitudes, as which views show them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub srgb_of_light: Option<[Vec<f32>; 3]>,
 }
 
 /// The valid range of the scale: an amplitude of a field computed from amplitudes up to 1.
@@ -70,6 +75,20 @@ struct Description {
 }
 
 impl HologramInfo {
+    /// Creates the info of a hologram for an uncalibrated `display`, without encoder and scale, whose views are
+    /// amplitudes.
+    pub fn new(display: Display) -> Self {
+        HologramInfo {
+            display,
+            encoder: None,
+            scale: None,
+            lut: None,
+            levels_turns: None,
+            calibrated: Vec::new(),
+            srgb_of_light: None,
+        }
+    }
+
     /// Returns the PNG text chunk for `levels` with this info.
     fn chunk(&self, path: &Path, levels: &Levels) -> Result<(&'static str, String)> {
         let description = Description {
@@ -111,7 +130,34 @@ impl HologramInfo {
             }
             Response::of_turns(turns)?;
         }
+        if let Some(rows) = &self.srgb_of_light {
+            let lasers = self.display.colours();
+            if rows
+                .iter()
+                .any(|row| row.len() != lasers || row.iter().any(|v| !v.is_finite()))
+            {
+                return refuse(format!(
+                    "srgb_of_light must hold three rows of {lasers} numbers, one for each laser"
+                ));
+            }
+        }
         Ok(())
+    }
+
+    /// Returns [`Self::srgb_of_light`] for views in `colours` on a display with `lasers`.
+    pub fn light_rows(colours: &ViewColours, lasers: usize) -> Option<[Vec<f32>; 3]> {
+        Some(colours.matrix()?.map(|row| row[..lasers].to_vec()))
+    }
+
+    /// Returns how views become pictures.
+    pub fn view_colours(&self) -> ViewColours {
+        match &self.srgb_of_light {
+            None => ViewColours::Amplitude,
+            Some(rows) => {
+                let number = |row: &Vec<f32>, laser: usize| row.get(laser).copied().unwrap_or_default();
+                ViewColours::Srgb(rows.each_ref().map(|row| [0, 1, 2].map(|laser| number(row, laser))))
+            }
+        }
     }
 
     /// Returns the display, as far as this info describes it.

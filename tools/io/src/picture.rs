@@ -1,5 +1,6 @@
 //! Colour pictures, read as amplitudes or bytes and written as PNG.
 
+pub mod colours;
 pub mod depth_map;
 pub mod export;
 pub mod photo;

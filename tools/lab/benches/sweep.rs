@@ -7,6 +7,7 @@
 
 use ndarray::Array2;
 use num_complex::Complex32;
+use phasefront::input::RgbEncoding;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_core::Size;
 use phasefront_core::depth::DepthUnit;
@@ -32,7 +33,8 @@ fn main() -> Result<()> {
         far_m: None,
         inverted: false,
     };
-    let Captured { rgb, depth, .. } = frame::read(Path::new(rgb), Path::new(depth), options)?;
+    let amplitude = Some(RgbEncoding::Amplitude);
+    let Captured { rgb, depth, .. } = frame::read(Path::new(rgb), Path::new(depth), options, amplitude)?;
     let frame = RgbdFrame::new(rgb, depth)?;
     let Size { width, height } = frame.size();
     let display = Display::default();

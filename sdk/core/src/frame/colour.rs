@@ -2,6 +2,7 @@
 //!
 //! [`super::convert`] converts them to amplitudes.
 
+use super::encoding::RgbEncoding;
 use super::plane::Plane;
 use crate::Size;
 use crate::runtime::error::{Error, Result};
@@ -77,6 +78,7 @@ pub struct ColourImage<'a> {
     format: ColourFormat,
     size: Size,
     planes: [Plane<'a>; 3],
+    encoding: RgbEncoding,
 }
 
 impl<'a> ColourImage<'a> {
@@ -119,7 +121,18 @@ impl<'a> ColourImage<'a> {
             format,
             size,
             planes: all,
+            encoding: RgbEncoding::default(),
         })
+    }
+
+    /// Sets the meaning of the image's red, green and blue.
+    pub fn with_encoding(self, encoding: RgbEncoding) -> Self {
+        ColourImage { encoding, ..self }
+    }
+
+    /// Returns the meaning of the image's red, green and blue.
+    pub fn encoding(&self) -> RgbEncoding {
+        self.encoding
     }
 
     /// Returns the memory layout.

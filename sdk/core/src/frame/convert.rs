@@ -2,6 +2,7 @@
 //! and converted in one pass. Tests compare the results with [`super::reference`].
 
 use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix, check_size};
+use super::light::LightPlan;
 use super::plane::View;
 use super::plane::{Orientation, Plane};
 use super::resample::{Axis, Crop};
@@ -24,6 +25,7 @@ pub struct ColourPlan {
     luma: Axes,
     /// The axes of subsampled chroma, or `None` if all channels have full resolution.
     chroma: Option<Axes>,
+    light: Option<LightPlan>,
 }
 
 struct Axes {
@@ -99,7 +101,14 @@ impl ColourPlan {
                 y: Axis::new(upright.height, crop.y, crop.height, height),
             },
             chroma,
+            light: None,
         })
+    }
+
+    /// Returns this plan with colours converted to amplitudes by `light`, which is of three lasers. Without it, the plan
+    /// gives the encoded colours; those of [`super::RgbEncoding::Amplitude`] are the amplitudes.
+    pub fn with_light(self, light: Option<LightPlan>) -> Self {
+        ColourPlan { light, ..self }
     }
 
     /// Returns whether the plan fits images like `image` turned by `orientation`. Strides may differ.
@@ -191,7 +200,11 @@ impl ColourPlan {
                     for (channel, out) in channels.iter().zip(&mut out) {
                         channel.row(y, self.orientation, row, out);
                     }
-                    to_amplitude(self.format, out);
+                    let [red, green, blue] = out;
+                    to_rgb(self.format, [&mut *red, &mut *green, &mut *blue]);
+                    if let Some(light) = &self.light {
+                        light.convert_rows([red, green, blue]);
+                    }
                 }
             });
         Ok(())
@@ -325,8 +338,8 @@ pub fn yuv_constants(encoding: YuvEncoding) -> ([f32; 4], [f32; 4]) {
     )
 }
 
-/// Converts rows of red, green, blue or Y, U, V in 0..=255 to amplitudes in \[0, 1].
-fn to_amplitude(format: ColourFormat, [first, second, third]: [&mut [f32]; 3]) {
+/// Converts rows of red, green, blue or Y, U, V in 0..=255 to red, green and blue in \[0, 1].
+fn to_rgb(format: ColourFormat, [first, second, third]: [&mut [f32]; 3]) {
     match format {
         ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => {
             for row in [first, second, third] {

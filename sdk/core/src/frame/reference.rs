@@ -1,10 +1,14 @@
-//! The definition of the conversion of camera images. It computes each output pixel separately in f64. Tests compare
-//! `convert` with it.
+//! The definitions of the conversion of camera images and of encoded colours. They compute each output pixel separately
+//! in f64. Tests compare `convert` and `light` with them.
 
 use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix};
+use super::encoding::{Knee, RgbEncoding};
+use super::light::{Gamut, to_lasers};
 use super::plane::Orientation;
 use super::resample::Crop;
 use crate::Size;
+use crate::display::Display;
+use crate::display::primaries::times;
 
 /// Converts `image`, turned by `orientation`, to amplitudes, (3, H, W), of `size`.
 ///
@@ -99,4 +103,37 @@ fn rgb_of_yuv([y, u, v]: [f64; 3], encoding: YuvEncoding) -> [f64; 3] {
     let red = y + (2.0 - 2.0 * kr) * v;
     let blue = y + (2.0 - 2.0 * kb) * u;
     [red, (y - kr * red - kb * blue) / (1.0 - kr - kb), blue]
+}
+
+/// Converts one encoded colour to the amplitudes of the lasers of `display`, as [`super::LightPlan`] does.
+pub fn amplitudes(rgb: [f64; 3], encoding: RgbEncoding, display: &Display) -> Vec<f64> {
+    let luminance = |rgb: [f64; 3]| times(&encoding.to_xyz(), rgb)[1];
+    let mut light = rgb.map(|value| encoding.light(value));
+    if encoding.is_high_dynamic_range() {
+        let gain = encoding.gain(luminance(light));
+        light = light.map(|v| gain * v);
+        let most = light.iter().copied().fold(0.0, f64::max);
+        if most > 0.0 {
+            light = light.map(|v| v * Knee::of_highlights().apply(most).min(1.0) / most);
+        }
+    }
+    if display.colours() == 1 {
+        return vec![luminance(light).sqrt()];
+    }
+    let matrix = to_lasers(encoding, display);
+    let lasers = times(&matrix, light);
+    let most = lasers.iter().copied().fold(0.0, f64::max);
+    let saturation = 1.0 - lasers.iter().copied().fold(f64::INFINITY, f64::min) / most;
+    let kept = Gamut::new(&matrix).knee.apply(saturation);
+    let inside = |light: f64| {
+        if saturation > 0.0 {
+            most - (most - light) * kept / saturation
+        } else {
+            light
+        }
+    };
+    lasers
+        .iter()
+        .map(|v| (inside(*v) / most.max(1.0)).clamp(0.0, 1.0).sqrt())
+        .collect()
 }

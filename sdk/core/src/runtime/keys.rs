@@ -3,7 +3,7 @@
 use crate::runtime::error::{Error, Result};
 
 /// The keys of a [`crate::display::Display`].
-pub const DISPLAY: [&str; 8] = [
+pub const DISPLAY: [&str; 11] = [
     "width",
     "height",
     "pitch_um",
@@ -12,6 +12,9 @@ pub const DISPLAY: [&str; 8] = [
     "offset_mm",
     "bits",
     "aperture_radius",
+    "white",
+    "powers",
+    "primaries",
 ];
 
 /// The keys that a [`crate::output::modulator::ModulatorSpec`] has in addition to [`DISPLAY`].
@@ -139,8 +142,18 @@ mod tests {
 
     #[test]
     fn the_keys_are_those_of_the_form() {
-        let table = toml::Table::try_from(Display::default()).unwrap();
-        let form: BTreeSet<_> = table.keys().map(String::as_str).collect();
+        // One of the last three at most.
+        let balances = [
+            "white = [0.31, 0.33]",
+            "powers = [1, 1, 1]",
+            "primaries = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+        ];
+        let tables = balances.map(|toml| toml::Table::try_from(Display::from_toml(toml).unwrap()).unwrap());
+        let form: BTreeSet<_> = tables
+            .iter()
+            .flat_map(|table| table.keys())
+            .map(String::as_str)
+            .collect();
         assert_eq!(form, BTreeSet::from(DISPLAY));
     }
 }

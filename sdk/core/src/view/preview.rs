@@ -17,6 +17,7 @@ use crate::optics::fft::ConvolveScratch;
 use crate::optics::zernike::Aberration;
 use crate::output::{Layout, rows};
 use crate::runtime::error::{Error, Result};
+use crate::view::colours::ViewColours;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
@@ -40,6 +41,7 @@ pub struct Preview {
     screen: Size,
     x: Axis,
     y: Axis,
+    view: ViewColours,
 }
 
 /// Checks that the size of a screen is small enough, before memory is allocated for the image.
@@ -101,7 +103,18 @@ impl Preview {
             screen,
             x: Axis::new(small.width, 0.0, small.width as f64, screen.width),
             y: Axis::new(small.height, 0.0, small.height as f64, screen.height),
+            view: ViewColours::Amplitude,
         })
+    }
+
+    /// Sets how amplitudes become pixels. Without it, the amplitude is the value.
+    pub fn with_view_colours(self, view: ViewColours) -> Self {
+        Preview { view, ..self }
+    }
+
+    /// Returns how amplitudes become pixels.
+    pub fn view_colours(&self) -> &ViewColours {
+        &self.view
     }
 
     /// Returns the number of modulator pixels along each side whose light is averaged.
@@ -161,7 +174,7 @@ impl Preview {
     }
 
     /// Renders `levels`, (C, H, W), into `image`: its layout and its memory, whose rows begin so many bytes apart.
-    /// `scale` is the amplitude that maps to full light. Amplitude 1 becomes 255, and the view of one laser is grey.
+    /// `scale` is the amplitude that maps to full light. The view of one laser is grey.
     /// Allocates nothing.
     ///
     /// # Errors
@@ -264,18 +277,18 @@ impl Preview {
     fn draw<'a>(&self, amplitude: &[f32], layout: Layout, rows: impl IndexedParallelIterator<Item = &'a mut [u8]>) {
         let Size { width, height } = self.small;
         rows.enumerate().for_each(|(y, pixels)| {
-            let byte = |colour: usize, x: usize| {
+            let mean = |colour: usize, x: usize| {
                 let plane = &amplitude[colour * height * width..];
                 let row = |(row, weight): (usize, f32)| {
                     let row = &plane[row * width..][..width];
                     weight * self.x.taps(x).map(|(at, w)| w * row[at]).sum::<f32>()
                 };
-                (self.y.taps(y).map(row).sum::<f32>() * 255.0 + 0.5) as u8
+                self.y.taps(y).map(row).sum::<f32>()
             };
             for (x, pixel) in pixels.chunks_exact_mut(layout.pixel_bytes()).enumerate() {
                 let bytes = match self.colours {
-                    1 => [byte(0, x); 3],
-                    _ => [0, 1, 2].map(|colour| byte(colour, x)),
+                    1 => self.view.bytes(&[mean(0, x)]),
+                    _ => self.view.bytes(&[0, 1, 2].map(|colour| mean(colour, x))),
                 };
                 layout.write_pixel(0, |colour| bytes[colour].into(), pixel);
             }

@@ -43,10 +43,10 @@ fn sample(channel: u32, x: u32, y: u32) -> f32 {
 
 fn rgb(x: u32, y: u32) -> vec3f {
     let v = vec3f(sample(0u, x, y), sample(1u, x, y), sample(2u, x, y));
-    if (!YUV) { return clamp(v / 255.0, vec3f(0), vec3f(1)); }
+    if (!YUV) { return amplitudes(clamp(v / 255.0, vec3f(0), vec3f(1))); }
     let luma = (v.x - camera.levels.x) * camera.levels.y;
     let chroma = (v.yz - camera.levels.z) * camera.levels.w;
     let m = camera.matrix;
     let all = luma + vec3f(m.x * chroma.y, m.y * chroma.x + m.z * chroma.y, m.w * chroma.x);
-    return clamp(all, vec3f(0), vec3f(1));
+    return amplitudes(clamp(all, vec3f(0), vec3f(1)));
 }

@@ -3,10 +3,10 @@
 use ndarray::{Array2, Array3};
 use phasefront_core::Size;
 use phasefront_core::depth::condition::ConditionedReadings;
-use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, RgbdFrame};
+use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, LightConstants, Orientation, RgbdFrame};
 
 /// The format of colour images.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Colour {
     /// Three planes of f32 in \[0, 1] of the frame's size, as in an [`RgbdFrame`].
@@ -19,6 +19,8 @@ pub enum Colour {
         size: Size,
         /// The orientation that makes the images upright.
         orientation: Orientation,
+        /// The conversion of their colours to amplitudes.
+        light: LightConstants,
     },
 }
 

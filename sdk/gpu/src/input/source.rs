@@ -3,6 +3,7 @@
 use super::camera::Camera;
 use super::condition::Conditioning;
 use super::frame::{Colour, ColourData, Depth, DepthData, Frame};
+use super::light;
 use crate::Result;
 use crate::device::Device;
 use phasefront_core::Size;
@@ -95,11 +96,17 @@ impl Reader {
                 format,
                 size: sensor,
                 orientation,
+                light,
             } => {
                 let plan = ColourPlan::for_format(format, sensor, orientation, size)?;
                 let (camera, bytes, constants) = Camera::new(device, plan, format, sensor)?;
                 header += &constants;
-                (bytes, include_str!("camera.wgsl"), Some(camera))
+                header += &light::header(&light);
+                (
+                    bytes,
+                    concat!(include_str!("light.wgsl"), include_str!("camera.wgsl")),
+                    Some(camera),
+                )
             }
         };
         let depth_bytes = match depth {

@@ -5,7 +5,9 @@ use crate::session::engine::brightness::BrightnessTracker;
 use crate::session::engine::frame_input::FrameInput;
 use crate::session::quality::QualityLevel;
 use crate::session::statistics::BackendReport;
+use phasefront_core::display::Display;
 use phasefront_core::encode::brightness::Past;
+use phasefront_core::frame::LightConstants;
 use phasefront_core::pipeline::{FrameReport, FrameTimes};
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
@@ -44,7 +46,7 @@ impl From<GpuError> for Failure {
 }
 
 /// The plans and memory of a quality level on the GPU.
-pub(in crate::session) struct OnGpu(Renderer);
+pub(in crate::session) struct OnGpu(Renderer, Display);
 
 impl OnGpu {
     /// Plans `quality_level` on `device`; without one, opens a device and tests it.
@@ -66,7 +68,7 @@ impl OnGpu {
             ..Job::new(size, quality_level.method.clone(), options.target.clone())
         };
         let renderer = Renderer::new(device, options.gpu.device.clone(), job).await?;
-        Ok(OnGpu(renderer))
+        Ok(OnGpu(renderer, options.target.display.clone()))
     }
 
     pub(in crate::session) fn device(&self) -> Option<&Arc<Device>> {
@@ -127,7 +129,7 @@ impl OnGpu {
         brightness: &BrightnessTracker,
         deliver: Deliver,
     ) -> Result<InFlight, Failure> {
-        let (colour, depth, frame) = Self::frame(input);
+        let (colour, depth, frame) = self.frame(input);
         self.0.expect(colour, depth).await?;
         let past = brightness.past(input.elapsed);
         Ok(self.0.submit(past, &frame, deliver).await?)
@@ -135,13 +137,13 @@ impl OnGpu {
 
     /// Reads a frame without computing its levels, so that the next one has its past.
     pub(in crate::session) async fn read(&mut self, input: &FrameInput<'_>, past: Option<Past>) -> Result<(), Failure> {
-        let (colour, depth, frame) = Self::frame(input);
+        let (colour, depth, frame) = self.frame(input);
         self.0.expect(colour, depth).await?;
         Ok(self.0.read(past, &frame).await?)
     }
 
     /// Returns the formats of a frame, and the frame. The camera's colour is read directly.
-    fn frame<'a>(input: &'a FrameInput<'_>) -> (Colour, Depth, Frame<'a>) {
+    fn frame<'a>(&self, input: &'a FrameInput<'_>) -> (Colour, Depth, Frame<'a>) {
         let mut frame = Frame::of(input.frame);
         let colour = match input.camera {
             None => Colour::Planar,
@@ -151,6 +153,7 @@ impl OnGpu {
                     format: camera.colour.format(),
                     size: camera.colour.size(),
                     orientation: camera.orientation,
+                    light: LightConstants::new(camera.colour.encoding(), &self.1),
                 }
             }
         };
@@ -203,7 +206,6 @@ mod tests {
     use super::*;
     use crate::session::threads::block_on;
     use ndarray::{Array2, Array3};
-    use phasefront_core::display::Display;
     use phasefront_core::frame::RgbdFrame;
     use phasefront_core::method::Method;
     use phasefront_core::method::network::Network;

@@ -3,9 +3,10 @@
 
 use super::{full_light, median, named};
 use phasefront::Size;
-use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
+use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, RgbEncoding, YuvEncoding};
 use phasefront::session::FrameTimes;
 use phasefront::{EncoderOptions, Method, Target};
+use phasefront_core::frame::LightConstants;
 use phasefront_gpu::{
     ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, GpuPipeline, Job, probe,
 };
@@ -85,6 +86,7 @@ pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget
         format,
         size,
         orientation: Orientation::default(),
+        light: LightConstants::new(RgbEncoding::default(), &target.display),
     };
     job.depth = Depth::U16;
     let mut pipeline = GpuPipeline::new(device, &job)?;

@@ -8,6 +8,7 @@ mod lut;
 mod model;
 mod pack;
 mod rehearse;
+mod white;
 
 use clap::Subcommand;
 use phasefront::Display;
@@ -25,6 +26,7 @@ pub(crate) enum Calibrate {
     Aberration(aberration::Aberration),
     Model(model::LearnModel),
     Pack(pack::Pack),
+    White(white::White),
     Rehearse(rehearse::Rehearse),
 }
 
@@ -37,6 +39,7 @@ impl Calibrate {
             Calibrate::Aberration(command) => command.run(json),
             Calibrate::Model(command) => command.run(json),
             Calibrate::Pack(command) => command.run(json),
+            Calibrate::White(command) => command.run(json),
             Calibrate::Rehearse(command) => command.run(json),
         }
     }

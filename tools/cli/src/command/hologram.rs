@@ -73,6 +73,7 @@ impl Hologram {
         let before = Before::of_flags(self.resume, self.overwrite);
         let mut record = RunRecord::new("hologram");
         record.add(flags)?;
+        self.request.record_colours(&mut record);
         stills::run(self.request, pictures, &self.output, before, record, json)
     }
 }

@@ -1,5 +1,6 @@
 //! `phasefront judge`: compares methods and encoders on an image and a display.
 
+use crate::flags::colours::ColourFlags;
 use crate::flags::encoder::{EncoderFlags, FocusName};
 use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, shown_json, shown_text};
 use crate::flags::method::CoreMethod;
@@ -17,7 +18,7 @@ use phasefront_core::depth::sharpness;
 use phasefront_exact::incoherent::{self, Natural, Pupil};
 use phasefront_exact::truth::{self, Figures};
 use phasefront_io::display::DisplayFile;
-use phasefront_io::hologram::Hologram;
+use phasefront_io::hologram::{Hologram, HologramInfo};
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
@@ -112,6 +113,10 @@ impl Judge {
         };
         let image = Image::Rgbd(frame);
         let mut request = HologramRequest::new(self.display.clone());
+        request.set_colours(match layers {
+            Some(_) => ColourFlags::AMPLITUDE,
+            None => self.frame.colours(),
+        });
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean, &mut request)?;
         let z_m = truth::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;
@@ -198,7 +203,10 @@ impl Judge {
             }
         };
         request.keeps_field = false;
-        let (_, info) = infos(file, &made);
+        let (_, mut info) = infos(file, &made);
+        // The exact wave of an image is made of its layers, whose colours are the image's amplitudes.
+        let colours = request.view_colours(display, image);
+        info.srgb_of_light = HologramInfo::light_rows(&colours, display.colours());
         let field: Array3<Complex32> = made.field.expect("kept for this");
         Ok((Hologram::Complex(field, info), what))
     }
@@ -336,7 +344,10 @@ fn write_page(
     let scene = |title: String, hologram: &Hologram, figures: Vec<(String, String)>| -> Result<Scene> {
         let Size { width, height } = hologram.size();
         let views = hologram.views_on(file, &z_m)?;
-        let views: Vec<_> = (views.iter()).map(|view| viewer::picture(view.view())).collect();
+        let colours = hologram.info().view_colours();
+        let views: Vec<_> = (views.iter())
+            .map(|view| viewer::picture(view.view(), &colours))
+            .collect();
         Ok(Scene {
             title,
             width,

@@ -11,6 +11,7 @@ use phasefront::{EncoderOptions, Pipeline, RgbdFrame, Size};
 use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, check_used, sweep_for};
 use phasefront_command::terminal::{self, progress_bar};
+use phasefront_core::view::colours::ViewColours;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{self, Hologram, HologramInfo, Levels, packed};
 use phasefront_io::{Error, Result, output};
@@ -161,6 +162,8 @@ impl MultiplexCommand {
         };
         output::make_folder(dir)?;
         let path = |n: usize| dir.join(format!("phase_{n:03}.png"));
+        let shown = &display.target.display;
+        let colours = ViewColours::new(self.frame.colours().viewed(), shown);
         for (n, map) in maps.iter().enumerate() {
             let info = HologramInfo {
                 display: display.target.display.clone(),
@@ -169,6 +172,7 @@ impl MultiplexCommand {
                 lut: display.lut.map(Vec::from),
                 levels_turns: display.target.panel.levels_turns.clone(),
                 calibrated: display.calibrated(true),
+                srgb_of_light: HologramInfo::light_rows(&colours, shown.colours()),
             };
             let levels = Levels::Bytes(map.levels.clone());
             hologram::write_hologram(&path(n), &Hologram::Levels(levels, info))?;

@@ -120,6 +120,7 @@ impl Unpack {
             lut: display.lut.map(Vec::from),
             levels_turns: display.target.panel.levels_turns.clone(),
             calibrated: display.calibrated(true),
+            srgb_of_light: None,
         };
         let levels = match modulator.bits() {
             0..=8 => Levels::Bytes(levels.mapv(|level| level as u8)),

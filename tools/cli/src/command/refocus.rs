@@ -60,8 +60,9 @@ impl Refocus {
             Some(display) => hologram.views_on(&display, &z_m),
         }
         .map_err(|e| Error::file(&self.hologram, e))?;
+        let colours = hologram.info().view_colours();
         let views: Vec<_> = (views.iter())
-            .map(|view| export::of_amplitude(view.view()))
+            .map(|view| export::of_view(view.view(), &colours))
             .map(|view| export::at_width(view, self.width.unwrap_or(u32::MAX)))
             .collect();
         let mut written = Vec::new();

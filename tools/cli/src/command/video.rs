@@ -4,6 +4,7 @@ mod sink;
 mod source;
 
 use crate::flags::backend::BackendFlags;
+use crate::flags::colours::ColourFlags;
 use crate::flags::depth::DepthFlags;
 use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::{SeenDepthFlags, warn_of_size};
@@ -45,6 +46,8 @@ pub(crate) struct Video {
     /// Take the depth of a film from the right half of its pictures, in grey; a margin in their middle is left out
     #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"], help_heading = "Input")]
     depth_beside: bool,
+    #[command(flatten)]
+    colours: ColourFlags,
     #[command(flatten)]
     seen: SeenDepthFlags,
     /// Size of the colour of raw frames on stdin, rows of RGB bytes
@@ -182,6 +185,7 @@ impl Video {
     fn record(&self, flags: &[Flag], display: &phasefront::Display, rate: f64) -> Result<RunRecord> {
         let mut record = RunRecord::new("video");
         record.add(flags)?;
+        self.colours.record(&mut record);
         self.depth.record(&mut record);
         let method = CoreMethod::or_default(self.method, self.network.as_deref(), &self.encoder);
         record.choice("--method", Some(&method));
@@ -274,6 +278,7 @@ impl Video {
             lut: file.lut.map(Vec::from),
             levels_turns: file.target.panel.levels_turns.clone(),
             calibrated: file.calibrated(true),
+            srgb_of_light: None, // The frames say it.
         };
         Ok((options, info))
     }

@@ -325,10 +325,11 @@ impl Parts {
 /// Computes the views of `hologram` at `z_m`, no wider than a page shows them.
 fn views(hologram: &Hologram, file: &DisplayFile, z_m: &[f64], bar: &ProgressBar) -> Result<Vec<RgbImage>> {
     let mut all = Vec::with_capacity(z_m.len());
+    let colours = hologram.info().view_colours();
     for z_m in z_m.chunks(CHUNK) {
         let views = hologram.views_on(file, z_m)?;
         bar.inc(views.len() as u64);
-        all.extend(views.iter().map(|view| viewer::picture(view.view())));
+        all.extend(views.iter().map(|view| viewer::picture(view.view(), &colours)));
     }
     Ok(all)
 }

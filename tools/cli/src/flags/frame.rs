@@ -1,6 +1,7 @@
 //! The flags for an RGB-D image: from two files, from a photo with depth inside, or from any picture by a network that
 //! estimates depth. Further flags place the image on the modulator.
 
+use crate::flags::colours::ColourFlags;
 use crate::flags::depth::DepthFlags;
 use clap::{Args, ValueEnum, ValueHint};
 use ndarray::{Array2, Array3};
@@ -13,13 +14,22 @@ use phasefront_io::frame::fit::{Fit, Placement};
 use phasefront_io::frame::{Captured, ShownDepth};
 use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_io::input::quiet;
-use phasefront_io::picture::{self, photo};
+use phasefront_io::picture::colours::{self, Colours};
+use phasefront_io::picture::photo;
 use phasefront_io::{Error, Result, frame, output};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// The flags for an RGB-D image, for flags that conflict with them. clap makes no group of a struct that holds others.
-pub(crate) const IMAGE_FLAGS: [&str; 6] = ["rgb", "depth", "photo", "fit", "SeenDepthFlags", "DepthFlags"];
+pub(crate) const IMAGE_FLAGS: [&str; 7] = [
+    "rgb",
+    "depth",
+    "photo",
+    "fit",
+    "ColourFlags",
+    "SeenDepthFlags",
+    "DepthFlags",
+];
 
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
@@ -38,6 +48,8 @@ pub(crate) struct FrameFlags {
     /// A phone's JPEG with depth inside (GDepth or Dynamic Depth)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]
     photo: Option<PathBuf>,
+    #[command(flatten)]
+    colours: ColourFlags,
     #[command(flatten)]
     seen: SeenDepthFlags,
     /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: unchanged;
@@ -249,27 +261,51 @@ impl FrameFlags {
                 "is a folder; name one picture. `phasefront hologram` takes folders of pictures",
             ));
         }
-        let mut shown = None;
-        let frame = match (&self.rgb, &self.depth, &self.photo) {
+        let asked = self.colours.asked();
+        let mut distances = None;
+        let (frame, encoding) = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
-                let captured: Captured = frame::read(rgb, depth, self.depth_numbers.options(self.seen.invert)?)?;
-                shown = captured.shown;
-                self.conditioned(&captured.rgb, captured.depth, display)
+                let options = self.depth_numbers.options(self.seen.invert)?;
+                let Captured {
+                    rgb,
+                    encoding,
+                    depth,
+                    shown,
+                } = frame::read(rgb, depth, options, asked)?;
+                distances = shown;
+                (self.conditioned(&rgb, depth, display)?, encoding)
             }
-            (Some(rgb), None, _) => self.by_network(&picture::read_rgb(rgb)?, display),
+            (Some(rgb), None, _) => {
+                let (Colours { rgb, encoding }, _) = colours::read(rgb, asked)?;
+                (self.by_network(&rgb, display)?, encoding)
+            }
             (None, _, Some(path)) => {
-                let photo = photo::read(path)?;
-                match self.seen.network() {
-                    Some(_) => self.by_network(&photo.rgb, display),
-                    None => self.of_photo(path, &photo, display),
-                }
+                let photo = photo::read(path, asked)?;
+                let Colours { rgb, encoding } = &photo.colours;
+                let frame = match self.seen.network() {
+                    Some(_) => self.by_network(rgb, display)?,
+                    None => self.of_photo(path, &photo, display)?,
+                };
+                (frame, *encoding)
             }
-            _ => Err(Error::Input(
-                "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
-            )),
-        }?;
+            _ => {
+                return Err(Error::Input(
+                    "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
+                ));
+            }
+        };
         warn_of_size(frame.size(), display, named, "--fit contain, cover or centre");
-        Ok((frame.for_display(display), shown))
+        Ok((frame.decoded(encoding, display), distances))
+    }
+
+    /// Returns the meaning of the colours.
+    pub(crate) fn colours(&self) -> ColourFlags {
+        self.colours
+    }
+
+    /// Sets the meaning of the colours.
+    pub(crate) fn set_colours(&mut self, colours: ColourFlags) {
+        self.colours = colours;
     }
 
     fn placement(&self, picture: Size, display: &Display) -> Placement {
@@ -304,7 +340,7 @@ impl FrameFlags {
             }
         };
         let depth = depth.map_err(|e| Error::file(path, e))?;
-        self.conditioned(&photo.rgb, depth, display)
+        self.conditioned(&photo.colours.rgb, depth, display)
     }
 
     fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {

@@ -6,6 +6,7 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Size;
 use phasefront::{Pipeline, RgbdFrame};
+use phasefront_core::view::colours::ViewColours;
 use phasefront_io::Result;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::Levels;
@@ -45,6 +46,7 @@ impl HologramRequest {
                 ("encode", modulation.encode),
             ],
             engine: engine.map(described),
+            view_colours: ViewColours::Amplitude,
         })
     }
 }

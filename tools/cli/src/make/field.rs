@@ -7,6 +7,7 @@ use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::Size;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_io::hologram::Levels;
 use std::time::{Duration, Instant};
 
@@ -53,6 +54,7 @@ impl Encoding<'_> {
                 ("encode", modulation.encode),
             ],
             engine: None,
+            view_colours: ViewColours::Amplitude,
         }
     }
 }

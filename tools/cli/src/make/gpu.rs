@@ -6,6 +6,7 @@ use ndarray::Array3;
 use phasefront::RgbdFrame;
 use phasefront::Size;
 use phasefront_cli::gpu;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::Levels;
@@ -52,6 +53,7 @@ impl HologramRequest {
                 ("encode", times.encode),
             ],
             engine: Some(pipeline.describe()),
+            view_colours: ViewColours::Amplitude,
         })
     }
 }

@@ -1,13 +1,16 @@
 //! The request for a hologram: the flags for its image and its method.
 
 use crate::flags::backend::BackendFlags;
+use crate::flags::colours::ColourFlags;
 use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, Picture};
 use crate::flags::method::CoreMethod;
+use crate::record::RunRecord;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum, ValueHint};
 use phasefront::{Brightness, EncoderOptions, RgbdFrame};
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used};
+use phasefront_core::view::colours::ViewColours;
 use phasefront_exact::point_based::Occlusion;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::frame::ShownDepth;
@@ -139,6 +142,24 @@ impl HologramRequest {
     pub(crate) fn set_method(&mut self, method: Method, network: Option<String>, encoder: EncoderFlags) {
         (self.method, self.network, self.encoder) = (Some(method), network, encoder);
         (self.planes, self.precision) = (None, None);
+    }
+
+    /// Sets the meaning of the image's colours, in which views show it.
+    pub(crate) fn set_colours(&mut self, colours: ColourFlags) {
+        self.frame.set_colours(colours);
+    }
+
+    /// Records the meaning of the image's colours.
+    pub(crate) fn record_colours(&self, record: &mut RunRecord) {
+        self.frame.colours().record(record);
+    }
+
+    /// Returns how views of the holograms of `image` become pictures. Layered depth images have amplitudes.
+    pub(crate) fn view_colours(&self, display: &phasefront::Display, image: &Image) -> ViewColours {
+        match image {
+            Image::Rgbd(_) => ViewColours::new(self.frame.colours().viewed(), display),
+            Image::Layers(_) => ViewColours::Amplitude,
+        }
     }
 
     /// Sets the number of planes.

@@ -45,7 +45,7 @@ fn read(folder: &Folder, name: &str, unit: DepthUnit) -> phasefront_io::Result<C
         far_m: None,
         inverted: false,
     };
-    frame::read(&folder.path("rgb.png"), &folder.path(name), options)
+    frame::read(&folder.path("rgb.png"), &folder.path(name), options, None)
 }
 
 /// A layer of an OpenEXR file: its name, its channels, and the place of its data window.

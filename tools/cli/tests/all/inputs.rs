@@ -232,7 +232,7 @@ fn a_unit_means_the_same_for_every_format() {
         .to_rgb16()
         .save(folder.path("mm.png"))
         .unwrap();
-    let read = |name: &str, unit| frame::read(&folder.path("c.png"), &folder.path(name), options(unit)).unwrap();
+    let read = |name: &str, unit| frame::read(&folder.path("c.png"), &folder.path(name), options(unit), None).unwrap();
     let want = read("m.npy", DepthUnit::Metres);
     for (name, unit) in [
         ("m.tif", DepthUnit::Metres),
@@ -339,6 +339,7 @@ fn pictures_are_upright_as_their_exif_says() {
             &folder.path("6.jpg"),
             &folder.path(name),
             options(DepthUnit::Normalized),
+            None,
         )
     };
     let want = read("upright.png").unwrap();
@@ -651,12 +652,9 @@ fn only_regular_files_are_read() {
 
 fn info(scale: Option<f32>) -> HologramInfo {
     HologramInfo {
-        display: Display::default(),
         encoder: Some("anti-alias".into()),
         scale,
-        lut: None,
-        levels_turns: None,
-        calibrated: vec![],
+        ..HologramInfo::new(Display::default())
     }
 }
 

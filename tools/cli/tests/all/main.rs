@@ -10,11 +10,14 @@ mod driver;
 mod folder;
 #[path = "../ldi/mod.rs"]
 mod ldi;
+#[path = "../../../../tests/reference.rs"]
+mod reference;
 #[path = "../../../../tests/skip.rs"]
 mod skip;
 
 mod calibrate_command;
 mod capture;
+mod colours;
 mod command;
 mod depth_files;
 mod devices;

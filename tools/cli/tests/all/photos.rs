@@ -142,7 +142,7 @@ fn each_kind_of_photo_gives_its_depth_and_becomes_a_hologram() {
     for (name, bytes, range) in kinds {
         let path = folder.path(name);
         fs::write(&path, &bytes).unwrap();
-        let read = photo::read(&path).unwrap();
+        let read = photo::read(&path, None).unwrap();
         assert_eq!((read.range, read.range_m), (range, Some((0.5, 4.0))), "{name}");
         let known = depth();
         for (x, y, value) in known.enumerate_pixels() {
@@ -179,12 +179,12 @@ fn a_photo_and_its_depth_are_turned_upright_together() {
     let bytes = jpeg(&[app1(&exif), app1(&gdepth(&format!(r#"GDepth:Data="{data}""#)))]);
     let folder = Folder::new();
     fs::write(folder.path("p.jpg"), bytes).unwrap();
-    let read = photo::read(&folder.path("p.jpg")).unwrap();
-    assert_eq!(read.rgb.dim(), (3, WIDTH as usize, HEIGHT as usize));
+    let read = photo::read(&folder.path("p.jpg"), None).unwrap();
+    assert_eq!(read.colours.rgb.dim(), (3, WIDTH as usize, HEIGHT as usize));
     assert_eq!(read.depth.dim(), (WIDTH as usize / 2, HEIGHT as usize / 2));
     // The left side of the stored photo is now the top: near, and blue.
     assert!(read.depth[(2, 5)] < 0.2 && read.depth[(20, 5)] > 0.8);
-    assert!(read.rgb[(2, 5, 9)] > 0.7 && read.rgb[(2, 40, 9)] < 0.3);
+    assert!(read.colours.rgb[(2, 5, 9)] > 0.7 && read.colours.rgb[(2, 40, 9)] < 0.3);
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use crate::fingerprint::Fingerprint;
 use crate::frame::{self, DepthOptions, Doubt, Stored};
+use crate::picture;
 use crate::{Error, Result};
 use ndarray::Array2;
 use phasefront::Size;
-use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane, RgbEncoding};
 use phasefront_core::depth::{self, DepthUnit};
 use std::io::Read;
 use std::path::Path;
@@ -15,6 +16,7 @@ use std::path::Path;
 pub struct VideoFrame {
     colour: Vec<u8>,
     colour_size: Size,
+    encoding: RgbEncoding,
     depth: Option<VideoDepth>,
 }
 
@@ -49,6 +51,9 @@ impl VideoFrame {
     pub fn fingerprint(&self, hasher: &mut Fingerprint) {
         hasher.numbers(&[self.colour_size.height, self.colour_size.width]);
         hasher.bytes(&self.colour);
+        if self.encoding != RgbEncoding::Amplitude {
+            hasher.bytes(self.encoding.name().as_bytes());
+        }
         if let Some(VideoDepth { bytes, size, format }) = &self.depth {
             hasher.numbers(&[size.height, size.width]);
             hasher.bytes(format!("{format:?}").as_bytes());
@@ -64,6 +69,7 @@ impl VideoFrame {
         VideoFrame {
             colour,
             colour_size,
+            encoding: RgbEncoding::Amplitude,
             depth: Some(VideoDepth {
                 bytes,
                 size: depth_size,
@@ -93,6 +99,7 @@ impl VideoFrame {
         Ok(VideoFrame {
             colour,
             colour_size: Size { width: side, height },
+            encoding: RgbEncoding::Amplitude,
             depth: Some(VideoDepth {
                 bytes: depth.flat_map(u16::to_le_bytes).collect(),
                 size: Size { width: side, height },
@@ -106,8 +113,14 @@ impl VideoFrame {
         VideoFrame {
             colour,
             colour_size,
+            encoding: RgbEncoding::Amplitude,
             depth: None,
         }
+    }
+
+    /// Sets the meaning of the colours, which are amplitudes without it.
+    pub fn with_encoding(self, encoding: RgbEncoding) -> Self {
+        VideoFrame { encoding, ..self }
     }
 
     /// Swaps near and far.
@@ -168,7 +181,7 @@ impl VideoFrame {
     pub fn camera_frame(&self, timestamp_ns: u64) -> Result<CameraFrame<'_>> {
         let width = self.colour_size.width;
         let plane = Plane::new(&self.colour, 3 * width, 3);
-        let colour = ColourImage::new(ColourFormat::Rgb, self.colour_size, &[plane])?;
+        let colour = ColourImage::new(ColourFormat::Rgb, self.colour_size, &[plane])?.with_encoding(self.encoding);
         let Some(depth) = &self.depth else {
             return Ok(CameraFrame::without_depth(timestamp_ns, colour));
         };
@@ -180,34 +193,32 @@ impl VideoFrame {
     }
 }
 
-/// Reads the files of a frame, with the checks of a still ([`frame::read`]). `told` takes what is doubtful about them.
+/// Reads the files of a frame, colour and depth, with the checks of a still ([`frame::read`]). The colours mean `asked`
+/// or what the file says. `told` takes what is doubtful about them.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read, if the files do not match, or if a pixel has no normalized depth.
 pub fn read_frame(
-    colour: &Path,
-    depth: &Path,
+    paths: [&Path; 2],
     options: DepthOptions,
+    asked: Option<RgbEncoding>,
     told: &mut dyn FnMut(Doubt),
 ) -> Result<VideoFrame> {
-    let Stored { image, readings } = frame::stored(colour, depth, options, told)?;
-    let colour_size = Size {
-        width: image.width() as usize,
-        height: image.height() as usize,
-    };
+    let Stored { colours, readings } = frame::stored(paths, options, asked, told)?;
     let unit = options.unit;
     if unit == DepthUnit::Normalized
         && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d))
     {
         return Err(Error::file(
-            depth,
+            paths[1],
             format!("holds {bad}; normalized depth of video must lie in 0..=1"),
         ));
     }
     let (format, bytes) = depth_bytes(&readings, unit);
     Ok(VideoFrame {
-        colour: image.into_rgb8().into_raw(),
-        colour_size,
+        colour: picture::amplitude_bytes(colours.rgb.view()),
+        colour_size: colours.size(),
+        encoding: colours.encoding,
         depth: Some(VideoDepth {
             bytes,
             size: Size::from_shape(readings.dim()),
@@ -289,6 +300,7 @@ impl RawVideo {
         Ok(Some(VideoFrame {
             colour,
             colour_size: self.colour,
+            encoding: RgbEncoding::Amplitude,
             depth: Some(VideoDepth {
                 bytes,
                 size: self.depth,

@@ -6,6 +6,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::imageops::{self, FilterType};
 use image::{Delay, DynamicImage, Frame, RgbImage};
 use ndarray::ArrayView3;
+use phasefront_core::view::colours::ViewColours;
 use std::io::Write;
 use std::path::Path;
 
@@ -16,10 +17,18 @@ const FRAME_MS: u32 = 100;
 /// The longest side of a WebP, in pixels.
 const WEBP_SIDE: u32 = 16383;
 
-/// Converts amplitudes, (C, H, W), to a picture. Values above 1 are clipped, and one laser's are grey.
-pub fn of_amplitude(amplitude: ArrayView3<'_, f32>) -> RgbImage {
-    let (_, height, width) = amplitude.dim();
-    RgbImage::from_raw(width as u32, height as u32, picture::amplitude_bytes(amplitude)).expect("three bytes a pixel")
+/// Converts the amplitudes of a view, (C, H, W), to a picture by `colours`. Light above full light is clipped, and one
+/// laser's is grey.
+pub fn of_view(amplitude: ArrayView3<'_, f32>, colours: &ViewColours) -> RgbImage {
+    let (lasers, height, width) = amplitude.dim();
+    let (columns, rows) = (width as u32, height as u32);
+    if *colours == ViewColours::Amplitude {
+        return RgbImage::from_raw(columns, rows, picture::amplitude_bytes(amplitude)).expect("three bytes a pixel");
+    }
+    RgbImage::from_fn(columns, rows, |x, y| {
+        let at = [0, 1, 2].map(|laser| amplitude[(laser.min(lasers - 1), y as usize, x as usize)]);
+        image::Rgb(colours.bytes(&at[..lasers]))
+    })
 }
 
 /// Scales `picture` down to a width of `width` pixels and keeps its aspect ratio. A narrower picture stays unchanged.

@@ -9,10 +9,12 @@
 
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PHOTO};
-use crate::{Error, Result, picture};
+use crate::picture::colours::{self, Colours};
+use crate::{Error, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
-use ndarray::{Array2, Array3};
+use ndarray::Array2;
+use phasefront::input::RgbEncoding;
 use roxmltree::{Document, Node};
 use std::path::Path;
 
@@ -44,8 +46,8 @@ pub enum Range {
 /// A photo with depth, upright.
 #[derive(Debug, Clone)]
 pub struct Photo {
-    /// The amplitudes, (3, H, W) in 0..=1.
-    pub rgb: Array3<f32>,
+    /// The colours, (3, H, W), and their meaning.
+    pub colours: Colours,
     /// The depth d_n, (h, w) in 0..=1: 0 is near and 1 is far. It covers the same field of view as the photo,
     /// stretched.
     pub depth: Array2<f32>,
@@ -69,16 +71,16 @@ impl Photo {
     }
 }
 
-/// Reads a photo with embedded depth.
+/// Reads a photo with embedded depth. Its colours mean `asked` or what the file says.
 ///
 /// # Errors
 /// Returns an error with advice if the file is missing or broken or has no supported depth.
-pub fn read(path: &Path) -> Result<Photo> {
+pub fn read(path: &Path, asked: Option<RgbEncoding>) -> Result<Photo> {
     let bytes = input::bytes(path, MOST_PHOTO)?;
-    of_bytes(&bytes).map_err(|why| Error::file(path, why))
+    of_bytes(&bytes, &path.display().to_string(), asked).map_err(|why| Error::file(path, why))
 }
 
-fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
+fn of_bytes(bytes: &[u8], name: &str, asked: Option<RgbEncoding>) -> std::result::Result<Photo, String> {
     if let Some(why) = decode::unread_container(bytes) {
         return Err(why.into());
     }
@@ -99,7 +101,7 @@ fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
     let (w, h) = (grey.width() as usize, grey.height() as usize);
     let grey = grey.into_raw().into_iter().map(|v| f32::from(v) / 65535.0);
     Ok(Photo {
-        rgb: picture::amplitudes(colour),
+        colours: colours::of_bytes(colour, bytes, name, asked)?,
         depth: Array2::from_shape_vec((h, w), grey.collect()).map_err(|e| e.to_string())?,
         range: found.range,
         range_m: found.range_m,

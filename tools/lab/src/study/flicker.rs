@@ -5,7 +5,7 @@ use crate::scene;
 use crate::sensor::coarse::{Coarse, Sampling};
 use crate::sensor::{FAR_M, Images, NEAR_M, Reading, Sensor, colour_bytes};
 use phasefront::Size;
-use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthRange, Plane};
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthRange, Plane, RgbEncoding};
 use phasefront::output::Layout;
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
 use phasefront_exact::truth::{visible_depth, visible_rgb};
@@ -183,6 +183,7 @@ pub fn study(
             for (frame, images) in standing.readings.iter().enumerate() {
                 let colour = Plane::new(&standing.rgb, 3 * width, 3);
                 let colour = ColourImage::new(ColourFormat::Rgb, standing.size, &[colour])?;
+                let colour = colour.with_encoding(RgbEncoding::Amplitude);
                 let timestamp = (1 + frame as u64) * 1_000_000_000 / RATE_HZ;
                 let hologram = process(&CameraFrame::new(timestamp, colour, images.depth()?))?;
                 let (height, width) = (height / 2, width / 2);

@@ -415,6 +415,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
         );
         let info = HologramInfo {
             calibrated: Vec::new(),
+            srgb_of_light: None,
             display: display.clone(),
             encoder: Some(shown.name.clone()),
             scale: Some(modulation.scale),

@@ -151,6 +151,7 @@ impl Sink {
         let shape = (hologram.colours(), height, width);
         let info = HologramInfo {
             scale: Some(hologram.scale()),
+            srgb_of_light: HologramInfo::light_rows(&hologram.view_colours(), hologram.colours()),
             ..self.info.clone()
         };
         let path = self.phase(folder, index);

@@ -3,6 +3,7 @@
 use super::Video;
 use indicatif::ProgressBar;
 use phasefront::Size;
+use phasefront::input::RgbEncoding;
 use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{progress_bar, progress_count};
 use phasefront_core::depth::DepthUnit;
@@ -37,7 +38,11 @@ pub(super) struct Source {
 enum Input {
     Folder(Folder),
     Film(Box<FilmSource>),
-    Pipe { raw: RawVideo, first: Option<Read> },
+    Pipe {
+        raw: RawVideo,
+        encoding: RgbEncoding,
+        first: Option<Read>,
+    },
 }
 
 /// A frame, and what is doubtful about it.
@@ -64,6 +69,7 @@ impl Read {
 struct Folder {
     paths: Vec<(PathBuf, PathBuf)>,
     depth: DepthOptions,
+    asked: Option<RgbEncoding>,
     /// The frames that were read, if they are shown again.
     kept: Vec<Read>,
     next: usize,
@@ -75,6 +81,7 @@ struct FilmSource {
     colour: Film,
     depth: FilmDepth,
     numbers: DepthOptions,
+    encoding: RgbEncoding,
     first: Option<Read>,
     about: Option<About>,
 }
@@ -211,9 +218,9 @@ impl Input {
 
     fn next(&mut self) -> Result<Option<Read>> {
         match self {
-            Input::Pipe { raw, first } => match first.take() {
+            Input::Pipe { raw, encoding, first } => match first.take() {
                 Some(read) => Ok(Some(read)),
-                None => read_raw(raw),
+                None => read_raw(raw, *encoding),
             },
             Input::Film(film) => film.next(),
             Input::Folder(folder) => folder.next(),
@@ -241,11 +248,13 @@ fn open_folder(flags: &mut Video) -> Result<(Input, Size)> {
     for folder in folders {
         output::reading(folder)?;
     }
-    let size = video::read_frame(&paths[0].0, &paths[0].1, depth, &mut |_| ())?.size();
+    let asked = flags.colours.asked();
+    let size = video::read_frame([&paths[0].0, &paths[0].1], depth, asked, &mut |_| ())?.size();
     let total = paths.len() * flags.repeat as usize;
     let folder = Folder {
         paths,
         depth,
+        asked,
         kept: Vec::new(),
         next: 0,
         total,
@@ -265,7 +274,8 @@ impl Folder {
         }
         let (colour, depth) = &self.paths[at];
         let mut doubts = Vec::new();
-        let mut frame = video::read_frame(colour, depth, self.depth, &mut |doubt| doubts.push(doubt))?;
+        let mut told = |doubt| doubts.push(doubt);
+        let mut frame = video::read_frame([colour, depth], self.depth, self.asked, &mut told)?;
         if self.depth.inverted {
             frame.invert().map_err(|e| Error::file(depth, e))?;
         }
@@ -303,16 +313,17 @@ fn open_pipe(flags: &Video, numbers: DepthOptions) -> Result<(Input, Size)> {
         depth: flags.raw_depth.unwrap_or(colour),
         unit: numbers.unit,
     };
-    let first = read_raw(&raw)?;
+    let encoding = flags.colours.viewed();
+    let first = read_raw(&raw, encoding)?;
     if first.is_none() {
         return Err(Error::Input("stdin holds no frame".into()));
     }
-    Ok((Input::Pipe { raw, first }, colour))
+    Ok((Input::Pipe { raw, encoding, first }, colour))
 }
 
-fn read_raw(raw: &RawVideo) -> Result<Option<Read>> {
+fn read_raw(raw: &RawVideo, encoding: RgbEncoding) -> Result<Option<Read>> {
     let frame = raw.read(&mut std::io::stdin().lock())?;
-    frame.map(|frame| Read::checked(frame, false)).transpose()
+    (frame.map(|frame| Read::checked(frame.with_encoding(encoding), false))).transpose()
 }
 
 fn open_film(flags: &Video, numbers: DepthOptions) -> Result<(Input, Size)> {
@@ -343,11 +354,16 @@ fn open_film(flags: &Video, numbers: DepthOptions) -> Result<(Input, Size)> {
         }
     };
     let about = film::about(path);
+    let said = about.map_or(RgbEncoding::Srgb, |about| about.encoding);
+    let is_mapped = about.is_some_and(|about| about.is_hdr());
+    let asked = (flags.colours.asked()).filter(|asked| !(is_mapped && asked.is_high_dynamic_range()));
+    let encoding = asked.unwrap_or(said);
     let mut film = FilmSource {
         path: path.clone(),
         colour: Film::open(path, Pixels::Rgb, about.as_ref())?,
         depth,
         numbers,
+        encoding,
         first: None,
         about,
     };
@@ -390,7 +406,7 @@ impl FilmSource {
             FilmDepth::Beside(sides) => VideoFrame::of_sides(colour.size, &colour.bytes, sides.side)?,
             FilmDepth::Network => VideoFrame::without_depth(colour.size, colour.bytes),
         };
-        let read = Read::checked(frame, self.numbers.inverted).map_err(|e| Error::file(&self.path, e))?;
-        Ok(Some(read))
+        let read = Read::checked(frame.with_encoding(self.encoding), self.numbers.inverted);
+        Ok(Some(read.map_err(|e| Error::file(&self.path, e))?))
     }
 }

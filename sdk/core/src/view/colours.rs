@@ -1,0 +1,108 @@
+//! The colours of a view on a screen: amplitudes of laser light become bytes of a picture.
+
+use crate::display::Display;
+use crate::frame::{RgbEncoding, light_to_srgb};
+use std::sync::LazyLock;
+
+/// How a view's amplitudes become a picture's red, green and blue.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ViewColours {
+    /// The amplitude is the value, as in pictures of [`RgbEncoding::Amplitude`].
+    Amplitude,
+    /// The light, the square of the amplitude, is shown in its own colour, in sRGB, by this matrix from the light of the
+    /// lasers to linear sRGB, row by row; one laser is white. What sRGB cannot show is clipped.
+    Srgb([[f32; 3]; 3]),
+}
+
+/// The number of intervals of [`CURVE`].
+const INTERVALS: usize = 1 << 12;
+
+/// The bytes of sRGB by the root of linear light.
+static CURVE: LazyLock<[u8; INTERVALS + 1]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let root = i as f32 / INTERVALS as f32;
+        (encoded(root * root) * 255.0).round() as u8
+    })
+});
+
+/// Returns the sRGB value of linear light in \[0, 1] (IEC 61966-2-1).
+fn encoded(light: f32) -> f32 {
+    if light <= 0.0031308 {
+        12.92 * light
+    } else {
+        1.055 * light.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+impl ViewColours {
+    /// Returns the colours of views of holograms on `display` of pictures of this `encoding`.
+    pub fn new(encoding: RgbEncoding, display: &Display) -> Self {
+        if encoding == RgbEncoding::Amplitude {
+            return ViewColours::Amplitude;
+        }
+        ViewColours::Srgb(light_to_srgb(display))
+    }
+
+    /// Returns the matrix from light to linear sRGB, row by row, or `None` for amplitudes.
+    pub fn matrix(&self) -> Option<[[f32; 3]; 3]> {
+        match self {
+            ViewColours::Amplitude => None,
+            ViewColours::Srgb(matrix) => Some(*matrix),
+        }
+    }
+
+    /// Returns the bytes red, green and blue for the amplitudes of three lasers, or of one.
+    pub fn bytes(&self, amplitude: &[f32]) -> [u8; 3] {
+        let laser = |c: usize| amplitude.get(c).copied();
+        match self {
+            ViewColours::Amplitude => {
+                let byte = |v: f32| (v * 255.0 + 0.5) as u8;
+                [0, 1, 2].map(|c| byte(laser(c).unwrap_or(amplitude[0])))
+            }
+            ViewColours::Srgb(matrix) => {
+                let light = [0, 1, 2].map(|c| laser(c).map_or(0.0, |a| a * a));
+                matrix.map(|row| {
+                    let linear = row[0] * light[0] + row[1] * light[1] + row[2] * light[2];
+                    CURVE[(linear.clamp(0.0, 1.0).sqrt() * INTERVALS as f32 + 0.5) as usize]
+                })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::frame::LightPlan;
+
+    /// Every grey and many colours of sRGB come back from the lasers' light.
+    #[test]
+    fn pictures_come_back() {
+        for (toml, colours) in [("", 3), ("powers = [1, 1, 1]", 3), ("wavelengths_nm = [532]", 1)] {
+            let display = Display::from_toml(toml).unwrap();
+            let plan = LightPlan::new(RgbEncoding::Srgb, &display).unwrap();
+            let view = ViewColours::new(RgbEncoding::Srgb, &display);
+            // Lasers of unequal power show the brightest D65, which is less than the white of all three.
+            for i in 0..=255u8 {
+                for colour in [[i; 3], [i, 200 - i / 2, 60 + i / 3]] {
+                    if colours == 1 && colour[0] != colour[1] {
+                        continue;
+                    }
+                    let mut amplitude = vec![0.0; colours];
+                    plan.convert(&colour.map(|v| f32::from(v) / 255.0), &mut amplitude);
+                    let bytes = view.bytes(&amplitude);
+                    let near = bytes.iter().zip(colour).all(|(a, b)| a.abs_diff(b) <= 1);
+                    assert!(near, "{toml}: {colour:?} {bytes:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn amplitudes_are_values() {
+        assert_eq!(ViewColours::Amplitude.bytes(&[0.0, 0.5, 1.2]), [0, 128, 255]);
+        assert_eq!(ViewColours::Amplitude.bytes(&[0.5]), [128; 3]);
+        assert_eq!(ViewColours::Amplitude.matrix(), None);
+    }
+}

@@ -1,0 +1,59 @@
+//! The flag for the meaning of a picture's colours.
+
+use crate::record::RunRecord;
+use clap::{Args, ValueEnum};
+use phasefront::input::RgbEncoding;
+
+/// The meaning of the colours of pictures and films.
+#[derive(Clone, Copy, Default, Args)]
+#[command(next_help_heading = "Input")]
+pub(crate) struct ColourFlags {
+    /// Meaning of the red, green and blue of pictures and films
+    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
+    rgb_encoding: EncodingName,
+}
+
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
+enum EncodingName {
+    /// What the file says of its colours by a profile or tags, else sRGB
+    Auto,
+    /// sRGB, and BT.709 video
+    Srgb,
+    /// Display P3, as phones take photographs
+    DisplayP3,
+    /// BT.2020 with hybrid log-gamma
+    Bt2020Hlg,
+    /// BT.2020 with perceptual quantization
+    Bt2020Pq,
+    /// Amplitudes of the lasers, as in the paper and its data sets
+    #[default]
+    Amplitude,
+}
+
+impl ColourFlags {
+    /// Colours that are amplitudes, as those of layered depth images.
+    pub(crate) const AMPLITUDE: ColourFlags = ColourFlags {
+        rgb_encoding: EncodingName::Amplitude,
+    };
+
+    /// Returns the encoding that is asked for, or `None` if files say it.
+    pub(crate) fn asked(self) -> Option<RgbEncoding> {
+        match self.rgb_encoding {
+            EncodingName::Auto => None,
+            EncodingName::Srgb => Some(RgbEncoding::Srgb),
+            EncodingName::DisplayP3 => Some(RgbEncoding::DisplayP3),
+            EncodingName::Bt2020Hlg => Some(RgbEncoding::Bt2020Hlg),
+            EncodingName::Bt2020Pq => Some(RgbEncoding::Bt2020Pq),
+            EncodingName::Amplitude => Some(RgbEncoding::Amplitude),
+        }
+    }
+
+    /// Returns an encoding whose views are those of the pictures: light in sRGB, or amplitudes.
+    pub(crate) fn viewed(self) -> RgbEncoding {
+        self.asked().unwrap_or(RgbEncoding::Srgb)
+    }
+
+    pub(crate) fn record(self, record: &mut RunRecord) {
+        record.choice("--rgb-encoding", Some(&self.rgb_encoding));
+    }
+}
