@@ -12,7 +12,14 @@ use std::sync::Arc;
 pub const DEEP: &str = PAIR.name;
 
 /// The names of the networks in the source tree's `models` folder that are not bundled.
-const FILES: [&str; 6] = ["ldi3-15", "natural-8", "rgbd-15-cylinder", "rgbd-15-wide", "rgbd-30", "seeded-8-80"];
+const FILES: [&str; 6] = [
+    "ldi3-15",
+    "natural-8",
+    "rgbd-15-cylinder",
+    "rgbd-15-wide",
+    "rgbd-30",
+    "seeded-8-80",
+];
 
 /// Returns the full name for `name`, which may be short.
 fn full_name(name: &str) -> String {
