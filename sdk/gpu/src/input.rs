@@ -238,8 +238,8 @@ mod tests {
     };
     use phasefront_core::method::network::Network;
 
-    /// Checks camera images of odd sizes, rotated, enlarged and reduced, in the number formats of float chains and in every
-    /// encoding.
+    /// Checks camera images of odd sizes, rotated, enlarged and reduced, in the number formats of float chains and in
+    /// every encoding.
     #[test]
     fn the_input_is_that_of_the_cpu() {
         let device = device();

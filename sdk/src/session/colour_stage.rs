@@ -10,8 +10,8 @@ use phasefront_core::runtime::error::Result;
 pub(super) struct ColourStage {
     display: Display,
     size: Size,
-    /// The encoded picture, (3, H, W), where its amplitudes do not serve: depth networks take pictures, and the edges of
-    /// depth are those of three colours even if the display has one laser.
+    /// The encoded picture, (3, H, W), where its amplitudes do not serve: depth networks take pictures, and the edges
+    /// of depth are those of three colours even if the display has one laser.
     picture: Vec<f32>,
     plans: Option<Plans>,
 }

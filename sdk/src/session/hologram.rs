@@ -381,8 +381,8 @@ impl Hologram {
 
     /// Writes the view of an eye focused at `z_m` into `bytes`, an image of the size `screen` in `layout`, Rgb,
     /// Rgba or Bgra, whose rows begin `row_stride` bytes apart. The pixels are sRGB; for a frame of
-    /// [`RgbEncoding::Amplitude`] they are amplitudes, where 255 is 1. The plan is kept for the next call with the same z and
-    /// size, on this or another result of the session.
+    /// [`RgbEncoding::Amplitude`] they are amplitudes, where 255 is 1. The plan is kept for the next call with the same
+    /// z and size, on this or another result of the session.
     ///
     /// # Errors
     /// Returns an error if the image is empty, has over 2²⁶ pixels or a side over 2¹⁴, has another layout or does not

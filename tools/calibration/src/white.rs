@@ -1,5 +1,5 @@
-//! The balance of three lasers: what their readings say of the display's white, and what the picture's colours are worth
-//! with and without it.
+//! The balance of three lasers: what their readings say of the display's white, and what the picture's colours are
+//! worth with and without it.
 
 use phasefront::input::RgbEncoding;
 use phasefront::target::Balance;

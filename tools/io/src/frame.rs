@@ -75,8 +75,8 @@ pub(crate) struct Stored {
     pub(crate) readings: Array2<f32>,
 }
 
-/// Reads the files of a still or of a frame of a video, colour and depth. The colours mean `asked` or what the file says.
-/// `told` takes what is doubtful about them.
+/// Reads the files of a still or of a frame of a video, colour and depth. The colours mean `asked` or what the file
+/// says. `told` takes what is doubtful about them.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or if the files do not match.

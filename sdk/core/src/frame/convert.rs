@@ -105,8 +105,8 @@ impl ColourPlan {
         })
     }
 
-    /// Returns this plan with colours converted to amplitudes by `light`, which is of three lasers. Without it, the plan
-    /// gives the encoded colours; those of [`super::RgbEncoding::Amplitude`] are the amplitudes.
+    /// Returns this plan with colours converted to amplitudes by `light`, which is of three lasers. Without it, the
+    /// plan gives the encoded colours; those of [`super::RgbEncoding::Amplitude`] are the amplitudes.
     pub fn with_light(self, light: Option<LightPlan>) -> Self {
         ColourPlan { light, ..self }
     }

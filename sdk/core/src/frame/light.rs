@@ -2,10 +2,10 @@
 //! [`super::reference::amplitudes`].
 //!
 //! A curve gives the light of each value, and a matrix the light of each laser: the picture's primaries and the lasers'
-//! meet in X, Y and Z, both with white D65. Light that the lasers cannot show lies outside 0..=1, and is brought in along
-//! the line to white, which keeps the hue: colours nearer to the edge of what the lasers show than the picture's most
-//! saturated colour lies beyond it are compressed, all others stay. The amplitude is the root of the light. One laser
-//! shows the luminance.
+//! meet in X, Y and Z, both with white D65. Light that the lasers cannot show lies outside 0..=1, and is brought in
+//! along the line to white, which keeps the hue: colours nearer to the edge of what the lasers show than the picture's
+//! most saturated colour lies beyond it are compressed, all others stay. The amplitude is the root of the light. One
+//! laser shows the luminance.
 
 use super::encoding::{Knee, RgbEncoding};
 use crate::display::Display;
@@ -201,8 +201,8 @@ impl LightConstants {
     }
 }
 
-/// Returns the matrix from linear colours of `encoding` to the light of three lasers. Lasers that mix no D65 get the red,
-/// green and blue of sRGB.
+/// Returns the matrix from linear colours of `encoding` to the light of three lasers. Lasers that mix no D65 get the
+/// red, green and blue of sRGB.
 pub(super) fn to_lasers(encoding: RgbEncoding, display: &Display) -> Matrix {
     let lasers = display.primaries().unwrap_or_else(|| RgbEncoding::Srgb.to_xyz());
     let from_xyz = inverse(&lasers).expect("three colours that mix white");
@@ -259,8 +259,8 @@ impl LightPlan {
         }
     }
 
-    /// Converts an encoded picture, (3, H, W) in \[0, 1], to amplitudes, (C, H, W), on the current thread pool. Does not
-    /// allocate.
+    /// Converts an encoded picture, (3, H, W) in \[0, 1], to amplitudes, (C, H, W), on the current thread pool. Does
+    /// not allocate.
     ///
     /// # Panics
     /// Panics if `amplitude` does not have C·H·W values for the display's C lasers.
@@ -368,8 +368,8 @@ fn mix(matrix: &[[f32; 3]; 3], gamut: &Gamut, [red, green, blue]: [&mut [f32]; 3
     });
 }
 
-/// Returns the matrix, row by row, from the light of the lasers of `display`, the squares of their amplitudes, to linear
-/// sRGB. One laser is white: its matrix has ones in its first column and zeros in the others.
+/// Returns the matrix, row by row, from the light of the lasers of `display`, the squares of their amplitudes, to
+/// linear sRGB. One laser is white: its matrix has ones in its first column and zeros in the others.
 pub fn light_to_srgb(display: &Display) -> [[f32; 3]; 3] {
     if display.colours() == 1 {
         return [[1.0, 0.0, 0.0]; 3];

@@ -9,8 +9,8 @@ use std::sync::LazyLock;
 pub enum ViewColours {
     /// The amplitude is the value, as in pictures of [`RgbEncoding::Amplitude`].
     Amplitude,
-    /// The light, the square of the amplitude, is shown in its own colour, in sRGB, by this matrix from the light of the
-    /// lasers to linear sRGB, row by row; one laser is white. What sRGB cannot show is clipped.
+    /// The light, the square of the amplitude, is shown in its own colour, in sRGB, by this matrix from the light of
+    /// the lasers to linear sRGB, row by row; one laser is white. What sRGB cannot show is clipped.
     Srgb([[f32; 3]; 3]),
 }
 

@@ -1,5 +1,5 @@
-//! Judges displayed colours by an independent model: levels in a file become light behind the aperture by this file's own
-//! Fourier optics, its colour by the standard observer, and the difference by CIEDE2000.
+//! Judges displayed colours by an independent model: levels in a file become light behind the aperture by this file's
+//! own Fourier optics, its colour by the standard observer, and the difference by CIEDE2000.
 use crate::folder::Folder;
 use crate::reference::fft2;
 use ndarray::{Array2, Array3};
@@ -445,7 +445,8 @@ const ADOBE_COLORANTS: [Colour; 3] = [
     [0.14919, 0.06322, 0.74457],
 ];
 
-/// Writes the patches, one pixel each, as a PNG of 16 bits whose values are `values` of each patch's X, Y, Z, with chunks.
+/// Writes the patches, one pixel each, as a PNG of 16 bits whose values are `values` of each patch's X, Y, Z, with
+/// chunks.
 fn write_png(path: &Path, values: impl Fn(Colour) -> Colour, profile: Option<Vec<u8>>, chunks: &[([u8; 4], Vec<u8>)]) {
     let patches = patches();
     let mut info = png::Info::with_size(patches.len() as u32, 1);

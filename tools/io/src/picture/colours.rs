@@ -52,8 +52,8 @@ enum Said {
     Profile(Box<ColorProfile>),
 }
 
-/// Reads the picture at `path`, upright, and its orientation. `asked` overrides what the file says of its colours; a file
-/// that says nothing is sRGB. Values of a profile other than sRGB's and Display P3's are converted to
+/// Reads the picture at `path`, upright, and its orientation. `asked` overrides what the file says of its colours; a
+/// file that says nothing is sRGB. Values of a profile other than sRGB's and Display P3's are converted to
 /// [`RgbEncoding::Bt2020`].
 ///
 /// # Errors
