@@ -31,21 +31,22 @@ def exported(folder: Path) -> dict[str, str]:
         while module is not None:
             path.insert(0, module["name"])
             module = inside.get(str(module["id"]))
-        found[use["source"]] = "::".join(path)
-        found[defined(folder, use["source"])] = "::".join(path)
+        for source in definitions(folder, use["source"]):
+            found[source] = "::".join(path)
     return found
 
 
-def defined(folder: Path, path: str) -> str:
-    """Returns the definition of an item that a crate's root re-exports from one of its modules or another crate."""
+def definitions(folder: Path, path: str) -> list[str]:
+    """Returns the paths of an item: `path`, and what the roots of crates re-export there, down to its definition."""
     crate, *rest = path.split("::")
     if len(rest) == 1:
         for item in json.loads((folder / f"{crate}.json").read_text())["index"].values():
             use = item["inner"].get("use")
             if use and use["name"] == rest[0]:
                 source = use["source"].removeprefix("crate::").removeprefix("self::")
-                return defined(folder, source) if source.startswith("phasefront_") else f"{crate}::{source}"
-    return path
+                next_path = source if source.startswith("phasefront_") else f"{crate}::{source}"
+                return [path, *definitions(folder, next_path)]
+    return [path]
 
 
 def main(folder: Path) -> int:
@@ -55,6 +56,8 @@ def main(folder: Path) -> int:
     lines = [line for line in (folder / "phasefront.txt").read_text().splitlines() if not line.startswith("pub use ")]
     for crate in ("phasefront_core", "phasefront_gpu", "phasefront_kernels"):
         for line in (folder / f"{crate}.txt").read_text().splitlines():
+            if line.startswith("pub use "):
+                continue
             # The subject of the line: the type of an implementation, or the first path.
             about = line.rsplit(" for ", 1)[-1] if line.startswith("impl") else line
             if re.match(rf"impl {crate}::", line) and " for " in line:
