@@ -4,6 +4,7 @@ use crate::networks::Precision;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use phasefront::Size;
+use phasefront::target::Balance;
 use phasefront::{Display, Encoding, Network, Sweep};
 use phasefront_io::display::{self, DisplayFile};
 use phasefront_io::output::Holding;
@@ -40,6 +41,28 @@ impl DisplayFlags {
     /// Returns the display's file or the modulator's name, if one is given.
     pub fn name(&self) -> Option<&str> {
         self.display.as_deref()
+    }
+
+    /// Reads the display for a command that shows a picture's own colours. Warns if the display is a modulator of the
+    /// catalogue, which says nothing of the white of three lasers.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Self::read`].
+    pub fn read_for_colours(&self) -> Result<DisplayFile> {
+        let file = self.read()?;
+        let display = &file.target.display;
+        let modulator = self.name().filter(|name| display::display_path(name).is_none());
+        let is_unknown = display.colours() == 3 && *display.balance() == Balance::Unknown;
+        if let Some(name) = modulator.filter(|_| is_unknown) {
+            let nm: Vec<_> = (display.wavelengths_m().iter())
+                .map(|l| format!("{:.0}", l * 1e9))
+                .collect();
+            log::warn!(
+                "{name} says nothing of your lasers: {} nm are taken, together as white as D65; wavelengths_nm and powers in a display's file give right colours, and `calibrate white` makes the line",
+                nm.join(", ")
+            );
+        }
+        Ok(file)
     }
 
     /// Reads the display for a command that supports only red, green and blue, and no offset.

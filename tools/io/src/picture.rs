@@ -2,6 +2,7 @@
 
 pub mod colours;
 pub mod depth_map;
+pub mod difference;
 pub mod export;
 pub mod photo;
 pub mod plot;

@@ -26,7 +26,7 @@ static CURVE: LazyLock<[u8; INTERVALS + 1]> = LazyLock::new(|| {
 });
 
 /// Returns the sRGB value of linear light in \[0, 1] (IEC 61966-2-1).
-fn encoded(light: f32) -> f32 {
+pub fn encoded(light: f32) -> f32 {
     if light <= 0.0031308 {
         12.92 * light
     } else {
@@ -51,21 +51,22 @@ impl ViewColours {
         }
     }
 
+    /// Returns the light in linear sRGB for the amplitudes of three lasers, or of one, or `None` if views are
+    /// amplitudes. What sRGB cannot show lies outside \[0, 1].
+    pub fn linear(&self, amplitude: &[f32]) -> Option<[f32; 3]> {
+        let matrix = self.matrix()?;
+        let light = [0, 1, 2].map(|laser| amplitude.get(laser).map_or(0.0, |a| a * a));
+        Some(matrix.map(|row| row[0] * light[0] + row[1] * light[1] + row[2] * light[2]))
+    }
+
     /// Returns the bytes red, green and blue for the amplitudes of three lasers, or of one.
     pub fn bytes(&self, amplitude: &[f32]) -> [u8; 3] {
-        let laser = |c: usize| amplitude.get(c).copied();
-        match self {
-            ViewColours::Amplitude => {
+        match self.linear(amplitude) {
+            None => {
                 let byte = |v: f32| (v * 255.0 + 0.5) as u8;
-                [0, 1, 2].map(|c| byte(laser(c).unwrap_or(amplitude[0])))
+                [0, 1, 2].map(|c| byte(*amplitude.get(c).unwrap_or(&amplitude[0])))
             }
-            ViewColours::Srgb(matrix) => {
-                let light = [0, 1, 2].map(|c| laser(c).map_or(0.0, |a| a * a));
-                matrix.map(|row| {
-                    let linear = row[0] * light[0] + row[1] * light[1] + row[2] * light[2];
-                    CURVE[(linear.clamp(0.0, 1.0).sqrt() * INTERVALS as f32 + 0.5) as usize]
-                })
-            }
+            Some(linear) => linear.map(|light| CURVE[(light.clamp(0.0, 1.0).sqrt() * INTERVALS as f32 + 0.5) as usize]),
         }
     }
 }

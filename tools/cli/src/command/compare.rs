@@ -1,14 +1,22 @@
-//! `phasefront compare`: measures PSNR and SSIM between the amplitudes of two images or holograms.
+//! `phasefront compare`: measures the difference of two images or holograms by PSNR, SSIM and CIEDE2000.
 
 use clap::Args;
 use ndarray::Array3;
 use phasefront_command::terminal;
 use phasefront_core::optics::metrics;
-use phasefront_io::{Error, Result, hologram, picture};
+use phasefront_core::view::colours::{ViewColours, encoded as encoded_srgb};
+use phasefront_io::picture::colours::{self, Colours};
+use phasefront_io::picture::difference;
+use phasefront_io::{Error, Result, hologram};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Compare two images or holograms: PSNR and SSIM of their amplitudes, per colour and overall
+/// Compare two images or holograms: PSNR and SSIM, per colour and overall, and CIEDE2000
+///
+/// Of two holograms, PSNR and SSIM are those of the displayed amplitudes, of two images, those of their values, in sRGB
+/// if their encodings differ. An image and a hologram are compared in sRGB, unless the hologram was made of amplitudes:
+/// then the image's values are taken for amplitudes too. CIEDE2000 is the mean difference of colours as eyes see them,
+/// for the mean light of squares of 8 pixels.
 #[derive(Args)]
 pub(crate) struct Compare {
     /// An image, or a hologram that is viewed at --z-mm
@@ -27,9 +35,11 @@ impl Compare {
                 "--z-mm is the focus of holograms; these are two images, leave it out".into(),
             ));
         }
-        let a = self.amplitude(&self.a)?;
-        let b = self.amplitude(&self.b)?;
-        let result = metrics::compare(a.view(), b.view()).map_err(|e| Error::file(&self.b, e))?;
+        let (a, b) = (self.seen(&self.a)?, self.seen(&self.b)?);
+        let (values_a, values_b) = values(&a, &b);
+        let result = metrics::compare(values_a.view(), values_b.view()).map_err(|e| Error::file(&self.b, e))?;
+        let light = a.linear_srgb().zip(b.linear_srgb());
+        let ciede2000 = light.map(|(a, b)| difference::of_pictures(a.view(), b.view()));
         let mut text = String::from("        PSNR dB    SSIM");
         let colours = ["red", "green", "blue"];
         let each = result.psnr.iter().zip(&result.ssim);
@@ -38,18 +48,67 @@ impl Compare {
             text += &format!("\n{colour:7} {psnr:7.2}  {ssim:6.4}");
         }
         text += &format!("\noverall {:7.2}  {:6.4}", result.psnr_overall, result.ssim_overall);
-        terminal::print(json, &json!(result), text);
+        let mut value = json!(result);
+        value["ciede2000"] = json!(ciede2000);
+        if let Some(ciede2000) = ciede2000 {
+            text += &format!("\nCIEDE2000 {ciede2000:5.2}");
+        }
+        terminal::print(json, &value, text);
         Ok(())
     }
 
-    fn amplitude(&self, path: &Path) -> Result<Array3<f32>> {
+    fn seen(&self, path: &Path) -> Result<Seen> {
         if hologram::is_hologram(path)? {
             let hologram = hologram::read_hologram(path)?;
             let mut views = hologram
                 .views(&[self.z_mm.unwrap_or(0.0) / 1e3])
                 .map_err(|e| Error::file(path, e))?;
-            return Ok(views.remove(0));
+            return Ok(Seen::View(views.remove(0), hologram.info().view_colours()));
         }
-        picture::read_rgb(path)
+        let (colours, _) = colours::read(path, None)?;
+        Ok(Seen::Picture(colours))
+    }
+}
+
+/// What is seen of an image or a hologram.
+enum Seen {
+    Picture(Colours),
+    /// The displayed amplitudes, (C, H, W), and how they become a picture.
+    View(Array3<f32>, ViewColours),
+}
+
+impl Seen {
+    /// Returns the light in linear sRGB, (3, H, W), if it is known.
+    fn linear_srgb(&self) -> Option<Array3<f32>> {
+        match self {
+            Seen::Picture(picture) => picture.linear_srgb(),
+            // The grey light of one laser has no picture's colours.
+            Seen::View(amplitude, _) if amplitude.dim().0 == 1 => None,
+            Seen::View(amplitude, colours) => difference::light_of_view(amplitude.view(), colours),
+        }
+    }
+
+    /// Returns the values of an image, and the amplitudes of a view.
+    fn stored(&self) -> Array3<f32> {
+        match self {
+            Seen::Picture(picture) => picture.rgb.clone(),
+            Seen::View(amplitude, _) => amplitude.clone(),
+        }
+    }
+}
+
+/// Returns the values by which `a` and `b` are compared.
+fn values(a: &Seen, b: &Seen) -> (Array3<f32>, Array3<f32>) {
+    let alike = match (a, b) {
+        (Seen::Picture(a), Seen::Picture(b)) => a.encoding == b.encoding,
+        (Seen::View(..), Seen::View(..)) => true,
+        _ => false,
+    };
+    match (a.linear_srgb(), b.linear_srgb()) {
+        (Some(a), Some(b)) if !alike => {
+            let encoded = |light: Array3<f32>| light.mapv_into(|v| encoded_srgb(v.clamp(0.0, 1.0)));
+            (encoded(a), encoded(b))
+        }
+        _ => (a.stored(), b.stored()),
     }
 }

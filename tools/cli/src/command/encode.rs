@@ -2,6 +2,7 @@
 
 use crate::flags::encoder::EncoderFlags;
 use crate::flags::outputs::OutputFlags;
+use crate::make::HologramResult;
 use crate::make::field::{self, Stage};
 use clap::Args;
 use ndarray::Array3;
@@ -11,8 +12,9 @@ use phasefront::{Brightness, EncoderOptions};
 use phasefront_command::flags::DisplayFlags;
 use phasefront_core::pipeline;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_io::display::DisplayFile;
-use phasefront_io::hologram;
+use phasefront_io::hologram::{self, HologramInfo};
 use phasefront_io::{Error, Result, output};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -65,7 +67,8 @@ impl Encode {
             name: "field",
             time: start.elapsed(),
         };
-        let is_at_modulator = self.z_mm.is_none() && self.is_of_the_modulator(&display)?;
+        let said = self.said(&display)?;
+        let is_at_modulator = self.z_mm.is_none() && said.is_some();
         let z_m = match is_at_modulator {
             true => target.display.offset_m(),
             false => self.z_mm.unwrap_or(0.0) / 1e3,
@@ -85,21 +88,23 @@ impl Encode {
             is_at_modulator,
             keeps_field: self.outputs.need_field(),
         };
-        self.outputs
-            .finish(&self.output, &display, &encoding.of(field, stage), None, json)
+        let made = HologramResult {
+            view_colours: said.map_or(ViewColours::Amplitude, |info| info.view_colours()),
+            ..encoding.of(field, stage)
+        };
+        self.outputs.finish(&self.output, &display, &made, None, json)
     }
 
-    /// Checks whether the field has a `.json` beside it, as `--complex` writes it, which says that it is at the
-    /// modulator.
-    fn is_of_the_modulator(&self, display: &DisplayFile) -> Result<bool> {
+    /// Returns what the `.json` beside the field says, as `--complex` writes it for a field at the modulator.
+    fn said(&self, display: &DisplayFile) -> Result<Option<HologramInfo>> {
         if !self.field.with_extension("json").is_file() {
-            return Ok(false);
+            return Ok(None);
         }
         let hologram = hologram::read_hologram(&self.field)?;
         hologram
             .check_display(display)
             .map_err(|e| Error::file(&self.field, e))?;
-        Ok(true)
+        Ok(Some(hologram.info().clone()))
     }
 }
 

@@ -15,11 +15,13 @@ use phasefront_command::flags::{DisplayFlags, EncoderName};
 use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_core::depth::sharpness;
+use phasefront_core::view::colours::ViewColours;
 use phasefront_exact::incoherent::{self, Natural, Pupil};
 use phasefront_exact::truth::{self, Figures};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{Hologram, HologramInfo};
 use phasefront_io::ldi::Ldi;
+use phasefront_io::picture::difference;
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
@@ -81,6 +83,8 @@ struct Row {
     encoder: String,
     figures: Figures,
     natural: Natural,
+    /// The mean CIEDE2000 of the view at the middle from that of the reference, unless pictures hold amplitudes.
+    ciede2000: Option<f64>,
     wave: Duration,
     encode: Duration,
     made: HologramResult,
@@ -91,7 +95,10 @@ impl Judge {
         if let Some(path) = &self.output {
             output::file(path, &["html"])?;
         }
-        let file = self.display.read()?;
+        let file = match self.ldi {
+            Some(_) => self.display.read()?,
+            None => self.frame.colours().display(&self.display)?,
+        };
         let display = &file.target.display;
         let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
         let (frame, depth_shown) = match &layers {
@@ -146,6 +153,7 @@ impl Judge {
                 encoder: made.encoder.describe(),
                 figures: truth::judge(&shown, &wanted, self.margin)?,
                 natural: natural.judge(&shown_naturally, self.margin)?,
+                ciede2000: colour_difference(&shown[0], &wanted[0], &made.view_colours),
                 wave: times[..times.len() - 1].iter().sum(),
                 encode: times[times.len() - 1],
                 made,
@@ -275,7 +283,7 @@ impl Row {
         json!({
             "method": self.method, "encoder": self.encoder, "psnr_db": self.figures.amplitude_psnr,
             "ssim": self.figures.amplitude_ssim, "stack_psnr_db": self.figures.focal_psnr,
-            "stack_ssim": self.figures.focal_ssim, "natural": self.natural, "brightness": self.figures.brightness,
+            "stack_ssim": self.figures.focal_ssim, "natural": self.natural, "ciede2000": self.ciede2000, "brightness": self.figures.brightness,
             "wave_ms": ms(self.wave), "encode_ms": ms(self.encode),
         })
     }
@@ -289,7 +297,7 @@ fn table(rows: &[Row], what: &str) -> String {
         .unwrap_or(0)
         .max(7);
     let mut text = format!(
-        "{:8}  {:wide$}  PSNR dB   SSIM  stack PSNR dB  stack SSIM  natural dB  in focus  out of focus  natural SSIM  brightness  wave ms  encode ms",
+        "{:8}  {:wide$}  PSNR dB   SSIM  stack PSNR dB  stack SSIM  natural dB  in focus  out of focus  natural SSIM  CIEDE2000  brightness  wave ms  encode ms",
         "method", "encoder"
     );
     for row in rows {
@@ -302,13 +310,14 @@ fn table(rows: &[Row], what: &str) -> String {
             ..
         } = row.figures;
         text += &format!(
-            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {:10.2}  {:>8}  {:>12}  {:12.3}  {brightness:10.3}  {:7.1}  {:9.1}",
+            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {:10.2}  {:>8}  {:>12}  {:12.3}  {:>9}  {brightness:10.3}  {:7.1}  {:9.1}",
             row.method,
             row.encoder,
             row.natural.psnr,
-            decibels(row.natural.in_focus_psnr),
-            decibels(row.natural.out_of_focus_psnr),
+            figure(row.natural.in_focus_psnr),
+            figure(row.natural.out_of_focus_psnr),
             row.natural.ssim,
+            figure(row.ciede2000),
             1e3 * row.wave.as_secs_f64(),
             1e3 * row.encode.as_secs_f64(),
         );
@@ -318,9 +327,15 @@ fn table(rows: &[Row], what: &str) -> String {
     )
 }
 
+/// Returns the mean CIEDE2000 of two views, (C, H, W), or `None` if views are amplitudes.
+fn colour_difference(shown: &Array3<f32>, wanted: &Array3<f32>, colours: &ViewColours) -> Option<f64> {
+    let light = |view: &Array3<f32>| difference::light_of_view(view.view(), colours);
+    Some(difference::of_pictures(light(shown)?.view(), light(wanted)?.view()))
+}
+
 /// Writes a figure that there may not be.
-fn decibels(psnr: Option<f64>) -> String {
-    psnr.map_or_else(|| "–".to_owned(), |psnr| format!("{psnr:.2}"))
+fn figure(figure: Option<f64>) -> String {
+    figure.map_or_else(|| "–".to_owned(), |figure| format!("{figure:.2}"))
 }
 
 /// Writes a page that shows the displayed images of each combination and the reference.
@@ -383,8 +398,8 @@ fn write_page(
                 format!(
                     "{:.2} dB, in focus {}, out of focus {}, SSIM {:.3}",
                     row.natural.psnr,
-                    decibels(row.natural.in_focus_psnr),
-                    decibels(row.natural.out_of_focus_psnr),
+                    figure(row.natural.in_focus_psnr),
+                    figure(row.natural.out_of_focus_psnr),
                     row.natural.ssim
                 ),
             ),

@@ -76,7 +76,7 @@ impl MultiplexCommand {
         if let Some(folder) = &self.output {
             output::folder(folder, self.overwrite.holding())?;
         }
-        let file = self.display.read()?;
+        let file = self.frame.colours().display(&self.display)?;
         let target = file.corrected()?;
         if target.display.bits() > 8 || target.panel.adds() {
             return Err(Error::Input(

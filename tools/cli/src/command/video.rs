@@ -203,7 +203,7 @@ impl Video {
         threads: Option<NonZeroUsize>,
         rate: f64,
     ) -> Result<(SessionOptions, HologramInfo)> {
-        let file = self.display.read()?;
+        let file = self.colours.display(&self.display)?;
         let modulator = &file.target.display;
         if self.size.is_none() {
             let Size { width, height } = modulator.size();

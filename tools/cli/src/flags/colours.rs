@@ -3,6 +3,9 @@
 use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
 use phasefront::input::RgbEncoding;
+use phasefront_command::flags::DisplayFlags;
+use phasefront_io::Result;
+use phasefront_io::display::DisplayFile;
 
 /// The meaning of the colours of pictures and films.
 #[derive(Clone, Copy, Default, Args)]
@@ -45,6 +48,14 @@ impl ColourFlags {
             EncodingName::Bt2020Hlg => Some(RgbEncoding::Bt2020Hlg),
             EncodingName::Bt2020Pq => Some(RgbEncoding::Bt2020Pq),
             EncodingName::Amplitude => Some(RgbEncoding::Amplitude),
+        }
+    }
+
+    /// Reads the display on which pictures of these colours are shown.
+    pub(crate) fn display(self, flags: &DisplayFlags) -> Result<DisplayFile> {
+        match self.rgb_encoding {
+            EncodingName::Amplitude => flags.read(),
+            _ => flags.read_for_colours(),
         }
     }
 

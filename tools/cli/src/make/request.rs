@@ -173,7 +173,10 @@ impl HologramRequest {
     }
 
     pub(crate) fn display(&self) -> Result<DisplayFile> {
-        self.display.read()
+        match self.ldi {
+            Some(_) => self.display.read(),
+            None => self.frame.colours().display(&self.display),
+        }
     }
 
     /// Returns the pictures of the folders, or `None` if the flags name no folders.

@@ -11,9 +11,12 @@ use moxcms::{
     Chromaticity, ColorPrimaries, ColorProfile, DataColorSpace, Layout, ToneReprCurve, TransformF32Executor,
     TransformOptions, XyY,
 };
-use ndarray::{Array3, ArrayView3};
-use phasefront::Size;
+use ndarray::{Array3, ArrayView3, Axis};
 use phasefront::input::RgbEncoding;
+use phasefront::target::Balance;
+use phasefront::{Display, Size};
+use phasefront_core::display::primaries::{inverse, product, times, transposed};
+use phasefront_core::frame::LightPlan;
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 use std::sync::Arc;
@@ -42,6 +45,31 @@ impl Colours {
     pub fn size(&self) -> Size {
         let (_, height, width) = self.rgb.dim();
         Size { width, height }
+    }
+
+    /// Returns the light in linear sRGB, (3, H, W), clipped to \[0, 1], or `None` if the values are amplitudes.
+    pub fn linear_srgb(&self) -> Option<Array3<f32>> {
+        // A screen of the picture's own primaries shows all its colours.
+        let rows = transposed(&self.encoding.to_xyz()).map(|row| row.map(|v| v.max(0.0)));
+        let primaries = Balance::Primaries(rows);
+        let screen = Display::default()
+            .with_balance(primaries)
+            .expect("a screen's primaries");
+        let plan = LightPlan::new(self.encoding, &screen)?;
+        let mut light = Array3::zeros(self.rgb.dim());
+        let rgb = self.rgb.as_standard_layout();
+        let values = rgb.as_slice().zip(light.as_slice_mut());
+        let (rgb, values) = values.expect("both are in standard layout");
+        plan.convert(rgb, values);
+        let from_xyz = inverse(&RgbEncoding::Srgb.to_xyz()).expect("three colours");
+        let matrix = product(&from_xyz, &self.encoding.to_xyz());
+        for mut pixel in light.lanes_mut(Axis(0)) {
+            let own = [0, 1, 2].map(|c| f64::from(pixel[c]).powi(2));
+            for (value, light) in pixel.iter_mut().zip(times(&matrix, own)) {
+                *value = light.clamp(0.0, 1.0) as f32;
+            }
+        }
+        Some(light)
     }
 }
 
@@ -287,7 +315,7 @@ fn in_wide(
 ) -> std::result::Result<Array3<f32>, String> {
     let conversion = Conversion::new(layout, profile, &wide())?;
     let mut wide = Array3::zeros(rgb.dim());
-    for (y, row) in rgb.axis_iter(ndarray::Axis(1)).enumerate() {
+    for (y, row) in rgb.axis_iter(Axis(1)).enumerate() {
         // A grey profile is of the one value that all three colours have.
         let values: Vec<f32> = row.t().iter().copied().step_by(3 / layout.channels()).collect();
         let values = conversion.convert(&values)?;
