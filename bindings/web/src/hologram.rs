@@ -1,9 +1,9 @@
 //! Results, which leave the module as copies, images into the memory of the page.
 
+#[cfg(not(target_feature = "atomics"))]
 use crate::error::error;
 use crate::error::{Answer, object, of_core, setting};
 use js_sys::{Array, Float32Array, Object, Uint8Array};
-#[cfg(not(target_feature = "atomics"))]
 use phasefront::Size;
 #[cfg(not(target_feature = "atomics"))]
 use phasefront::output::Levels;

@@ -1,8 +1,8 @@
 //! The options of a session.
 
+#[cfg(feature = "gpu")]
 use super::engine::GpuOptions;
 use super::quality::{self, Backend, Quality, QualityLevel};
-#[cfg(feature = "gpu")]
 use phasefront_core::Size;
 use phasefront_core::depth::stream::DepthOptions;
 #[cfg(feature = "tract")]
