@@ -58,8 +58,6 @@ pub(crate) struct MultiplexCommand {
     overwrite: OverwriteFlag,
 }
 
-/// The joint steps of natural focus.
-const JOINT_STEPS: usize = 10;
 /// The largest number of maps of natural focus, which are in memory together.
 const MOST_NATURAL: u16 = 24;
 
@@ -97,7 +95,7 @@ impl MultiplexCommand {
         // Joint steps follow after all maps.
         let options = EncoderOptions {
             focus_steps: 0,
-            ..encoder.options
+            ..encoder.options.clone()
         };
         let pipeline = Pipeline::new(frame.size(), method, &target, &options)?;
         let Size { width, height } = frame.size();
@@ -105,7 +103,7 @@ impl MultiplexCommand {
         let values = wave.as_slice_mut().expect("standard layout");
         pipeline.field(&frame, values, &mut pipeline.scratch())?;
         let plan = Multiplex::new(frame.size(), &target, &options)?;
-        let maps = match self.encoder.focus_steps(JOINT_STEPS)? {
+        let maps = match encoder.options.focus_steps {
             0 => {
                 let differ = Differ {
                     start: true,

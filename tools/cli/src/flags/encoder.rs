@@ -30,8 +30,7 @@ pub(crate) struct EncoderFlags {
     /// How what is out of focus looks [default: coherent]
     #[arg(long, value_enum, help_heading = "Method")]
     focus: Option<FocusName>,
-    /// Steps of --focus natural, 1 to 1000, each of two transforms a plane, colour and map [default: 30; 10 for
-    /// several maps]
+    /// Steps of --focus natural, 1 to 1000, each of two transforms a plane, colour and map [default: 30]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     focus_steps: Option<u16>,
 }
@@ -45,8 +44,8 @@ pub(crate) enum FocusName {
     Natural,
 }
 
-/// The steps of natural focus of a still.
-pub(crate) const FOCUS_STEPS: usize = 30;
+/// The default number of steps of natural focus.
+const FOCUS_STEPS: usize = 30;
 
 /// The options of an encoder, and its name.
 #[derive(Clone)]
@@ -99,8 +98,8 @@ impl EncoderFlags {
         self.focus == Some(FocusName::Natural)
     }
 
-    /// Returns the number of steps of natural focus, of which `default` are the default, or 0 for coherent focus.
-    pub(crate) fn focus_steps(&self, default: usize) -> Result<usize> {
+    /// Returns the number of steps of natural focus, or 0 for coherent focus.
+    fn focus_steps(&self) -> Result<usize> {
         check_used(&[(
             "--focus-steps",
             self.focus_steps.is_some(),
@@ -108,7 +107,7 @@ impl EncoderFlags {
             "--focus natural",
         )])?;
         Ok(match self.is_natural() {
-            true => self.focus_steps.map_or(default, usize::from),
+            true => self.focus_steps.map_or(FOCUS_STEPS, usize::from),
             false => 0,
         })
     }
@@ -141,7 +140,7 @@ impl EncoderFlags {
                 dark_threshold: self.dark_threshold.unwrap_or(default.dark_threshold),
                 local_steps: self.local_steps.unwrap_or(default.local_steps),
                 midpoint_steps: self.midpoint_steps,
-                focus_steps: self.focus_steps(FOCUS_STEPS)?,
+                focus_steps: self.focus_steps()?,
                 ..default
             },
             name: name.name(),
