@@ -138,7 +138,7 @@ async function fallsBack(options, why) {
   const found = await levels(session, 61, 47);
   const said = `${found.backend}: ${found.backendWhy}`;
   const same = found.all.every((level, i) => level === cpu.all[i]);
-  if (!same || !said.startsWith("cpu") || !said.includes(why) || said.includes("\n"))
+  if (!same || !said.startsWith("simd128: ") || !said.includes(why) || said.includes("\n"))
     throw new Error(`${why}: ${same} ${said}`);
   return said;
 }
