@@ -1,10 +1,11 @@
 //! Judges displayed colours by an independent model: levels in a file become light behind the aperture by this file's
 //! own Fourier optics, its colour by the standard observer, and the difference by CIEDE2000.
-use crate::folder::Folder;
+use crate::folder::{Folder, SMALL_HOLOGRAM};
 use crate::reference::fft2;
 use ndarray::{Array2, Array3};
 use num_complex::Complex64;
 use phasefront::input::RgbEncoding;
+use phasefront_calibration::white::CHECKER;
 use phasefront_io::film;
 use phasefront_io::picture::colours;
 use serde_json::Value;
@@ -16,34 +17,6 @@ use std::process::Command;
 
 type Colour = [f64; 3];
 type Matrix = [Colour; 3];
-
-/// The ColorChecker's patches in sRGB.
-const CHECKER: [[u8; 3]; 24] = [
-    [115, 82, 68],
-    [194, 150, 130],
-    [98, 122, 157],
-    [87, 108, 67],
-    [133, 128, 177],
-    [103, 189, 170],
-    [214, 126, 44],
-    [80, 91, 166],
-    [193, 90, 99],
-    [94, 60, 108],
-    [157, 188, 64],
-    [224, 163, 46],
-    [56, 61, 150],
-    [70, 148, 73],
-    [175, 54, 60],
-    [231, 199, 31],
-    [187, 86, 149],
-    [8, 133, 161],
-    [243, 243, 242],
-    [200, 200, 200],
-    [160, 160, 160],
-    [122, 122, 121],
-    [85, 85, 85],
-    [52, 52, 52],
-];
 
 /// sRGB's and BT.2020's light to X, Y, Z, from IEC 61966-2-1 and BT.2020; D65; as published.
 const SRGB: Matrix = [
@@ -632,18 +605,7 @@ fn an_unknown_white_is_told_once() {
     let folder = Folder::new();
     write_patches(&folder, &patches());
     let told = |more: &[&str]| {
-        let call = [
-            "hologram",
-            "--rgb",
-            "rgb.png",
-            "--depth",
-            "depth.png",
-            "--method",
-            "sweep",
-            "-o",
-            "h.png",
-        ];
-        let output = folder.run(&[&call[..], more].concat());
+        let output = folder.run(&[&SMALL_HOLOGRAM[..], &["-o", "h.png"], more].concat());
         assert!(output.status.success());
         String::from_utf8_lossy(&output.stderr)
             .matches("says nothing of your lasers")
@@ -662,18 +624,8 @@ fn judge_says_how_far_colours_are() {
     let folder = Folder::new();
     write_patches(&folder, &patches());
     for (encoding, has_colours) in [("auto", true), ("amplitude", false)] {
-        let call = [
-            "judge",
-            "--rgb",
-            "rgb.png",
-            "--depth",
-            "depth.png",
-            "--method",
-            "sweep",
-            "--planes",
-            "8",
-        ];
-        let said = folder.succeeds(&[&call[..], &["--json", "--rgb-encoding", encoding]].concat());
+        let flags = ["--json", "--rgb-encoding", encoding];
+        let said = folder.succeeds(&[&["judge"], &SMALL_HOLOGRAM[1..], &flags].concat());
         let said: Value = serde_json::from_str(&said).unwrap();
         for row in said["rows"].as_array().unwrap() {
             assert_eq!(
