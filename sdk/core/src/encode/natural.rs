@@ -51,7 +51,7 @@ const FLOOR: f32 = 1e-3;
 /// The largest number of steps.
 pub(super) const MAX_STEPS: usize = 1000;
 
-/// A plan for one shape and target. It is immutable and can be shared between threads.
+/// A plan for one size and target. It is immutable and can be shared between threads.
 pub struct NaturalSteps {
     size: Size,
     steps: usize,

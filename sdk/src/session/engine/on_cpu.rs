@@ -37,8 +37,8 @@ impl OnCpu {
     }
 
     fn plan(options: &SessionOptions, quality_level: &QualityLevel) -> Result<Pipeline> {
-        let (shape, method) = (quality_level.size, quality_level.method.clone());
-        Pipeline::new(shape, method, &options.target, quality_level.encoder(options))
+        let QualityLevel { size, method, .. } = quality_level;
+        Pipeline::new(*size, method.clone(), &options.target, quality_level.encoder(options))
     }
 
     pub(in crate::session) fn report(&self) -> BackendReport {
