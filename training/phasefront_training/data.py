@@ -31,6 +31,7 @@ from .sensor_depth import simulate_sensor_depth
 FORMAT = "phasefront-dataset-1"
 _HEADER = threading.Lock()
 SPLITS = ("train", "validation", "test")
+LEAST_SCENES = 40  # of a set with a scene for validation and one for tests, as `phasefront-lab dataset` divides them
 LARGEST_GAIN = 4  # of dark samples, whose colours have few levels
 
 
@@ -151,6 +152,8 @@ class Scenes:
         self.corrected = bool(manifest.table.get("aberration"))
         self.sensors = manifest.sensors
         numbers = list(manifest.indices(split))[:limit]
+        if not numbers:
+            raise DataError(f"{manifest.folder}: its {manifest.table['scenes']} scenes leave none for the split '{split}'; a set of {LEAST_SCENES} has one (--scenes {LEAST_SCENES})")
         present = [n for n in numbers if manifest.pair(n).exists()]
         if len(present) < len(numbers):
             print(f"{manifest.folder}: {len(numbers) - len(present)} of {len(numbers)} {split} pairs are not there", file=sys.stderr)

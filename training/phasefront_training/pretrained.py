@@ -4,14 +4,14 @@ from pathlib import Path
 
 from .export import ExportError, read_onnx
 
-MODELS = Path(__file__).resolve().parents[2] / "models"
+MODELS = Path(__file__).parent / "models"
 
 
 def from_pretrained(name, models=MODELS):
     """Returns (Chain, Display): a bundled network by its name, such as rgbd-15, in float32, and the display that it was
     trained for.
 
-    `models` is the folder of the .onnx files, by default that of the checkout. `data.network_input` makes the input of a
+    `models` is the folder of the .onnx files, by default that of this package. `data.network_input` makes the input of a
     scene, and `Chain.field` gives the field. Raises ExportError for another name.
     """
     file = Path(models) / f"{name}.onnx"

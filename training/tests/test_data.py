@@ -45,6 +45,13 @@ def test_damaged_shards_are_named_and_skipped(data_folder, tmp_path, capsys):
         Scenes(Manifest.read(folder), "train")
 
 
+def test_a_set_without_validation_says_how_many_scenes_have_one(data_folder):
+    manifest = Manifest.read(data_folder)
+    manifest.table.update(scenes=39, splits={"train": [0, 39], "validation": [39, 39], "test": [39, 39]})
+    with pytest.raises(data.DataError, match="39 scenes leave none for the split 'validation'; a set of 40 has one"):
+        Scenes(manifest, "validation")
+
+
 def test_pairs_of_too_few_layers_are_refused(data_folder):
     with pytest.raises(data.DataError, match="3 layers"):
         read_pair(Manifest.read(data_folder).pair(0), 5)

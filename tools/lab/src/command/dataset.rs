@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// the holograms correct it.
 #[derive(Args)]
 pub(crate) struct Dataset {
-    /// Pairs to make
+    /// Pairs to make; of each 40, one is for validation and one for tests
     #[arg(long, value_name = "N")]
     scenes: usize,
     /// Height and width of a scene, pixels
