@@ -777,6 +777,10 @@ const char *pf_last_error(void);
 // Returns the version of the library, such as "0.1.0". It is always valid.
 const char *pf_version(void);
 
+// Returns the third-party notices of the library as Markdown in UTF-8. An app must show them with its own notices. They are
+// always valid.
+const char *pf_third_party_notices(void);
+
 // Creates the target for a display in TOML, such as "width = 1920\npitch_um = 8.0", whose levels are equal steps of
 // phase. Missing keys have default values, so "" is the default display.
 enum PfStatus pf_target_from_toml(const char *toml, struct PfTarget **target);

@@ -51,7 +51,7 @@ pub use session::{
     pf_session_reset, pf_session_resume, pf_session_set_thermal, pf_session_statistics, pf_session_step_by_itself,
     pf_session_submit, pf_session_warm_up,
 };
-pub use status::{PfStatus, pf_last_error, pf_version};
+pub use status::{PfStatus, pf_last_error, pf_third_party_notices, pf_version};
 pub use target::{
     PfTarget, pf_target_free, pf_target_from_bytes, pf_target_from_file, pf_target_from_toml, pf_target_size,
     pf_target_with_look_up_table,

@@ -294,6 +294,7 @@ int main(void) {
         for (int c = 0; c < 3; c++) colour[3 * i + c] = (uint8_t)(i * (c + 3) % 256);
     }
     assert(strcmp(pf_version(), PHASEFRONT_VERSION) == 0);
+    assert(strncmp(pf_third_party_notices(), "# Third-party notices", 21) == 0);
     ok(pf_set_log_listener(PF_LOG_LEVEL_INFO, on_log, &logged));
     PfTarget *target = NULL;
     ok(pf_target_from_toml("width = 48\nheight = 36", &target));

@@ -67,6 +67,7 @@ from ._encode import Modulator, encode
 from ._frame import Frame
 from ._hologram import Hologram
 from ._metrics import Comparison, compare
+from ._notices import third_party_notices
 from ._session import Dropped, Event, Failed, Processed, QualityChanged, Session, send_log, send_stages, session_options
 from ._target import Target
 
@@ -79,7 +80,8 @@ __all__ = [
     "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "Rotation",
     "RunningMode", "Session", "SessionError", "SessionOptions", "SettingError", "Stage", "Statistics", "Target",
     "Thermal", "TimestampError", "YuvMatrix", "__version__", "built_in_pair", "compare", "display_from_toml", "encode",
-    "modulator_names", "send_log", "send_stages", "session_options", "version",
+    "modulator_names", "send_log", "send_stages", "session_options", "third_party_notices",
+    "version",
 ]  # fmt: skip
 
 #: The version of the library.

@@ -67,5 +67,8 @@ namespace Phasefront
     {
         /// <summary>The version of the library, for example "0.1.0".</summary>
         public static string Version => Text.Read(Native.pf_version());
+
+        /// <summary>The third-party notices of the library as Markdown. An app must show them with its own notices.</summary>
+        public static string ThirdPartyNotices => Text.Read(Native.pf_third_party_notices());
     }
 }

@@ -127,6 +127,7 @@ namespace Phasefront
         [UnmanagedFunctionPointer(C)] public delegate void OnClosed(IntPtr context);
 
         [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_version();
+        [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_third_party_notices();
         [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_last_error();
 
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_from_toml(byte[] toml, out IntPtr target);

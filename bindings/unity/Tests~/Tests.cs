@@ -30,6 +30,8 @@ internal static class Tests
             return 2;
         }
         Require(Library.Version == arguments[3], "version " + Library.Version);
+        var notices = Library.ThirdPartyNotices;
+        Require(notices.StartsWith("# Third-party notices") && notices.Contains("rustfft"), "the notices are not whole");
         Func<string, byte[]> left = name => File.ReadAllBytes(Path.Combine(arguments[2], name));
         Conformance(arguments[0], arguments[1], left("levels.bin"), left("seen.bin"));
         Mistakes();

@@ -1,6 +1,6 @@
 // Tests that the API refuses each fault with its kind and the start of its one-line message, and that later calls still
 // work.
-import { Frame, Modulator, Network, PhasefrontError, Session, Target, load, version } from "/phasefront/phasefront.js";
+import { Frame, Modulator, Network, PhasefrontError, Session, Target, load, thirdPartyNotices, version } from "/phasefront/phasefront.js";
 
 const bytes = (n) => new Uint8Array(n).fill(90);
 const colour = (width = 16, height = 12) => ({ width, height, data: bytes(4 * width * height) });
@@ -107,6 +107,8 @@ export async function run() {
   });
   deep.process(new Frame(colour(), depth()));
   const said = version();
+  const notices = await thirdPartyNotices();
+  if (!notices.startsWith("# Third-party notices")) throw new Error(`notices: ${notices.slice(0, 40)}`);
 
   // A request for too much memory ends the module cleanly: this call and every later one report it.
   const huge = { target: { width: 8192, height: 8192 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };

@@ -105,3 +105,16 @@ async function loaded(source: ModuleSource | Promise<ModuleSource> | undefined, 
 export function version(): string {
   return guard(rawVersion);
 }
+
+/**
+ * Reads the third-party notices of the module as Markdown from the folder of this file. An app must show them with its own
+ * notices.
+ *
+ * @throws PhasefrontError `session`: the file cannot be fetched.
+ */
+export async function thirdPartyNotices(): Promise<string> {
+  const file = new URL("./THIRD-PARTY.md", import.meta.url);
+  const answer = await fetch(file).catch(() => undefined);
+  if (!answer?.ok) throw new PhasefrontError("session", `the notices cannot be read: serve ${file.href} beside the module`);
+  return answer.text();
+}

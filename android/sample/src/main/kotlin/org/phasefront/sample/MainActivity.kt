@@ -50,8 +50,11 @@ class MainActivity : Activity(), Holograms.Screen, MainView.Actions {
 
         override fun onDisplayRemoved(id: Int) = showOnExternalScreen()
 
-        // Also a rotation by half a turn, which changes no configuration.
-        override fun onDisplayChanged(id: Int) = rotate()
+        // Also a rotation by half a turn, which changes no configuration, and a screen that stops or begins to mirror.
+        override fun onDisplayChanged(id: Int) {
+            rotate()
+            showOnExternalScreen()
+        }
     }
 
     override fun onCreate(saved: Bundle?) {

@@ -2,11 +2,18 @@ package org.phasefront.sample
 
 import android.Manifest
 import android.app.Application
+import android.graphics.ImageFormat
 import android.hardware.camera2.CameraCharacteristics
 import android.hardware.camera2.CameraManager
+import android.hardware.camera2.CameraMetadata
+import android.hardware.camera2.params.StreamConfiguration
+import android.hardware.display.DisplayManager
 import android.os.Bundle
 import android.os.PowerManager
 import android.provider.Settings
+import android.util.Size
+import android.util.SparseIntArray
+import android.view.Display
 import android.widget.Button
 import android.widget.SeekBar
 import com.google.ar.core.ArCoreApk.Availability
@@ -40,6 +47,10 @@ import org.robolectric.RuntimeEnvironment
 import org.robolectric.Shadows.shadowOf
 import org.robolectric.android.controller.ActivityController
 import org.robolectric.shadows.ShadowCameraCharacteristics
+import org.robolectric.shadows.ShadowDialog
+import org.robolectric.shadows.ShadowDisplayManager
+import org.robolectric.shadows.StreamConfigurationMapBuilder
+import org.robolectric.util.ReflectionHelpers
 
 /** A day in the app's life, on a phone with the stand-in of ARCore. docs/android.md has it as a table. */
 @RunWith(RobolectricTestRunner::class)
@@ -262,6 +273,44 @@ class DayTest {
         shows(CAMERA)
     }
 
+    /** A camera without BACKWARD_COMPATIBLE may give depth and nothing else. */
+    @Test
+    fun aCameraOfDepthAloneLeavesTheColourToArCore() {
+        val depthAlone = cameraOfDepth()
+        shadowOf(app.getSystemService(CameraManager::class.java)).addCamera("1", depthAlone)
+        assertNull(DepthCamera.of("1", depthAlone))
+        assertEquals(Size(640, 480), DepthCamera.of("2", cameraOfDepth(ImageFormat.YUV_420_888))?.depth)
+        launchWithCamera()
+    }
+
+    /** A camera of depth that also gives images of [formats]. */
+    private fun cameraOfDepth(vararg formats: Int): CameraCharacteristics {
+        val sizes = StreamConfigurationMapBuilder.newBuilder()
+        for (format in formats) sizes.addOutputSize(format, Size(640, 480))
+        // Robolectric's builder keeps depth's sizes where the framework does not look for them.
+        val depths = arrayOf(StreamConfiguration(Y16, 640, 480, false))
+        val map = sizes.build()
+        ReflectionHelpers.setField(map, "mDepthConfigurations", depths)
+        ReflectionHelpers.getField<SparseIntArray>(map, "mDepthOutputFormats").put(Y16, depths.size)
+        val camera = ShadowCameraCharacteristics.newCameraCharacteristics()
+        shadowOf(camera).set(CameraCharacteristics.LENS_FACING, CameraMetadata.LENS_FACING_BACK)
+        shadowOf(camera).set(CameraCharacteristics.SCALER_STREAM_CONFIGURATION_MAP, map)
+        return camera
+    }
+
+    @Test
+    fun aScreenIsPluggedInAndUnplugged() {
+        launchWithCamera()
+        val id = ShadowDisplayManager.addDisplay("w1920dp-h1080dp", Display.TYPE_EXTERNAL)
+        shadowOf(activity.getSystemService(DisplayManager::class.java).getDisplay(id)).setFlags(Display.FLAG_PRESENTATION)
+        wait("the levels on the screen") { shown()?.display?.displayId == id }
+        ShadowDisplayManager.removeDisplay(id)
+        wait("the end of the levels") { shown() == null }
+        shows(CAMERA)
+    }
+
+    private fun shown() = ShadowDialog.getShownDialogs().filterIsInstance<PhaseOutput>().firstOrNull { it.isShowing }
+
     @Test
     fun theAppWaitsWhileArCoreAsksItsServer() {
         Phone.availability = Availability.UNKNOWN_CHECKING
@@ -329,5 +378,8 @@ class DayTest {
 
     private companion object {
         const val CAMERA = "Camera with depth by ARCore"
+
+        /** The camera service's format of DEPTH16: HAL_PIXEL_FORMAT_Y16 of system/graphics.h. */
+        const val Y16 = 0x20363159
     }
 }
