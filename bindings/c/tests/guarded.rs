@@ -20,8 +20,10 @@ fn every_call_is_guarded() {
                 "brighten(options, ",
                 "with(session, ",
             ];
-            // These two read what is there.
-            let reads = ["pf_last_error", "pf_version", "pf_third_party_notices"].iter().any(|name| signature.contains(&format!("fn {name}(")));
+            // These read what is there.
+            let reads = ["pf_last_error", "pf_version", "pf_third_party_notices"]
+                .iter()
+                .any(|name| signature.contains(&format!("fn {name}(")));
             assert!(reads || guarded.iter().any(|by| body.contains(by)), "{signature}");
         }
     }
