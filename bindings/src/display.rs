@@ -1,6 +1,7 @@
 //! The display, in the units of its TOML form.
 
 use crate::error::{PhasefrontError, guard};
+use phasefront::target::Balance;
 
 /// A modulator, its lasers, and the display volume. It is checked when it is used.
 #[derive(Debug, Clone, PartialEq, uniffi::Record)]
@@ -39,6 +40,16 @@ pub struct Display {
     /// The radius of the aperture in the Fourier plane; 1 is the whole first order.
     #[uniffi(default = 1.0)]
     pub aperture_radius: f64,
+    /// The chromaticity x, y of the light of all lasers; none if it is not known. At most one of `white`, `powers` and
+    /// `primaries` may be given; without one, all lasers together are taken for D65.
+    #[uniffi(default = None)]
+    pub white: Option<Vec<f64>>,
+    /// The radiant powers of red, green and blue, on any scale.
+    #[uniffi(default = None)]
+    pub powers: Option<Vec<f64>>,
+    /// X, Y and Z of red, of green and of blue, 9 numbers on any scale.
+    #[uniffi(default = None)]
+    pub primaries: Option<Vec<f64>>,
 }
 
 /// Reads a display from its TOML form. Missing keys have default values.
@@ -60,6 +71,12 @@ impl From<phasefront::Display> for Display {
             // The defaults of the three.
             _ => ([638.0, 520.0, 450.0], nm.first().copied()),
         };
+        let (white, powers, primaries) = match display.balance() {
+            Balance::Unknown => (None, None, None),
+            Balance::White(white) => (Some(white.to_vec()), None, None),
+            Balance::Powers(powers) => (None, Some(powers.to_vec()), None),
+            Balance::Primaries(rows) => (None, None, Some(rows.concat())),
+        };
         Display {
             width: display.size().width,
             height: display.size().height,
@@ -72,6 +89,9 @@ impl From<phasefront::Display> for Display {
             offset_mm: round(display.offset_m() * 1e3),
             bits: display.bits() as usize,
             aperture_radius: display.aperture_radius(),
+            white,
+            powers,
+            primaries,
         }
     }
 }
@@ -92,6 +112,9 @@ impl TryFrom<&Display> for phasefront::Display {
             offset_mm,
             bits,
             aperture_radius,
+            white,
+            powers,
+            primaries,
         } = display;
         // The core reads displays only from TOML. `{:?}` writes floats so that they are read back the same, except for
         // the letter case of NaN.
@@ -99,11 +122,20 @@ impl TryFrom<&Display> for phasefront::Display {
             Some(laser_nm) => vec![laser_nm],
             None => vec![red_nm, green_nm, blue_nm],
         };
-        let toml = format!(
+        let mut toml = format!(
             "width = {width}\nheight = {height}\npitch_um = {pitch_um:?}\nwavelengths_nm = {wavelengths_nm:?}\n\
              volume_depth_mm = {volume_depth_mm:?}\noffset_mm = {offset_mm:?}\nbits = {bits}\n\
              aperture_radius = {aperture_radius:?}"
         );
+        for (key, numbers) in [("white", white), ("powers", powers)] {
+            if let Some(numbers) = numbers {
+                toml += &format!("\n{key} = {numbers:?}");
+            }
+        }
+        if let Some(numbers) = primaries {
+            let rows: Vec<_> = numbers.chunks(3).collect();
+            toml += &format!("\nprimaries = {rows:?}");
+        }
         Ok(phasefront::Display::from_toml(&toml.to_lowercase())?)
     }
 }
@@ -122,6 +154,15 @@ mod tests {
         assert_eq!(core, phasefront::Display::from_toml(text).unwrap());
         let defaults = display_from_toml(String::new()).unwrap();
         let one = display_from_toml("wavelengths_nm = [532]".into()).unwrap();
+        for balance in [
+            "white = [0.31, 0.33]",
+            "powers = [3.0, 2.5, 1.0]",
+            "primaries = [[0.5, 0.2, 0.0], [0.1, 0.7, 0.1], [0.3, 0.1, 1.8]]",
+        ] {
+            let display = display_from_toml(balance.into()).unwrap();
+            let core = phasefront::Display::try_from(&display).unwrap();
+            assert_eq!(core, phasefront::Display::from_toml(balance).unwrap());
+        }
         let laser_nm = Some(532.0);
         assert_eq!(one, Display { laser_nm, ..defaults });
         assert_eq!(phasefront::Display::try_from(&one).unwrap().colours(), 1);

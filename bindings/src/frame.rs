@@ -4,7 +4,7 @@ use crate::error::PhasefrontError;
 use phasefront::Size;
 use phasefront::input::{
     self, CameraFrame, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics, Orientation, Plane,
-    Rotation, YuvMatrix,
+    RgbEncoding, Rotation, YuvMatrix,
 };
 
 /// The memory layout of a colour image.
@@ -29,6 +29,27 @@ pub enum YuvMatrix {
     Bt601,
     /// ITU-R BT.709, for high definition.
     Bt709,
+}
+
+/// The meaning of a picture's red, green and blue.
+#[uniffi::remote(Enum)]
+#[non_exhaustive]
+pub enum RgbEncoding {
+    /// sRGB (IEC 61966-2-1), and BT.709 video, which screens show alike.
+    Srgb,
+    /// Display P3: the primaries of DCI-P3, white D65 and the curve of sRGB. Photographs and videos of phones.
+    DisplayP3,
+    /// BT.2020 of standard dynamic range, with the curve of sRGB.
+    Bt2020,
+    /// BT.2020 with hybrid log-gamma (BT.2100). Light above the reference white of 203 cd/m² is brought below full
+    /// light.
+    Bt2020Hlg,
+    /// BT.2020 with perceptual quantization (BT.2100, SMPTE ST 2084). As for hybrid log-gamma, light above the
+    /// reference white is brought below full light.
+    Bt2020Pq,
+    /// Amplitudes of the lasers themselves: the value is the amplitude, its square is the light. This is the convention
+    /// of the paper, its data sets and its networks' training.
+    Amplitude,
 }
 
 /// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
@@ -118,6 +139,8 @@ pub struct ColourInfo {
     pub matrix: YuvMatrix,
     /// Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
     pub video_range: bool,
+    /// The meaning of red, green and blue.
+    pub encoding: RgbEncoding,
 }
 
 /// The format and size of a depth image.
@@ -249,6 +272,7 @@ impl FrameInfo {
             },
             &planes,
         )?;
+        let colour = colour.with_encoding(self.colour.encoding);
 
         let mut frame = CameraFrame::without_depth(timestamp_ns, colour);
         if let Some(info) = &self.depth {

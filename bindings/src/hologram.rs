@@ -6,6 +6,7 @@ use crate::statistics::FrameTimes;
 use crate::target::Target;
 use num_complex::Complex32;
 use phasefront::Size;
+use phasefront::input::RgbEncoding;
 use phasefront::output::{self, Layout, Output, Placement};
 use phasefront::session;
 use std::sync::Arc;
@@ -91,6 +92,8 @@ pub struct HologramInfo {
     pub quality_level: usize,
     /// The time that each stage took.
     pub times: FrameTimes,
+    /// The meaning of the frame's colours. Views are in sRGB unless these are amplitudes, as which views show them.
+    pub encoding: RgbEncoding,
 }
 
 impl RawHologram {
@@ -153,7 +156,7 @@ impl RawHologram {
                 height: info.height,
             };
             let core = session::Hologram::from_levels(levels, size, info.scale, &target.core)?;
-            Ok(RawHologram::new(core))
+            Ok(RawHologram::new(core.with_encoding(info.encoding)))
         })
     }
 
@@ -172,7 +175,20 @@ impl RawHologram {
             valid_depth: self.core.valid_depth(),
             quality_level: self.core.quality_level(),
             times: self.core.times().into(),
+            encoding: self.core.encoding(),
         }
+    }
+
+    /// Returns the matrix from the lasers' light to linear sRGB, three rows of a number for each laser, which a
+    /// hologram's file holds; none if views are amplitudes.
+    pub fn srgb_of_light(&self) -> Option<Vec<f32>> {
+        let rows = self.core.view_colours().matrix()?;
+        Some(
+            rows.iter()
+                .flat_map(|row| &row[..self.core.colours()])
+                .copied()
+                .collect(),
+        )
     }
 
     /// Returns another handle to the same hologram. Each reader of its memory holds one.
@@ -200,7 +216,7 @@ impl RawHologram {
         self.core.z_at(x, y) * 1e3
     }
 
-    /// Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+    /// Writes the view of an eye focused at `z_mm` in sRGB, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
     ///
     /// # Errors
     /// Returns an error if the image is empty or does not fit, or z is too far away.

@@ -43,7 +43,9 @@ pub use options::{
 };
 #[cfg(feature = "tract")]
 pub use phasefront::input::ColourScale;
-pub use phasefront::input::{ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, Rotation, YuvMatrix};
+pub use phasefront::input::{
+    ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, RgbEncoding, Rotation, YuvMatrix,
+};
 pub use phasefront::output::{Layout, Placement};
 pub use phasefront::session::{Backend, Thermal};
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};

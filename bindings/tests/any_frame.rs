@@ -6,8 +6,8 @@
 
 use phasefront_ffi::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, Encoding, FrameInfo,
-    Intrinsics, Method, Orientation, PhasefrontError, PlaneInfo, Pose, RawSession, Rotation, RunningMode, Target,
-    YuvMatrix, display_from_toml, session_options,
+    Intrinsics, Method, Orientation, PhasefrontError, PlaneInfo, Pose, RawSession, RgbEncoding, Rotation, RunningMode,
+    Target, YuvMatrix, display_from_toml, session_options,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -152,6 +152,7 @@ fn frame(random: &mut Random, timestamp_ns: i64) -> (FrameInfo, [Vec<u8>; 5]) {
             planes,
             matrix: random.of(&[YuvMatrix::Bt601, YuvMatrix::Bt709]),
             video_range: random.often(0.5),
+            encoding: random.of(&RgbEncoding::ALL),
         },
         depth: Some(DepthInfo {
             format: depth_format,

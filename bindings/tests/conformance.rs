@@ -8,7 +8,8 @@
 use phasefront_ffi::{
     Brightness, ColourFormat, ColourInfo, ColourScale, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
     DepthNetwork, DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawPlanes,
-    RawSession, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml, session_options,
+    RawSession, RgbEncoding, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml,
+    session_options,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -138,6 +139,7 @@ fn info(frame: &Value) -> FrameInfo {
                 other => panic!("{other}"),
             },
             video_range: colour["video_range"].as_bool().unwrap(),
+            encoding: RgbEncoding::from_name(colour["encoding"].as_str().unwrap()).unwrap(),
         },
         depth: match depth {
             Value::Null => None,
@@ -415,7 +417,7 @@ mod write {
                 ],
                 other => panic!("{other}"),
             };
-            json!({"format": format, "width": width, "height": height, "matrix": matrix, "video_range": video_range, "planes": planes})
+            json!({"format": format, "width": width, "height": height, "matrix": matrix, "video_range": video_range, "encoding": "amplitude", "planes": planes})
         }
 
         fn depth(&mut self, format: &str, size: Size, t: f64) -> Value {
@@ -676,6 +678,27 @@ mod write {
             let mut depth = frames.depth(format, half, 0.0);
             depth["format"] = json!("metres-f32");
             one["frames"] = json!([still(colour, depth)]);
+            cases.push(one);
+        }
+
+        for (encoding, name, display) in [
+            ("srgb", "sRGB", display.clone()),
+            (
+                "display-p3",
+                "Display P3 on measured lasers",
+                format!("{display}powers = [4.0, 3.5, 2.0]\n"),
+            ),
+            ("bt2020-hlg", "hybrid log-gamma", display.clone()),
+            ("bt2020-pq", "perceptual quantization", display.clone()),
+            (
+                "srgb",
+                "sRGB on one laser",
+                format!("{display}wavelengths_nm = [532]\n"),
+            ),
+        ] {
+            let mut one = case(name, vec![cases[0]["frames"][0].clone()]);
+            one["display"] = json!(display);
+            one["frames"][0]["colour"]["encoding"] = json!(encoding);
             cases.push(one);
         }
 

@@ -386,6 +386,11 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_refocus(uint64_t ptr, doubl
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_share(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_SRGB_OF_LIGHT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_SRGB_OF_LIGHT
+RustBuffer uniffi_phasefront_ffi_fn_method_rawhologram_srgb_of_light(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_WRITE_OUTPUT
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_WRITE_OUTPUT
 void uniffi_phasefront_ffi_fn_method_rawhologram_write_output(uint64_t ptr, RustBuffer placement, int32_t image, RustBuffer to, RustCallStatus *_Nonnull out_status
@@ -1111,6 +1116,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_refocus(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_SHARE
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_SHARE
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_share(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_SRGB_OF_LIGHT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_SRGB_OF_LIGHT
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_srgb_of_light(void
     
 );
 #endif

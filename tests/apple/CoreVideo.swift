@@ -15,6 +15,12 @@ public let kCVPixelFormatType_DisparityFloat32: OSType = 0x6664_6973
 public let kCVPixelFormatType_DisparityFloat16: OSType = 0x6864_6973
 public let kCVImageBufferYCbCrMatrixKey: CFString = "CVImageBufferYCbCrMatrix"
 public let kCVImageBufferYCbCrMatrix_ITU_R_709_2: CFString = "ITU_R_709_2"
+public let kCVImageBufferColorPrimariesKey: CFString = "CVImageBufferColorPrimaries"
+public let kCVImageBufferColorPrimaries_P3_D65: CFString = "P3_D65"
+public let kCVImageBufferColorPrimaries_ITU_R_2020: CFString = "ITU_R_2020"
+public let kCVImageBufferTransferFunctionKey: CFString = "CVImageBufferTransferFunction"
+public let kCVImageBufferTransferFunction_ITU_R_2100_HLG: CFString = "ITU_R_2100_HLG"
+public let kCVImageBufferTransferFunction_SMPTE_ST_2084_PQ: CFString = "SMPTE_ST_2084_PQ"
 public let kCVPixelBufferPixelFormatTypeKey: CFString = "PixelFormatType"
 public let kCVPixelBufferWidthKey: CFString = "Width"
 public let kCVPixelBufferHeightKey: CFString = "Height"
@@ -33,6 +39,8 @@ public final class CVBuffer {
     /// The offset, the row stride and the height of each plane.
     let planes: [(offset: Int, rowStride: Int, height: Int)]
     let memory: UnsafeMutableRawBufferPointer
+    /// What the buffer says of its colours.
+    public var attachments: [CFString: CFTypeRef] = [:]
     private let lock = NSLock()
     private var locks = 0
 
@@ -96,8 +104,8 @@ public func CVPixelBufferUnlockBaseAddress(_ buffer: CVPixelBuffer, _: CVPixelBu
     return kCVReturnSuccess
 }
 public func CVBufferCopyAttachment(
-    _: CVBuffer, _: CFString, _: UnsafeMutablePointer<CVAttachmentMode>?
-) -> CFTypeRef? { nil }
+    _ buffer: CVBuffer, _ key: CFString, _: UnsafeMutablePointer<CVAttachmentMode>?
+) -> CFTypeRef? { buffer.attachments[key] }
 
 public final class CVPixelBufferPool {
     let width, height: Int

@@ -26,6 +26,7 @@ struct Day {
             ("heat changes the session's quality", heat),
             ("a warning of low memory releases the hologram", memory),
             ("a photo with depth is shown", photo),
+            ("buffers say what their colours mean", colours),
         ]
         for (name, play) in plays {
             StandInDevice.shared.change { $0 = .init() }
@@ -36,6 +37,26 @@ struct Day {
             }
             print("passed: \(name)")
         }
+    }
+}
+
+/// The attachments of buffers of cameras, photos and HDR video, and what each means.
+@MainActor
+private func colours() async throws {
+    let (p3, wide) = (kCVImageBufferColorPrimaries_P3_D65, kCVImageBufferColorPrimaries_ITU_R_2020)
+    let (hlg, pq) = (
+        kCVImageBufferTransferFunction_ITU_R_2100_HLG, kCVImageBufferTransferFunction_SMPTE_ST_2084_PQ
+    )
+    let said: [(String?, String?, RgbEncoding)] = [
+        (nil, nil, .srgb), ("ITU_R_709_2", "ITU_R_709_2", .srgb), (p3, "ITU_R_709_2", .displayP3), (wide, hlg, .bt2020Hlg),
+        (wide, pq, .bt2020Pq), (wide, "ITU_R_709_2", .bt2020),
+    ]
+    for (primaries, transfer, right) in said {
+        let buffer = CVBuffer(kCVPixelFormatType_420YpCbCr8BiPlanarFullRange, width: 64, height: 48)
+        buffer.attachments[kCVImageBufferColorPrimariesKey] = primaries
+        buffer.attachments[kCVImageBufferTransferFunctionKey] = transfer
+        let found = try withColourImage(buffer) { $0.encoding }
+        if found != right { fail("\(primaries ?? "none"), \(transfer ?? "none"): \(found)") }
     }
 }
 

@@ -109,6 +109,22 @@ typedef enum PfYuvMatrix {
   PF_YUV_MATRIX_BT709 = 1,
 } PfYuvMatrix;
 
+// The meaning of a picture's red, green and blue.
+typedef enum PfRgbEncoding {
+  // sRGB, and BT.709 video, which screens show alike.
+  PF_RGB_ENCODING_SRGB = 0,
+  // Display P3, as phones take photographs and videos.
+  PF_RGB_ENCODING_DISPLAY_P3 = 1,
+  // BT.2020 of standard dynamic range, with the curve of sRGB.
+  PF_RGB_ENCODING_BT2020 = 2,
+  // BT.2020 with hybrid log-gamma.
+  PF_RGB_ENCODING_BT2020_HLG = 3,
+  // BT.2020 with perceptual quantization.
+  PF_RGB_ENCODING_BT2020_PQ = 4,
+  // Amplitudes of the lasers, as in the paper and its data sets.
+  PF_RGB_ENCODING_AMPLITUDE = 5,
+} PfRgbEncoding;
+
 // The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
 // NaN, numbers of 1e9 or more, the largest code of an integer format and the largest finite 16-bit float mean no
 // reading.
@@ -499,6 +515,8 @@ typedef struct PfFrame {
   bool mirrored;
   // The cameras; NULL if depth and colour have the same field of view.
   const struct PfCameras *cameras;
+  // The meaning of the colours, a PfRgbEncoding.
+  uint32_t rgb_encoding;
 } PfFrame;
 
 // The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or
@@ -548,8 +566,8 @@ enum PfStatus pf_hologram_levels(const struct PfHologram *hologram,
 // Coordinates run from 0 to 1 from the upper left corner.
 enum PfStatus pf_hologram_z_at(const struct PfHologram *hologram, double x, double y, double *z_mm);
 
-// Writes the view of an eye focused at z into memory: an image of width x height pixels in `layout`, PF_LAYOUT_RGB,
-// PF_LAYOUT_RGBA or PF_LAYOUT_BGRA.
+// Writes the view of an eye focused at z, in sRGB, into memory: an image of width x height pixels in `layout`,
+// PF_LAYOUT_RGB, PF_LAYOUT_RGBA or PF_LAYOUT_BGRA.
 enum PfStatus pf_hologram_write_preview(const struct PfHologram *hologram,
                                         double z_mm,
                                         uint32_t width,

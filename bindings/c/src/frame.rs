@@ -4,7 +4,7 @@ use crate::pointer::{Extensible, bytes, pick, read};
 use crate::status::Result;
 use phasefront_ffi::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
-    Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
+    Orientation, PlaneInfo, Pose, RgbEncoding, Rotation, YuvMatrix,
 };
 
 /// The memory layout of a colour image.
@@ -42,6 +42,26 @@ pub enum PfYuvMatrix {
 }
 
 const YUV_MATRICES: [YuvMatrix; 2] = [YuvMatrix::Bt601, YuvMatrix::Bt709];
+
+/// The meaning of a picture's red, green and blue.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PfRgbEncoding {
+    /// sRGB, and BT.709 video, which screens show alike.
+    Srgb = 0,
+    /// Display P3, as phones take photographs and videos.
+    DisplayP3 = 1,
+    /// BT.2020 of standard dynamic range, with the curve of sRGB.
+    Bt2020 = 2,
+    /// BT.2020 with hybrid log-gamma.
+    Bt2020Hlg = 3,
+    /// BT.2020 with perceptual quantization.
+    Bt2020Pq = 4,
+    /// Amplitudes of the lasers, as in the paper and its data sets.
+    Amplitude = 5,
+}
+
+const RGB_ENCODINGS: [RgbEncoding; 6] = RgbEncoding::ALL;
 
 /// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
 /// NaN, numbers of 1e9 or more, the largest code of an integer format and the largest finite 16-bit float mean no
@@ -229,6 +249,8 @@ pub struct PfFrame {
     pub mirrored: bool,
     /// The cameras; NULL if depth and colour have the same field of view.
     pub cameras: *const PfCameras,
+    /// The meaning of the colours, a PfRgbEncoding.
+    pub rgb_encoding: u32,
 }
 
 // SAFETY: its first field is its size.
@@ -285,6 +307,7 @@ impl PfFrame {
                     planes: planes.map(PlaneInfo::from).collect(),
                     matrix: pick(&YUV_MATRICES, self.colour.matrix, "colour.matrix")?,
                     video_range: self.colour.video_range,
+                    encoding: pick(&RGB_ENCODINGS, self.rgb_encoding, "rgb_encoding")?,
                 },
                 depth,
                 confidence,
@@ -395,6 +418,19 @@ mod tests {
         ];
         of(&turns.map(|t| t as u32));
         same(&turns.each_ref().map(|t| t as _), &ROTATIONS.each_ref().map(|t| t as _));
+        let encodings = [
+            PfRgbEncoding::Srgb,
+            PfRgbEncoding::DisplayP3,
+            PfRgbEncoding::Bt2020,
+            PfRgbEncoding::Bt2020Hlg,
+            PfRgbEncoding::Bt2020Pq,
+            PfRgbEncoding::Amplitude,
+        ];
+        of(&encodings.map(|e| e as u32));
+        same(
+            &encodings.each_ref().map(|e| e as _),
+            &RGB_ENCODINGS.each_ref().map(|e| e as _),
+        );
         same(
             &[&PfYuvMatrix::Bt601, &PfYuvMatrix::Bt709],
             &YUV_MATRICES.each_ref().map(|m| m as _),

@@ -236,8 +236,8 @@ pub unsafe extern "C" fn pf_hologram_z_at(hologram: *const PfHologram, x: f64, y
     call(|| unsafe { give(z_mm, "z_mm", || Ok(read(hologram, "hologram")?.0.z_at(x, y))) })
 }
 
-/// Writes the view of an eye focused at z into memory: an image of width x height pixels in `layout`, PF_LAYOUT_RGB,
-/// PF_LAYOUT_RGBA or PF_LAYOUT_BGRA.
+/// Writes the view of an eye focused at z, in sRGB, into memory: an image of width x height pixels in `layout`,
+/// PF_LAYOUT_RGB, PF_LAYOUT_RGBA or PF_LAYOUT_BGRA.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_write_preview(
     hologram: *const PfHologram,

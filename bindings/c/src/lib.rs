@@ -20,7 +20,7 @@ mod target;
 
 pub use frame::{
     PfCameras, PfColour, PfColourFormat, PfConfidence, PfConfidenceFormat, PfDepth, PfDepthFormat, PfFrame,
-    PfIntrinsics, PfPlane, PfRotation, PfYuvMatrix,
+    PfIntrinsics, PfPlane, PfRgbEncoding, PfRotation, PfYuvMatrix,
 };
 pub use hologram::{
     PfFrameTimes, PfHologram, PfHologramInfo, PfLayout, PfMemory, PfOutputSize, PfPlacement, PfPlanes, PfPlanesInfo,

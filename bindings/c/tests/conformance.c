@@ -50,6 +50,7 @@ static uint32_t pick(const char *name, const char *const *names, uint32_t count)
 
 static const char *const COLOURS[] = {"rgba", "bgra", "rgb", "nv12", "yuv420"};
 static const char *const MATRICES[] = {"bt601", "bt709"};
+static const char *const ENCODINGS[] = {"srgb", "display-p3", "bt2020", "bt2020-hlg", "bt2020-pq", "amplitude"};
 static const char *const DEPTHS[] = {"metres-f32",      "metres-f16",      "disparity-f32", "disparity-f16",
                                      "millimetres-u16", "android-depth16", "normalized-u8", "normalized-u16",
                                      "relative-f32",    "relative-f16"};
@@ -73,7 +74,8 @@ static PfFrame frame_of(const cJSON *json, const uint8_t *memory) {
                                 .matrix = pick(text(colour, "matrix"), MATRICES, 2),
                                 .video_range = cJSON_IsTrue(of(colour, "video_range"))},
                      .rotation = (uint32_t)number(json, "rotation") / 90,
-                     .mirrored = cJSON_IsTrue(of(json, "mirrored"))};
+                     .mirrored = cJSON_IsTrue(of(json, "mirrored")),
+                     .rgb_encoding = pick(text(colour, "encoding"), ENCODINGS, 6)};
     int planes = cJSON_GetArraySize(of(colour, "planes"));
     for (int i = 0; i < planes; i++) frame.colour.planes[i] = plane(cJSON_GetArrayItem(of(colour, "planes"), i), memory);
     if (!is_null(json, "depth")) {

@@ -28,6 +28,24 @@ class YuvMatrix(enum.Enum):
     BT601 = 0
     BT709 = 1
 
+class RgbEncoding(enum.Enum):
+    """The meaning of a picture's red, green and blue.
+
+    Values:
+        SRGB: sRGB (IEC 61966-2-1), and BT.709 video, which screens show alike.
+        DISPLAY_P3: Display P3: the primaries of DCI-P3, white D65 and the curve of sRGB. Photographs and videos of phones.
+        BT2020: BT.2020 of standard dynamic range, with the curve of sRGB.
+        BT2020_HLG: BT.2020 with hybrid log-gamma (BT.2100). Light above the reference white of 203 cd/m² is brought below full light.
+        BT2020_PQ: BT.2020 with perceptual quantization (BT.2100, SMPTE ST 2084). As for hybrid log-gamma, light above the reference white is brought below full light.
+        AMPLITUDE: Amplitudes of the lasers themselves: the value is the amplitude, its square is the light. This is the convention of the paper, its data sets and its networks' training.
+    """
+    SRGB = 0
+    DISPLAY_P3 = 1
+    BT2020 = 2
+    BT2020_HLG = 3
+    BT2020_PQ = 4
+    AMPLITUDE = 5
+
 class ConfidenceFormat(enum.Enum):
     """The memory layout of a confidence map.
 
@@ -473,6 +491,7 @@ class ColourInfo:
         planes: The planes, in the format's order.
         matrix: The matrix of luma and chroma. Other formats ignore it.
         video_range: Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
+        encoding: The meaning of red, green and blue.
     """
     format: ColourFormat
     width: int
@@ -480,7 +499,8 @@ class ColourInfo:
     planes: list[PlaneInfo]
     matrix: YuvMatrix
     video_range: bool
-    def __init__(self, *, format: ColourFormat, width: int, height: int, planes: list[PlaneInfo], matrix: YuvMatrix, video_range: bool) -> None: ...
+    encoding: RgbEncoding
+    def __init__(self, *, format: ColourFormat, width: int, height: int, planes: list[PlaneInfo], matrix: YuvMatrix, video_range: bool, encoding: RgbEncoding) -> None: ...
 
 class ConfidenceInfo:
     """The format and size of a confidence map.
@@ -555,6 +575,9 @@ class Display:
         offset_mm: The z of the modulator relative to the middle of the volume, in mm, positive toward the viewer.
         bits: The number of bits of a modulator level.
         aperture_radius: The radius of the aperture in the Fourier plane; 1 is the whole first order.
+        white: The chromaticity x, y of the light of all lasers; none if it is not known. At most one of `white`, `powers` and `primaries` may be given; without one, all lasers together are taken for D65.
+        powers: The radiant powers of red, green and blue, on any scale.
+        primaries: X, Y and Z of red, of green and of blue, 9 numbers on any scale.
         wavelengths_nm: The wavelengths of the lasers, in nm: red, green and blue, or that of the only one. They replace the four fields of single wavelengths.
     """
     width: int
@@ -568,7 +591,10 @@ class Display:
     offset_mm: float
     bits: int
     aperture_radius: float
-    def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, laser_nm: float | None = ..., volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0, wavelengths_nm: list[float] | tuple[float, ...] | None = ...) -> None: ...
+    white: list[float] | None
+    powers: list[float] | None
+    primaries: list[float] | None
+    def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, laser_nm: float | None = ..., volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0, white: list[float] | None = ..., powers: list[float] | None = ..., primaries: list[float] | None = ..., wavelengths_nm: list[float] | tuple[float, ...] | None = ...) -> None: ...
     @property
     def wavelengths_nm(self) -> list[float]: ...
     @classmethod
@@ -673,6 +699,7 @@ class HologramInfo:
         valid_depth: The share of the depth sensor's pixels that had a usable reading.
         quality_level: The quality level of the hologram; 0 is the best.
         times: The time that each stage took.
+        encoding: The meaning of the frame's colours. Views are in sRGB unless these are amplitudes, as which views show them.
     """
     timestamp_ns: int
     width: int
@@ -684,7 +711,8 @@ class HologramInfo:
     valid_depth: float
     quality_level: int
     times: FrameTimes
-    def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, quality_level: int, times: FrameTimes) -> None: ...
+    encoding: RgbEncoding
+    def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, quality_level: int, times: FrameTimes, encoding: RgbEncoding) -> None: ...
 
 class OutputSize:
     """The images that a modulator's input takes of a hologram.
@@ -1030,6 +1058,10 @@ class RawHologram:
         """
     def share(self) -> RawHologram:
         """Returns another handle to the same hologram. Each reader of its memory holds one."""
+    def srgb_of_light(self) -> list[float] | None:
+        """Returns the matrix from the lasers' light to linear sRGB, three rows of a number for each laser, which a
+        hologram's file holds; none if views are amplitudes.
+        """
     def write_output(self, placement: Placement, image: int, to: RawMemory) -> None:
         """Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
         fewer bits than their place use its upper bits; `placement` positions the hologram.
@@ -1037,7 +1069,7 @@ class RawHologram:
         Errors: Returns an error if the layout does not have this image or the image does not fit.
         """
     def write_preview(self, z_mm: float, width: int, height: int, layout: Layout, to: RawMemory) -> None:
-        """Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+        """Writes the view of an eye focused at `z_mm` in sRGB, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
 
         Errors: Returns an error if the image is empty or does not fit, or z is too far away.
         """

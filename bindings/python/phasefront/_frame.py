@@ -8,7 +8,17 @@ import numpy
 from numpy.typing import ArrayLike
 
 from . import _ffi
-from ._ffi import Cameras, ColourFormat, ConfidenceFormat, DepthFormat, FrameError, Orientation, Rotation, YuvMatrix
+from ._ffi import (
+    Cameras,
+    ColourFormat,
+    ConfidenceFormat,
+    DepthFormat,
+    FrameError,
+    Orientation,
+    RgbEncoding,
+    Rotation,
+    YuvMatrix,
+)
 from ._memory import MOST_BYTES, NO_ARRAY, Memory, as_array
 from ._take import forbid_copies, shown, take
 
@@ -142,6 +152,7 @@ class FrameOptions(TypedDict, total=False):
     depth_format: DepthFormat | None
     orientation: Orientation | None
     cameras: Cameras | None
+    encoding: RgbEncoding
 
 
 def batch(what: str, values: ArrayLike) -> _Array:
@@ -171,6 +182,8 @@ class Frame:
         video_range: Whether luma spans 16 to 235 instead of 0 to 255. RGB formats ignore it.
         orientation: The rotation and mirroring that bring the sensor's image upright. By default it is upright.
         cameras: The colour camera and the depth camera, if they are apart.
+        encoding: The meaning of red, green and blue: `RgbEncoding.DISPLAY_P3` for photographs of phones, `AMPLITUDE` for
+            the amplitudes of the paper's data sets.
 
     Anything that NumPy reads in place will do for an array, such as a tensor of PyTorch or an object with DLPack.
 
@@ -192,6 +205,7 @@ class Frame:
         video_range: bool = False,
         orientation: Orientation | None = None,
         cameras: Cameras | None = None,
+        encoding: RgbEncoding = RgbEncoding.SRGB,
     ):
         colour_format = take("colour_format", colour_format, ColourFormat | None)
         depth_format = take("depth_format", depth_format, DepthFormat | None)
@@ -221,6 +235,7 @@ class Frame:
                 planes=[plane[1] for plane in planes],
                 matrix=take("matrix", matrix, YuvMatrix),
                 video_range=take("video_range", video_range, bool),
+                encoding=take("encoding", encoding, RgbEncoding),
             ),
             depth=depth_info,
             confidence=confidence_info,

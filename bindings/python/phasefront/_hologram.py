@@ -42,7 +42,7 @@ class Purpose:
         """Returns the purpose of holograms for `target` by `encoding`."""
         return cls(target, _encoder(encoding))
 
-    def told(self, scale: float, levels: NDArray[numpy.uint8]) -> str:
+    def told(self, scale: float, levels: NDArray[numpy.uint8], srgb_of_light: list[float] | None) -> str:
         """Returns the metadata of a hologram's file in the format of the command `phasefront`."""
         target = self.target
         display = target.display()
@@ -53,14 +53,18 @@ class Purpose:
             told["lut"] = list(target._table)
         if not isinstance(target, Target) or target._calibrated:
             told["calibrated"] = ["the display's calibration"]
+        if srgb_of_light is not None:
+            told["srgb_of_light"] = numpy.reshape(srgb_of_light, (3, -1)).tolist()
         return json.dumps(told)
 
 
 def _display(display: Display) -> dict[str, object]:
     """Returns a display with the keys of its TOML form."""
-    fields = dict(vars(display))
+    fields = {name: value for name, value in vars(display).items() if value is not None}
     for name in ("red_nm", "green_nm", "blue_nm", "laser_nm"):
-        del fields[name]
+        fields.pop(name, None)
+    if "primaries" in fields:
+        fields["primaries"] = numpy.reshape(fields["primaries"], (3, 3)).tolist()
     return fields | {"wavelengths_nm": display.wavelengths_nm}
 
 
@@ -136,7 +140,7 @@ class Hologram:
         layout: Layout = Layout.RGB,
         out: NDArray[numpy.uint8] | None = None,
     ) -> NDArray[numpy.uint8]:
-        """Returns the displayed image for an eye focused at `z_mm`: red, green, blue, uint8, (height, width, 3).
+        """Returns the displayed image in sRGB for an eye focused at `z_mm`: uint8, (height, width, 3).
 
         Args:
             z_mm: The z of the focus. By default the middle of the volume.
@@ -220,7 +224,7 @@ class Hologram:
         if file.suffix.lower() != ".png":
             raise FileError(f"{file}: the name must end in .png")
         self._check_bits("save writes")
-        texts = {"phasefront": self._purpose.told(self.info.scale, self.levels)}
+        texts = {"phasefront": self._purpose.told(self.info.scale, self.levels, self._raw.srgb_of_light())}
         try:
             _png.write(file, _png.encoded(self.levels.transpose(1, 2, 0), texts))
         except OSError as error:

@@ -19,6 +19,7 @@ from phasefront import (
     Method,
     Network,
     Orientation,
+    RgbEncoding,
     Rotation,
     RunningMode,
     Session,
@@ -44,6 +45,7 @@ DEPTH = {
     "relative-f16": (DepthFormat.RELATIVE_F16, "<f2"),
 }
 TURN = {0: Rotation.UPRIGHT, 90: Rotation.CLOCKWISE90, 180: Rotation.HALF, 270: Rotation.CLOCKWISE270}
+RGB = {name.lower().replace("_", "-"): value for name, value in RgbEncoding.__members__.items()}
 ENCODING = {
     "double-phase": Encoding.double_phase(),
     "anti-alias": Encoding.anti_alias(sigma=0.7, width=3),
@@ -82,6 +84,7 @@ def frame_of(case, memory):
         colour_format=COLOUR[colour["format"]],
         matrix={"bt601": YuvMatrix.BT601, "bt709": YuvMatrix.BT709}[colour["matrix"]],
         video_range=colour["video_range"],
+        encoding=RGB[colour["encoding"]],
         orientation=Orientation(rotation=TURN[case["rotation"]], mirrored=case["mirrored"]),
         **extra,
     )

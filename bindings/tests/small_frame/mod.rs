@@ -2,7 +2,7 @@
 
 use phasefront_ffi::{
     ColourFormat, ColourInfo, DepthFormat, DepthInfo, FrameInfo, Orientation, PhasefrontError, PlaneInfo, RawHologram,
-    RawSession, Rotation, YuvMatrix,
+    RawSession, RgbEncoding, Rotation, YuvMatrix,
 };
 use std::sync::Arc;
 
@@ -24,6 +24,7 @@ pub(crate) fn process(session: &RawSession) -> Result<Arc<RawHologram>, Phasefro
             planes: vec![plane(3)],
             matrix: YuvMatrix::Bt601,
             video_range: false,
+            encoding: RgbEncoding::Amplitude,
         },
         depth: Some(DepthInfo {
             format: DepthFormat::NormalizedU8,

@@ -28,6 +28,23 @@ namespace Phasefront
         Bt709 = 1,
     }
 
+    /// <summary>The meaning of a picture's red, green and blue.</summary>
+    public enum RgbEncoding : uint
+    {
+        /// <summary>sRGB, and BT.709 video, which screens show alike.</summary>
+        Srgb = 0,
+        /// <summary>Display P3, as phones take photographs and videos.</summary>
+        DisplayP3 = 1,
+        /// <summary>BT.2020 of standard dynamic range, with the curve of sRGB.</summary>
+        Bt2020 = 2,
+        /// <summary>BT.2020 with hybrid log-gamma.</summary>
+        Bt2020Hlg = 3,
+        /// <summary>BT.2020 with perceptual quantization.</summary>
+        Bt2020Pq = 4,
+        /// <summary>Amplitudes of the lasers, as in the paper and its data sets.</summary>
+        Amplitude = 5,
+    }
+
     /// <summary>The memory layout of a depth image. Except in normalized and relative formats, 0, negative numbers,
     /// NaN, numbers of 10⁹ or more, the largest code of an integer format and the largest finite 16-bit float mean no
     /// reading.</summary>
@@ -136,6 +153,8 @@ namespace Phasefront
         public bool VideoRange;
         /// <summary>The planes, in the order of the format.</summary>
         public ImagePlane[] Planes;
+        /// <summary>The meaning of red, green and blue.</summary>
+        public RgbEncoding Encoding;
     }
 
     /// <summary>A depth image.</summary>
@@ -253,6 +272,7 @@ namespace Phasefront
                 },
                 Rotation = (uint)Rotation,
                 Mirrored = Mirrored,
+                RgbEncoding = (uint)Colour.Encoding,
             };
             if (Confidence is ConfidenceMap map)
             {

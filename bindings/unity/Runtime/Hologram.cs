@@ -190,8 +190,8 @@ namespace Phasefront
             return zMm;
         }
 
-        /// <summary>Writes the displayed image for an eye focused at z: pixels of Rgb, Rgba or Bgra. Allocates no
-        /// image.</summary>
+        /// <summary>Writes the displayed image in sRGB for an eye focused at z: pixels of Rgb, Rgba or Bgra.
+        /// Allocates no image.</summary>
         public void WritePreview(double zMm, int width, int height, ModulatorLayout layout, ImageMemory to) =>
             to.Lend(memory => Native.pf_hologram_write_preview(this, zMm, checked((uint)width), checked((uint)height), (uint)layout, memory));
 

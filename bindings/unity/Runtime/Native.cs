@@ -46,6 +46,7 @@ namespace Phasefront
         public uint Rotation;
         [MarshalAs(UnmanagedType.U1)] public bool Mirrored;
         public IntPtr Cameras;
+        public uint RgbEncoding;
     }
 
     [StructLayout(LayoutKind.Sequential)]

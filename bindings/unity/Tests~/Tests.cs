@@ -14,6 +14,8 @@ internal static class Tests
 {
     private static readonly string[] Colours = { "rgba", "bgra", "rgb", "nv12", "yuv420" };
     private static readonly string[] Matrices = { "bt601", "bt709" };
+    private static readonly string[] Encodings =
+        { "srgb", "display-p3", "bt2020", "bt2020-hlg", "bt2020-pq", "amplitude" };
     private static readonly string[] Depths =
     {
         "metres-f32", "metres-f16", "disparity-f32", "disparity-f16", "millimetres-u16", "android-depth16",
@@ -91,6 +93,7 @@ internal static class Tests
                 Height = Int(colour["height"]),
                 Matrix = (YuvMatrix)Array.IndexOf(Matrices, colour["matrix"]),
                 VideoRange = (bool)colour["video_range"],
+                Encoding = (RgbEncoding)Array.IndexOf(Encodings, colour["encoding"]),
                 Planes = ((IEnumerable)colour["planes"]).Cast<object>().Select(plane => PlaneOf(plane, memory)).ToArray(),
             },
             Depth = frame["depth"] == null ? default : DepthOf(frame["depth"], memory),

@@ -35,7 +35,7 @@ pub(crate) fn of_core(core: phasefront::Error) -> JsValue {
 }
 
 /// Creates a plain object.
-pub(crate) fn object<const N: usize>(fields: [(&str, JsValue); N]) -> Object {
+pub(crate) fn object<'a>(fields: impl IntoIterator<Item = (&'a str, JsValue)>) -> Object {
     let object = Object::new();
     for (name, value) in fields {
         let _ = Reflect::set(&object, &name.into(), &value);

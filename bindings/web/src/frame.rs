@@ -4,7 +4,7 @@ use crate::error::{Answer, error, of_core};
 use phasefront::Size;
 use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
-    Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
+    Orientation, Plane, RgbEncoding, Rotation, YuvEncoding, YuvMatrix,
 };
 use wasm_bindgen::prelude::*;
 
@@ -47,6 +47,7 @@ pub struct RawFrame {
     confidence: Option<Image<ConfidenceFormat>>,
     orientation: Orientation,
     alignment: Alignment,
+    encoding: RgbEncoding,
 }
 
 fn unknown(what: &str, name: &str, known: &str) -> JsValue {
@@ -97,7 +98,18 @@ impl RawFrame {
             confidence: None,
             orientation: Orientation::default(),
             alignment: Alignment::default(),
+            encoding: RgbEncoding::default(),
         })
+    }
+
+    /// Sets the meaning of red, green and blue.
+    ///
+    /// # Errors
+    /// Throws an error of kind `frame` if the encoding is unknown.
+    pub fn encoding(&mut self, name: &str) -> Answer<()> {
+        let known = RgbEncoding::ALL.map(RgbEncoding::name).join(", ");
+        self.encoding = RgbEncoding::from_name(name).ok_or_else(|| unknown("encoding", name, &known))?;
+        Ok(())
     }
 
     /// Adds the next plane of the colour image. Strides are the bytes from one row to the next and from one pixel to
@@ -233,6 +245,7 @@ impl RawFrame {
     pub(crate) fn frame(&self) -> Answer<CameraFrame<'_>> {
         let planes: Vec<Plane<'_>> = self.colour.iter().map(Bytes::plane).collect();
         let colour = ColourImage::new(self.colour_format, self.colour_size, &planes).map_err(of_core)?;
+        let colour = colour.with_encoding(self.encoding);
         let depth = self
             .depth
             .as_ref()

@@ -2,7 +2,7 @@
 
 use crate::error::{Answer, object, of_core, setting};
 use js_sys::{Array, Object};
-use phasefront::target::Response;
+use phasefront::target::{Balance, Response};
 use phasefront::{Display, Target};
 use wasm_bindgen::prelude::*;
 
@@ -60,7 +60,18 @@ impl RawTarget {
         // Metres times 1e9 lose the last digit (637.9999…).
         let round = |value: f64| JsValue::from((value * 1e6).round() / 1e6);
         let lasers = display.wavelengths_m().iter().map(|l| round(l * 1e9));
-        object([
+        let numbers =
+            |values: &[f64]| -> JsValue { values.iter().map(|v| JsValue::from(*v)).collect::<Array>().into() };
+        let balance = match display.balance() {
+            Balance::Unknown => None,
+            Balance::White(white) => Some(("white", numbers(white))),
+            Balance::Powers(powers) => Some(("powers", numbers(powers))),
+            Balance::Primaries(rows) => {
+                let rows: Array = rows.iter().map(|row| numbers(row)).collect();
+                Some(("primaries", rows.into()))
+            }
+        };
+        let known = [
             ("width", display.size().width.into()),
             ("height", display.size().height.into()),
             ("pitchUm", round(display.pitch_m() * 1e6)),
@@ -69,6 +80,7 @@ impl RawTarget {
             ("offsetMm", round(display.offset_m() * 1e3)),
             ("bits", display.bits().into()),
             ("apertureRadius", display.aperture_radius().into()),
-        ])
+        ];
+        object(known.into_iter().chain(balance))
     }
 }

@@ -64,7 +64,7 @@ function frameOf(said, memory) {
     pixelStride: pixel_stride,
   });
   const image = ({ format, width, height, plane: of }) => ({ format, width, height, ...plane(of) });
-  const { width, height, planes, matrix, video_range: video } = said.colour;
+  const { width, height, planes, matrix, video_range: video, encoding } = said.colour;
   const format = FORMATS[said.colour.format];
   const colorSpace = { matrix: MATRICES[matrix], fullRange: !video };
   const colour =
@@ -75,6 +75,7 @@ function frameOf(said, memory) {
     timestamp: said.timestamp_ns / 1000,
     confidence: said.confidence ? image(said.confidence) : undefined,
     orientation: { degrees: said.rotation, mirrored: said.mirrored },
+    encoding,
   });
 }
 

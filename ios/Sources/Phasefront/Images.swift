@@ -4,7 +4,8 @@
     import PhasefrontCore
 
     extension Hologram {
-        /// Writes the displayed image for an eye focused at `zMm` into `buffer`, 32BGRA or 32RGBA of any size, in place.
+        /// Writes the displayed image in sRGB for an eye focused at `zMm` into `buffer`, 32BGRA or 32RGBA of any size, in
+        /// place.
         ///
         /// - Throws: ``PhasefrontError/setting(message:)`` for any other pixel format, or if z is too far away.
         public func writePreview(zMm: Double, to buffer: CVPixelBuffer) throws {

@@ -5,7 +5,8 @@
     import CoreVideo
 
     /// Calls `body` with the image in `buffer`, which stays locked during the call: 32BGRA, 32RGBA, 420f or 420v, the
-    /// formats of cameras and ARKit. Nothing is copied.
+    /// formats of cameras and ARKit. The meaning of its colours is read from its attachments, and is sRGB without them.
+    /// Nothing is copied.
     ///
     /// - Throws: ``PhasefrontError/frame(message:)`` for any other pixel format. The message names it.
     public func withColourImage<R>(_ buffer: CVPixelBuffer, _ body: (ColourImage) throws -> R) throws -> R {
@@ -23,6 +24,7 @@
                 message: "frame: colour is \(fourCharacters(other)); BGRA, RGBA, 420f or 420v are needed")
         }
         let matrix = CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String
+        let encoding = encoding(of: buffer)
         return try withLocked(buffer) {
             let planes =
                 switch format {
@@ -34,7 +36,7 @@
                     format: format, width: CVPixelBufferGetWidth(buffer), height: CVPixelBufferGetHeight(buffer),
                     planes: planes,
                     matrix: matrix == kCVImageBufferYCbCrMatrix_ITU_R_709_2 as String ? .bt709 : .bt601,
-                    videoRange: isVideoRange))
+                    videoRange: isVideoRange, encoding: encoding))
         }
     }
 
@@ -75,6 +77,18 @@
         public var phasefrontTimestampNs: Int64 {
             CMTimeConvertScale(self, timescale: 1_000_000_000, method: .roundTowardZero).value
         }
+    }
+
+    /// Returns the meaning of a buffer's colours by its attachments.
+    private func encoding(of buffer: CVPixelBuffer) -> RgbEncoding {
+        let attachment = { (key: CFString) in CVBufferCopyAttachment(buffer, key, nil) as? String }
+        let primaries = attachment(kCVImageBufferColorPrimariesKey)
+        let transfer = attachment(kCVImageBufferTransferFunctionKey)
+        if primaries == kCVImageBufferColorPrimaries_P3_D65 as String { return .displayP3 }
+        guard primaries == kCVImageBufferColorPrimaries_ITU_R_2020 as String else { return .srgb }
+        if transfer == kCVImageBufferTransferFunction_ITU_R_2100_HLG as String { return .bt2020Hlg }
+        if transfer == kCVImageBufferTransferFunction_SMPTE_ST_2084_PQ as String { return .bt2020Pq }
+        return .bt2020
     }
 
     private func withLocked<R>(_ buffer: CVPixelBuffer, _ body: () throws -> R) throws -> R {

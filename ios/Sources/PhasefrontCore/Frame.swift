@@ -37,11 +37,13 @@ public struct ColourImage: Sendable {
     public var matrix: YuvMatrix
     /// Whether luma spans 16...235 and chroma 16...240. RGB formats ignore it.
     public var videoRange: Bool
+    /// The meaning of red, green and blue.
+    public var encoding: RgbEncoding
 
     /// Creates an image of planes with any strides.
     public init(
         format: ColourFormat, width: Int, height: Int, planes: [ImagePlane], matrix: YuvMatrix = .bt601,
-        videoRange: Bool = false
+        videoRange: Bool = false, encoding: RgbEncoding = .srgb
     ) {
         self.format = format
         self.width = width
@@ -49,14 +51,15 @@ public struct ColourImage: Sendable {
         self.planes = planes
         self.matrix = matrix
         self.videoRange = videoRange
+        self.encoding = encoding
     }
 
     /// Creates an image of one plane without gaps.
-    public init(format: ColourFormat, width: Int, height: Int, bytes: Data) {
+    public init(format: ColourFormat, width: Int, height: Int, bytes: Data, encoding: RgbEncoding = .srgb) {
         let pixel = format == .rgb ? 3 : 4
         self.init(
             format: format, width: width, height: height,
-            planes: [ImagePlane(bytes: bytes, rowStride: pixel * width, pixelStride: pixel)])
+            planes: [ImagePlane(bytes: bytes, rowStride: pixel * width, pixelStride: pixel)], encoding: encoding)
     }
 }
 
@@ -157,7 +160,8 @@ public struct CameraFrame: Sendable {
             timestampNs: timestampNs,
             colour: ColourInfo(
                 format: colour.format, width: colour.width, height: colour.height,
-                planes: colour.planes.map(\.info), matrix: colour.matrix, videoRange: colour.videoRange),
+                planes: colour.planes.map(\.info), matrix: colour.matrix, videoRange: colour.videoRange,
+                encoding: colour.encoding),
             depth: depth.map {
                 DepthInfo(format: $0.format, width: $0.width, height: $0.height, plane: $0.plane.info)
             },

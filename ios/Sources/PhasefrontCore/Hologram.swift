@@ -40,9 +40,9 @@ public final class Hologram: Sendable {
         raw.zAt(x: x, y: y)
     }
 
-    /// Writes the displayed image for an eye focused at `zMm` into `memory`: `width` × `height` pixels in `layout`, RGB,
-    /// RGBA or BGRA, whose rows are `rowStride` bytes apart, by default without gaps. Allocates no image. It takes some
-    /// milliseconds, so do not call it on the main thread.
+    /// Writes the displayed image in sRGB for an eye focused at `zMm` into `memory`: `width` × `height` pixels in
+    /// `layout`, RGB, RGBA or BGRA, whose rows are `rowStride` bytes apart, by default without gaps. Allocates no image.
+    /// It takes some milliseconds, so do not call it on the main thread.
     ///
     /// - Throws: ``PhasefrontError/setting(message:)`` if the image is empty or does not fit, or if z is too far away.
     public func writePreview(

@@ -38,7 +38,7 @@ final class ConformanceTests: XCTestCase {
     }
 
     private struct Colours: Decodable {
-        let format, matrix: String
+        let format, matrix, encoding: String
         let width, height: Int
         let video_range: Bool
         let planes: [Memory]
@@ -61,6 +61,10 @@ final class ConformanceTests: XCTestCase {
     ]
     private static let confidences: [String: ConfidenceFormat] = ["low-medium-high": .lowMediumHigh, "u8": .u8]
     private static let matrices: [String: YuvMatrix] = ["bt601": .bt601, "bt709": .bt709]
+    private static let encodings: [String: RgbEncoding] = [
+        "srgb": .srgb, "display-p3": .displayP3, "bt2020": .bt2020, "bt2020-hlg": .bt2020Hlg,
+        "bt2020-pq": .bt2020Pq, "amplitude": .amplitude,
+    ]
     private static let rotations: [Int: Rotation] = [0: .upright, 90: .clockwise90, 180: .half, 270: .clockwise270]
     private static let modes: [String: RunningMode] = ["image": .image, "video": .video]
 
@@ -73,7 +77,8 @@ final class ConformanceTests: XCTestCase {
         let colour = ColourImage(
             format: try XCTUnwrap(Self.colours[still.colour.format]), width: still.colour.width,
             height: still.colour.height, planes: still.colour.planes.map { $0.plane(frames) },
-            matrix: try XCTUnwrap(Self.matrices[still.colour.matrix]), videoRange: still.colour.video_range)
+            matrix: try XCTUnwrap(Self.matrices[still.colour.matrix]), videoRange: still.colour.video_range,
+            encoding: try XCTUnwrap(Self.encodings[still.colour.encoding]))
         let depth = try still.depth.map {
             DepthImage(
                 format: try XCTUnwrap(Self.depths[$0.format]), width: $0.width, height: $0.height,

@@ -38,6 +38,8 @@ export interface PackedColour extends Plane {
   readonly height: number;
   /** The layout; `RGBA` by default. */
   readonly format?: "RGBA" | "RGBX" | "BGRA" | "BGRX" | "RGB";
+  /** The colour space, as an `ImageData` or a `VideoFrame` says it; sRGB by default. */
+  readonly colorSpace?: PredefinedColorSpace | VideoColorSpaceInit;
 }
 
 /** A colour image of luma and chroma, as a decoder makes it: `NV12` has two planes, `I420` three. */
@@ -49,9 +51,10 @@ export interface PlanarColour {
   readonly planes: readonly Plane[];
   /**
    * The matrix that converts luma and chroma to colour, `smpte170m` by default (that of BT.601, as `bt470bg`), or `bt709`;
-   * and whether luma ranges from 0 to 255, as by default, or from 16 to 235.
+   * whether luma ranges from 0 to 255, as by default, or from 16 to 235; and the primaries and the transfer of red, green
+   * and blue, sRGB's by default.
    */
-  readonly colorSpace?: Pick<VideoColorSpaceInit, "matrix" | "fullRange">;
+  readonly colorSpace?: VideoColorSpaceInit;
 }
 
 /** A depth image. A grey picture in an `ImageData` is a depth image with `pixelStride: 4`. */
@@ -106,7 +109,16 @@ export interface FrameOptions {
   readonly orientation?: Orientation;
   /** The cameras, if colour and depth have different fields of view. */
   readonly cameras?: Cameras;
+  /** The meaning of red, green and blue; by default what the image says of it by its `colorSpace`, else `srgb`. */
+  readonly encoding?: RgbEncoding;
 }
+
+/**
+ * The meaning of red, green and blue: `srgb`, which is also that of BT.709 video; `display-p3`, that of a phone's
+ * pictures; BT.2020 with the curve of sRGB (`bt2020`), hybrid log-gamma or perceptual quantization; or `amplitude`, the
+ * amplitudes of the lasers, as in the paper and its data sets.
+ */
+export type RgbEncoding = "srgb" | "display-p3" | "bt2020" | "bt2020-hlg" | "bt2020-pq" | "amplitude";
 
 /** The colour and depth of one moment. Images are read when a session processes the frame. */
 export class Frame {

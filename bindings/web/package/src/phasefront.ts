@@ -35,6 +35,7 @@ export {
   type PackedColour,
   type PlanarColour,
   type Plane,
+  type RgbEncoding,
 } from "./frame.js";
 export {
   Hologram,
@@ -60,7 +61,7 @@ export {
   type SessionOptions,
   type Statistics,
 } from "./session.js";
-export { Target, displayFromToml, type Display } from "./target.js";
+export { Target, displayFromToml, type Display, type FullDisplay } from "./target.js";
 
 /**
  * The source of the module: an address, a response, its bytes, or a compiled module that a page passes to its workers.

@@ -8,6 +8,7 @@ import type {
   PackedColour,
   PlanarColour,
   Plane,
+  RgbEncoding,
 } from "./frame.js";
 import { RawFrame } from "./raw/phasefront_web.js";
 
@@ -94,8 +95,11 @@ async function ofVideoFrame(frame: VideoFrame): Promise<PackedColour | PlanarCol
   });
   const planes = layout.map(({ offset, stride }) => ({ data: data.subarray(offset), rowStride: stride }));
   const format = known ? frame.format : "RGBA";
-  if (!known || packed) return { width, height, format, ...planes[0]! } as PackedColour;
-  return { width, height, format, planes, colorSpace: { matrix, fullRange } } as PlanarColour;
+  if (!known) return { width, height, format, ...planes[0]! } as PackedColour;
+  const { primaries, transfer } = frame.colorSpace;
+  const colorSpace = { matrix, fullRange, primaries, transfer };
+  if (packed) return { width, height, format, ...planes[0]!, colorSpace } as PackedColour;
+  return { width, height, format, planes, colorSpace } as PlanarColour;
 }
 
 function rawFrameOf(colour: PackedColour | PlanarColour, depth: DepthImage, options: FrameOptions): RawFrame {
@@ -103,7 +107,8 @@ function rawFrameOf(colour: PackedColour | PlanarColour, depth: DepthImage, opti
   const planes = "planes" in colour ? colour.planes : [colour];
   const pixels = COLOUR_BYTES[format] ?? [];
   const [width, height] = size("colour", colour);
-  const { matrix, fullRange } = ("planes" in colour && colour.colorSpace) || {};
+  const space = colour.colorSpace;
+  const { matrix, fullRange } = (typeof space === "object" && space) || {};
   const bt709 = MATRICES[matrix ?? "smpte170m"];
   if (bt709 === undefined)
     throw new PhasefrontError(
@@ -121,12 +126,22 @@ function rawFrameOf(colour: PackedColour | PlanarColour, depth: DepthImage, opti
     const of = depthFormat(depth);
     const parts = strides("depth", depth, depth.width, depthBytes(of));
     guard(() => raw.depth(of, ...size("depth", depth), ...parts));
+    guard(() => raw.encoding(options.encoding ?? encodingOf(space)));
     describe(raw, options);
   } catch (error) {
     release(raw);
     throw error;
   }
   return raw;
+}
+
+/** Returns the meaning of the colours of an image that says `space` of them. */
+function encodingOf(space: PackedColour["colorSpace"]): RgbEncoding {
+  if (typeof space !== "object") return space === "display-p3" ? "display-p3" : "srgb";
+  const [primaries, transfer] = [space.primaries as string, space.transfer as string];
+  if (primaries === "smpte432") return "display-p3";
+  if (primaries !== "bt2020") return "srgb";
+  return transfer === "hlg" ? "bt2020-hlg" : transfer === "pq" ? "bt2020-pq" : "bt2020";
 }
 
 function nanoseconds(timestamp: number): bigint {

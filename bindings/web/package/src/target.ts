@@ -19,7 +19,21 @@ export interface Display {
   bits?: number;
   /** The radius of the circular aperture in the Fourier plane, relative to half the sampling frequency. */
   apertureRadius?: number;
+  /**
+   * The chromaticity x, y of the light of all lasers. At most one of `white`, `powers` and `primaries` may be given;
+   * without one, all lasers together are taken for D65.
+   */
+  white?: number[];
+  /** The radiant powers of red, green and blue, on any scale. */
+  powers?: number[];
+  /** X, Y and Z of red, of green and of blue, on any scale. */
+  primaries?: number[][];
 }
+
+type Balance = "white" | "powers" | "primaries";
+
+/** A display with all its values; what balances its lasers is there if it is known. */
+export type FullDisplay = Required<Omit<Display, Balance>> & Pick<Display, Balance>;
 
 /** Converts a display to TOML. The core checks keys and ranges. */
 function toml(display: Display): string {
@@ -36,7 +50,7 @@ function toml(display: Display): string {
  *
  * @throws PhasefrontError `display`: the text is not a display, or the display is invalid.
  */
-export function displayFromToml(text: string): Required<Display> {
+export function displayFromToml(text: string): FullDisplay {
   return Target.fromToml(text).display;
 }
 
@@ -93,7 +107,7 @@ export class Target {
   }
 
   /** The display of the target. */
-  get display(): Required<Display> {
-    return guard(() => this.raw.display()) as Required<Display>;
+  get display(): FullDisplay {
+    return guard(() => this.raw.display()) as FullDisplay;
   }
 }

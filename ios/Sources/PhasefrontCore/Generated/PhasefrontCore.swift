@@ -1439,6 +1439,12 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     func share()  -> RawHologram
     
     /**
+     * Returns the matrix from the lasers' light to linear sRGB, three rows of a number for each laser, which a
+     * hologram's file holds; none if views are amplitudes.
+     */
+    func srgbOfLight()  -> [Float]?
+    
+    /**
      * Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
      * fewer bits than their place use its upper bits; `placement` positions the hologram.
      *
@@ -1448,7 +1454,7 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     func writeOutput(placement: Placement, image: Int, to: RawMemory) throws 
     
     /**
-     * Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+     * Writes the view of an eye focused at `z_mm` in sRGB, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
      *
      * # Errors
      * Returns an error if the image is empty or does not fit, or z is too far away.
@@ -1665,6 +1671,19 @@ open func share() -> RawHologram  {
 }
     
     /**
+     * Returns the matrix from the lasers' light to linear sRGB, three rows of a number for each laser, which a
+     * hologram's file holds; none if views are amplitudes.
+     */
+open func srgbOfLight() -> [Float]?  {
+    return try!  FfiConverterOptionSequenceFloat.lift(try! rustCall() {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_srgb_of_light(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
      * Writes image `image` of those that the modulator's driver takes, at the modulator's resolution. Levels with
      * fewer bits than their place use its upper bits; `placement` positions the hologram.
      *
@@ -1683,7 +1702,7 @@ open func writeOutput(placement: Placement, image: Int, to: RawMemory)throws   {
 }
     
     /**
-     * Writes the view of an eye focused at `z_mm`, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
+     * Writes the view of an eye focused at `z_mm` in sRGB, `width` × `height` pixels in `layout`, Rgb, Rgba or Bgra.
      *
      * # Errors
      * Returns an error if the image is empty or does not fit, or z is too far away.
@@ -3431,6 +3450,10 @@ public struct ColourInfo: Equatable, Hashable {
      * Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
      */
     public var videoRange: Bool
+    /**
+     * The meaning of red, green and blue.
+     */
+    public var encoding: RgbEncoding
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -3452,13 +3475,17 @@ public struct ColourInfo: Equatable, Hashable {
          */matrix: YuvMatrix, 
         /**
          * Whether luma spans 16..=235 and chroma 16..=240 instead of 0..=255 for both. Other formats ignore it.
-         */videoRange: Bool) {
+         */videoRange: Bool, 
+        /**
+         * The meaning of red, green and blue.
+         */encoding: RgbEncoding) {
         self.format = format
         self.width = width
         self.height = height
         self.planes = planes
         self.matrix = matrix
         self.videoRange = videoRange
+        self.encoding = encoding
     }
 
     
@@ -3482,7 +3509,8 @@ public struct FfiConverterTypeColourInfo: FfiConverterRustBuffer {
                 height: FfiConverterTypeInt.read(from: &buf), 
                 planes: FfiConverterSequenceTypePlaneInfo.read(from: &buf), 
                 matrix: FfiConverterTypeYuvMatrix.read(from: &buf), 
-                videoRange: FfiConverterBool.read(from: &buf)
+                videoRange: FfiConverterBool.read(from: &buf), 
+                encoding: FfiConverterTypeRgbEncoding.read(from: &buf)
         )
     }
 
@@ -3493,6 +3521,7 @@ public struct FfiConverterTypeColourInfo: FfiConverterRustBuffer {
         FfiConverterSequenceTypePlaneInfo.write(value.planes, into: &buf)
         FfiConverterTypeYuvMatrix.write(value.matrix, into: &buf)
         FfiConverterBool.write(value.videoRange, into: &buf)
+        FfiConverterTypeRgbEncoding.write(value.encoding, into: &buf)
     }
 }
 
@@ -4238,6 +4267,19 @@ public struct HologramDisplay: Equatable, Hashable {
      * The radius of the aperture in the Fourier plane; 1 is the whole first order.
      */
     public var apertureRadius: Double
+    /**
+     * The chromaticity x, y of the light of all lasers; none if it is not known. At most one of `white`, `powers` and
+     * `primaries` may be given; without one, all lasers together are taken for D65.
+     */
+    public var white: [Double]?
+    /**
+     * The radiant powers of red, green and blue, on any scale.
+     */
+    public var powers: [Double]?
+    /**
+     * X, Y and Z of red, of green and of blue, 9 numbers on any scale.
+     */
+    public var primaries: [Double]?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -4275,7 +4317,17 @@ public struct HologramDisplay: Equatable, Hashable {
          */bits: Int = 8, 
         /**
          * The radius of the aperture in the Fourier plane; 1 is the whole first order.
-         */apertureRadius: Double = Double(1.0)) {
+         */apertureRadius: Double = Double(1.0), 
+        /**
+         * The chromaticity x, y of the light of all lasers; none if it is not known. At most one of `white`, `powers` and
+         * `primaries` may be given; without one, all lasers together are taken for D65.
+         */white: [Double]? = nil, 
+        /**
+         * The radiant powers of red, green and blue, on any scale.
+         */powers: [Double]? = nil, 
+        /**
+         * X, Y and Z of red, of green and of blue, 9 numbers on any scale.
+         */primaries: [Double]? = nil) {
         self.width = width
         self.height = height
         self.pitchUm = pitchUm
@@ -4287,6 +4339,9 @@ public struct HologramDisplay: Equatable, Hashable {
         self.offsetMm = offsetMm
         self.bits = bits
         self.apertureRadius = apertureRadius
+        self.white = white
+        self.powers = powers
+        self.primaries = primaries
     }
 
     
@@ -4315,7 +4370,10 @@ public struct FfiConverterTypeHologramDisplay: FfiConverterRustBuffer {
                 volumeDepthMm: FfiConverterDouble.read(from: &buf), 
                 offsetMm: FfiConverterDouble.read(from: &buf), 
                 bits: FfiConverterTypeInt.read(from: &buf), 
-                apertureRadius: FfiConverterDouble.read(from: &buf)
+                apertureRadius: FfiConverterDouble.read(from: &buf), 
+                white: FfiConverterOptionSequenceDouble.read(from: &buf), 
+                powers: FfiConverterOptionSequenceDouble.read(from: &buf), 
+                primaries: FfiConverterOptionSequenceDouble.read(from: &buf)
         )
     }
 
@@ -4331,6 +4389,9 @@ public struct FfiConverterTypeHologramDisplay: FfiConverterRustBuffer {
         FfiConverterDouble.write(value.offsetMm, into: &buf)
         FfiConverterTypeInt.write(value.bits, into: &buf)
         FfiConverterDouble.write(value.apertureRadius, into: &buf)
+        FfiConverterOptionSequenceDouble.write(value.white, into: &buf)
+        FfiConverterOptionSequenceDouble.write(value.powers, into: &buf)
+        FfiConverterOptionSequenceDouble.write(value.primaries, into: &buf)
     }
 }
 
@@ -4394,6 +4455,10 @@ public struct HologramInfo: Equatable, Hashable {
      * The time that each stage took.
      */
     public var times: FrameTimes
+    /**
+     * The meaning of the frame's colours. Views are in sRGB unless these are amplitudes, as which views show them.
+     */
+    public var encoding: RgbEncoding
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -4427,7 +4492,10 @@ public struct HologramInfo: Equatable, Hashable {
          */qualityLevel: Int, 
         /**
          * The time that each stage took.
-         */times: FrameTimes) {
+         */times: FrameTimes, 
+        /**
+         * The meaning of the frame's colours. Views are in sRGB unless these are amplitudes, as which views show them.
+         */encoding: RgbEncoding) {
         self.timestampNs = timestampNs
         self.width = width
         self.height = height
@@ -4438,6 +4506,7 @@ public struct HologramInfo: Equatable, Hashable {
         self.validDepth = validDepth
         self.qualityLevel = qualityLevel
         self.times = times
+        self.encoding = encoding
     }
 
     
@@ -4465,7 +4534,8 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
                 farM: FfiConverterOptionFloat.read(from: &buf), 
                 validDepth: FfiConverterFloat.read(from: &buf), 
                 qualityLevel: FfiConverterTypeInt.read(from: &buf), 
-                times: FfiConverterTypeFrameTimes.read(from: &buf)
+                times: FfiConverterTypeFrameTimes.read(from: &buf), 
+                encoding: FfiConverterTypeRgbEncoding.read(from: &buf)
         )
     }
 
@@ -4480,6 +4550,7 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
         FfiConverterFloat.write(value.validDepth, into: &buf)
         FfiConverterTypeInt.write(value.qualityLevel, into: &buf)
         FfiConverterTypeFrameTimes.write(value.times, into: &buf)
+        FfiConverterTypeRgbEncoding.write(value.encoding, into: &buf)
     }
 }
 
@@ -7319,6 +7390,124 @@ public func FfiConverterTypeQualityReason_lower(_ value: QualityReason) -> RustB
 
 
 /**
+ * The meaning of a picture's red, green and blue.
+ */
+
+public enum RgbEncoding: Equatable, Hashable {
+    
+    /**
+     * sRGB (IEC 61966-2-1), and BT.709 video, which screens show alike.
+     */
+    case srgb
+    /**
+     * Display P3: the primaries of DCI-P3, white D65 and the curve of sRGB. Photographs and videos of phones.
+     */
+    case displayP3
+    /**
+     * BT.2020 of standard dynamic range, with the curve of sRGB.
+     */
+    case bt2020
+    /**
+     * BT.2020 with hybrid log-gamma (BT.2100). Light above the reference white of 203 cd/m² is brought below full
+     * light.
+     */
+    case bt2020Hlg
+    /**
+     * BT.2020 with perceptual quantization (BT.2100, SMPTE ST 2084). As for hybrid log-gamma, light above the
+     * reference white is brought below full light.
+     */
+    case bt2020Pq
+    /**
+     * Amplitudes of the lasers themselves: the value is the amplitude, its square is the light. This is the convention
+     * of the paper, its data sets and its networks' training.
+     */
+    case amplitude
+
+
+
+
+
+}
+
+#if compiler(>=6)
+extension RgbEncoding: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeRgbEncoding: FfiConverterRustBuffer {
+    typealias SwiftType = RgbEncoding
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> RgbEncoding {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+        
+        case 1: return .srgb
+        
+        case 2: return .displayP3
+        
+        case 3: return .bt2020
+        
+        case 4: return .bt2020Hlg
+        
+        case 5: return .bt2020Pq
+        
+        case 6: return .amplitude
+        
+        default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: RgbEncoding, into buf: inout [UInt8]) {
+        switch value {
+        
+        
+        case .srgb:
+            writeInt(&buf, Int32(1))
+        
+        
+        case .displayP3:
+            writeInt(&buf, Int32(2))
+        
+        
+        case .bt2020:
+            writeInt(&buf, Int32(3))
+        
+        
+        case .bt2020Hlg:
+            writeInt(&buf, Int32(4))
+        
+        
+        case .bt2020Pq:
+            writeInt(&buf, Int32(5))
+        
+        
+        case .amplitude:
+            writeInt(&buf, Int32(6))
+        
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRgbEncoding_lift(_ buf: RustBuffer) throws -> RgbEncoding {
+    return try FfiConverterTypeRgbEncoding.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRgbEncoding_lower(_ value: RgbEncoding) -> RustBuffer {
+    return FfiConverterTypeRgbEncoding.lower(value)
+}
+
+
+
+/**
  * The clockwise rotation that turns a sensor's image upright.
  */
 
@@ -8161,6 +8350,54 @@ fileprivate struct FfiConverterOptionTypeHologramMethod: FfiConverterRustBuffer 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionSequenceFloat: FfiConverterRustBuffer {
+    typealias SwiftType = [Float]?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterSequenceFloat.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterSequenceFloat.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterOptionSequenceDouble: FfiConverterRustBuffer {
+    typealias SwiftType = [Double]?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterSequenceDouble.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterSequenceDouble.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeInt: FfiConverterRustBuffer {
     typealias SwiftType = Int?
 
@@ -8179,6 +8416,31 @@ fileprivate struct FfiConverterOptionTypeInt: FfiConverterRustBuffer {
         case 1: return try FfiConverterTypeInt.read(from: &buf)
         default: throw UniffiInternalError.unexpectedOptionalTag
         }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterSequenceFloat: FfiConverterRustBuffer {
+    typealias SwiftType = [Float]
+
+    public static func write(_ value: [Float], into buf: inout [UInt8]) {
+        let len = Int32(value.count)
+        writeInt(&buf, len)
+        for item in value {
+            FfiConverterFloat.write(item, into: &buf)
+        }
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> [Float] {
+        let len: Int32 = try readInt(&buf)
+        var seq = [Float]()
+        seq.reserveCapacity(Int(len))
+        for _ in 0 ..< len {
+            seq.append(try FfiConverterFloat.read(from: &buf))
+        }
+        return seq
     }
 }
 
@@ -8497,10 +8759,13 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 9110) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_srgb_of_light() != 46536) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_write_output() != 58308) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_write_preview() != 53849) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_write_preview() != 24307) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_z_at() != 53543) {

@@ -7,6 +7,7 @@ use crate::display::primaries::{D65, Matrix, inverse, times, white};
 #[non_exhaustive]
 pub enum RgbEncoding {
     /// sRGB (IEC 61966-2-1), and BT.709 video, which screens show alike.
+    #[default]
     Srgb,
     /// Display P3: the primaries of DCI-P3, white D65 and the curve of sRGB. Photographs and videos of phones.
     DisplayP3,
@@ -20,7 +21,6 @@ pub enum RgbEncoding {
     Bt2020Pq,
     /// Amplitudes of the lasers themselves: the value is the amplitude, its square is the light. This is the convention
     /// of the paper, its data sets and its networks' training.
-    #[default]
     Amplitude,
 }
 

@@ -8,6 +8,7 @@ use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Size;
+use phasefront::input::RgbEncoding;
 use phasefront::{Brightness, EncoderOptions};
 use phasefront_command::flags::DisplayFlags;
 use phasefront_core::pipeline;
@@ -89,7 +90,11 @@ impl Encode {
             keeps_field: self.outputs.need_field(),
         };
         let made = HologramResult {
-            view_colours: said.map_or(ViewColours::Amplitude, |info| info.view_colours()),
+            // Light that nothing is said of is seen as it looks.
+            view_colours: said.map_or_else(
+                || ViewColours::new(RgbEncoding::Srgb, &target.display),
+                |info| info.view_colours(),
+            ),
             ..encoding.of(field, stage)
         };
         self.outputs.finish(&self.output, &display, &made, None, json)

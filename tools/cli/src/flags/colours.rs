@@ -19,6 +19,7 @@ pub(crate) struct ColourFlags {
 #[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 enum EncodingName {
     /// What the file says of its colours by a profile or tags, else sRGB
+    #[default]
     Auto,
     /// sRGB, and BT.709 video
     Srgb,
@@ -29,7 +30,6 @@ enum EncodingName {
     /// BT.2020 with perceptual quantization
     Bt2020Pq,
     /// Amplitudes of the lasers, as in the paper and its data sets
-    #[default]
     Amplitude,
 }
 

@@ -97,6 +97,8 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
             "depth.png",
             "--method",
             "sweep",
+            "--rgb-encoding",
+            "amplitude",
         ];
         folder.succeeds(&[&frame[..], &["--display", &toml, "-o", &hologram]].concat());
         folder.succeeds(&["refocus", &hologram, "--display", &toml, "--z-mm", "0", "-o", &view]);

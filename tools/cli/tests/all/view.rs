@@ -151,7 +151,8 @@ fn ways_are_judged_by_the_best_wave_at_hand() {
         let call = [&["judge", "--json", "--planes", "24", "--margin", "4"], more].concat();
         serde_json::from_str(&folder.succeeds(&call)).unwrap()
     };
-    let said = judged(&[&FRAME[..], &["-o", "j.html"]].concat());
+    // What the steps bring was measured on amplitudes.
+    let said = judged(&[&FRAME[..], &["--rgb-encoding", "amplitude", "-o", "j.html"]].concat());
     assert!(said["truth"].as_str().unwrap().contains("there is no truth"), "{said}");
     let rows = said["rows"].as_array().unwrap();
     // Sweep and network with three corrections each, and the pair.

@@ -46,13 +46,22 @@ public class ColourImage(
     public val matrix: YuvMatrix = YuvMatrix.BT601,
     /** Whether luma spans 16..235 and chroma 16..240. RGB formats ignore it. */
     public val videoRange: Boolean = false,
+    /** The meaning of red, green and blue. */
+    public val encoding: RgbEncoding = RgbEncoding.SRGB,
 ) {
     /** Creates an image of one plane without gaps. */
-    public constructor(format: ColourFormat, width: Int, height: Int, bytes: ByteBuffer) : this(
+    public constructor(
+        format: ColourFormat,
+        width: Int,
+        height: Int,
+        bytes: ByteBuffer,
+        encoding: RgbEncoding = RgbEncoding.SRGB,
+    ) : this(
         format,
         width,
         height,
         if (format == ColourFormat.RGB) listOf(ImagePlane(bytes, 3 * width, 3)) else listOf(ImagePlane(bytes, 4 * width, 4)),
+        encoding = encoding,
     )
 }
 
@@ -115,6 +124,7 @@ public class CameraFrame(
             planes = colour.planes.map { it.info("colour") },
             matrix = colour.matrix,
             videoRange = colour.videoRange,
+            encoding = colour.encoding,
         ),
         depth = depth?.let { DepthInfo(it.format, size("depth", it.width), size("depth", it.height), it.plane.info("depth")) },
         confidence = depth?.confidence?.let {

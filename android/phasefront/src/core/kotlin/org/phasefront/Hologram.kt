@@ -49,9 +49,9 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     public fun zAt(x: Double, y: Double): Double = open { it.zAt(x, y) }
 
     /**
-     * Writes the displayed image for an eye focused at [zMm] into [to]: [width] × [height] pixels in [layout], RGB, RGBA
-     * or BGRA, from the position of a direct buffer, with rows [rowStride] bytes apart. Allocates no image. It takes some
-     * milliseconds, so do not call it on the main thread.
+     * Writes the displayed image in sRGB for an eye focused at [zMm] into [to]: [width] × [height] pixels in [layout],
+     * RGB, RGBA or BGRA, from the position of a direct buffer, with rows [rowStride] bytes apart. Allocates no image. It
+     * takes some milliseconds, so do not call it on the main thread.
      *
      * @throws PhasefrontException.Setting if the image is empty or does not fit, or if z is too far away.
      */

@@ -1,22 +1,64 @@
 package org.phasefront
 
 import android.graphics.Bitmap
+import android.graphics.ColorSpace
 import android.graphics.ImageFormat
+import android.hardware.DataSpace
 import android.hardware.HardwareBuffer
 import android.media.Image
+import android.os.Build
 import java.nio.ByteBuffer
 
 /**
- * Returns a camera image without a copy. Its format is YUV_420_888, as from Camera2 and ARCore. Keep the [Image] open
- * while the frame is used.
+ * Returns a camera image without a copy. Its format is YUV_420_888, as from Camera2 and ARCore. Its [encoding] is by
+ * default what its `dataSpace` says, which is known since Android 13, else sRGB. Keep the [Image] open while the frame is
+ * used.
  *
  * @throws PhasefrontException.Frame for any other format. The message names it.
  */
-public fun Image.toColourImage(matrix: YuvMatrix = YuvMatrix.BT601, videoRange: Boolean = false): ColourImage {
+public fun Image.toColourImage(
+    matrix: YuvMatrix = YuvMatrix.BT601,
+    videoRange: Boolean = false,
+    encoding: RgbEncoding = rgbEncoding(),
+): ColourImage {
     if (format != ImageFormat.YUV_420_888) {
         throw PhasefrontException.Frame("frame: colour is of Android's format $format; YUV_420_888 (${ImageFormat.YUV_420_888}) is needed")
     }
-    return ColourImage(ColourFormat.YUV420, width, height, planes.map { it.toPlane() }, matrix, videoRange)
+    return ColourImage(ColourFormat.YUV420, width, height, planes.map { it.toPlane() }, matrix, videoRange, encoding)
+}
+
+/** Returns the meaning of the colours of an image of a camera or a decoder. */
+private fun Image.rgbEncoding(): RgbEncoding {
+    if (Build.VERSION.SDK_INT < Build.VERSION_CODES.TIRAMISU) return RgbEncoding.SRGB
+    return when (DataSpace.getStandard(dataSpace)) {
+        DataSpace.STANDARD_DCI_P3 -> RgbEncoding.DISPLAY_P3
+        DataSpace.STANDARD_BT2020, DataSpace.STANDARD_BT2020_CONSTANT_LUMINANCE -> when (DataSpace.getTransfer(dataSpace)) {
+            DataSpace.TRANSFER_HLG -> RgbEncoding.BT2020_HLG
+            DataSpace.TRANSFER_ST2084 -> RgbEncoding.BT2020_PQ
+            else -> RgbEncoding.BT2020
+        }
+        else -> RgbEncoding.SRGB
+    }
+}
+
+/**
+ * Returns a copy of the pixels of a bitmap of ARGB_8888 in its own colour space, sRGB or Display P3.
+ *
+ * @throws PhasefrontException.Frame for a bitmap of another configuration or colour space: `Bitmap.copy`, or
+ * `BitmapFactory.Options.inPreferredColorSpace`, makes one.
+ */
+public fun Bitmap.toColourImage(): ColourImage {
+    val encoding = when (colorSpace) {
+        null, ColorSpace.get(ColorSpace.Named.SRGB) -> RgbEncoding.SRGB
+        ColorSpace.get(ColorSpace.Named.DISPLAY_P3) -> RgbEncoding.DISPLAY_P3
+        else -> throw PhasefrontException.Frame("frame: the bitmap's colours are ${colorSpace?.name}; sRGB or Display P3 are needed")
+    }
+    if (config != Bitmap.Config.ARGB_8888) {
+        throw PhasefrontException.Frame("frame: the bitmap's configuration is $config; ARGB_8888 is needed")
+    }
+    val bytes = ByteBuffer.allocateDirect(byteCount).also(::copyPixelsToBuffer)
+    bytes.flip()
+    return ColourImage(ColourFormat.RGBA, width, height, listOf(ImagePlane(bytes, rowBytes, 4)), encoding = encoding)
 }
 
 /**
@@ -58,8 +100,8 @@ public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: B
 private fun Image.Plane.toPlane(): ImagePlane = ImagePlane(buffer, rowStride, pixelStride)
 
 /**
- * Writes the displayed image for an eye focused at [zMm] into [to], a mutable bitmap of the configuration ARGB_8888,
- * with one copy through memory that is kept for the next call on the thread.
+ * Writes the displayed image in sRGB for an eye focused at [zMm] into [to], a mutable bitmap of the configuration
+ * ARGB_8888, with one copy through memory that is kept for the next call on the thread.
  *
  * @throws PhasefrontException.Setting for another bitmap.
  */

@@ -1,7 +1,9 @@
 package org.phasefront
 
 import android.graphics.Bitmap
+import android.graphics.ColorSpace
 import android.graphics.ImageFormat
+import android.hardware.DataSpace
 import android.hardware.HardwareBuffer
 import android.media.Image
 import java.nio.ByteBuffer
@@ -31,6 +33,10 @@ private class CameraImage(private val format: Int, private val width: Int, priva
 
     override fun getPlanes(): Array<Plane> = all
 
+    var space: Int = DataSpace.DATASPACE_UNKNOWN
+
+    override fun getDataSpace(): Int = space
+
     override fun close(): Unit = Unit
 
     class Bytes(private val bytes: ByteBuffer, private val row: Int, private val pixel: Int) : Plane() {
@@ -50,7 +56,7 @@ class ImagesTest {
         ByteBuffer.allocateDirect(size).apply { repeat(size) { put(value(it).toByte()) } }.flip()
 
     /** Returns 64×48 pixels of luma that is not uniform and of grey chroma, with gaps behind the rows. */
-    private fun colour(): Image {
+    private fun colour(): CameraImage {
         val luma = bytes(80 * 48) { (it % 80) * 3 + it / 80 }
         val chroma = bytes(64 * 24) { 128 }
         return CameraImage(
@@ -95,6 +101,39 @@ class ImagesTest {
         val confidence = CameraImage(ImageFormat.Y8, 32, 24, CameraImage.Bytes(bytes(32 * 24) { 255 }, 32, 1))
         val depth = depth(HardwareBuffer.D_16).toDepthImage(confidence)
         assertEquals(32 to 24, depth.confidence?.run { width to height })
+    }
+
+    @Test
+    fun imagesSayTheMeaningOfTheirColours() {
+        val range = DataSpace.RANGE_LIMITED
+        for ((space, encoding) in listOf(
+            DataSpace.DATASPACE_UNKNOWN to RgbEncoding.SRGB,
+            DataSpace.DATASPACE_JFIF to RgbEncoding.SRGB,
+            DataSpace.DATASPACE_DISPLAY_P3 to RgbEncoding.DISPLAY_P3,
+            DataSpace.pack(DataSpace.STANDARD_BT2020, DataSpace.TRANSFER_HLG, range) to RgbEncoding.BT2020_HLG,
+            DataSpace.pack(DataSpace.STANDARD_BT2020, DataSpace.TRANSFER_ST2084, range) to RgbEncoding.BT2020_PQ,
+            DataSpace.pack(DataSpace.STANDARD_BT2020, DataSpace.TRANSFER_SMPTE_170M, range) to RgbEncoding.BT2020,
+        )) {
+            assertEquals(encoding, colour().also { it.space = space }.toColourImage().encoding, "$space")
+        }
+        assertEquals(RgbEncoding.AMPLITUDE, colour().toColourImage(encoding = RgbEncoding.AMPLITUDE).encoding)
+    }
+
+    @Test
+    fun bitmapsAreCopiedInTheirOwnColours() {
+        for ((space, encoding) in listOf(
+            ColorSpace.Named.SRGB to RgbEncoding.SRGB,
+            ColorSpace.Named.DISPLAY_P3 to RgbEncoding.DISPLAY_P3,
+        )) {
+            val bitmap = Bitmap.createBitmap(3, 2, Bitmap.Config.ARGB_8888, true, ColorSpace.get(space))
+            bitmap.copyPixelsFromBuffer(bytes(24) { if (it % 4 == 3) 255 else 9 * it })
+            val image = bitmap.toColourImage()
+            assertEquals(Triple(3, 2, encoding), Triple(image.width, image.height, image.encoding))
+            val plane = image.planes.single()
+            assertEquals(listOf(72, 81, 90), List(3) { plane.buffer.get(8 + it).toInt() and 0xff })
+        }
+        val wide = Bitmap.createBitmap(3, 2, Bitmap.Config.RGBA_F16, true, ColorSpace.get(ColorSpace.Named.SRGB))
+        assertContains(assertFailsWith<PhasefrontException.Frame> { wide.toColourImage() }.message.orEmpty(), "ARGB_8888")
     }
 
     @Test

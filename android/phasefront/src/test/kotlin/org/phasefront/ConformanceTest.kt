@@ -67,6 +67,7 @@ class ConformanceTest {
                 colour.getJSONArray("planes").objects().map(::plane),
                 YuvMatrix.valueOf(colour.getString("matrix").uppercase()),
                 colour.getBoolean("video_range"),
+                RgbEncoding.valueOf(colour.getString("encoding").uppercase().replace('-', '_')),
             ),
             depth?.let { DepthImage(depthFormat!!, it.getInt("width"), it.getInt("height"), plane(it.getJSONObject("plane")), confidence) },
             Orientation(rotation, case.getBoolean("mirrored")),
