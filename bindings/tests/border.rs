@@ -5,7 +5,7 @@
 use std::path::Path;
 
 /// The calls that only read what exists already, and the end of a session, which has no error to report.
-const PLAIN: [&str; 15] = [
+const PLAIN: [&str; 16] = [
     "colours",
     "display",
     "height",
@@ -16,6 +16,7 @@ const PLAIN: [&str; 15] = [
     "plane_len",
     "share",
     "shut_down",
+    "srgb_of_light",
     "statistics",
     "target",
     "version",
