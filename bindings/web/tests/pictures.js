@@ -84,6 +84,22 @@ export async function run() {
   // The formats without alpha have the pixels of the others.
   if (seen.size !== 6) throw new Error(`${seen.size} different pictures`);
 
+  // A video frame says what its colours mean.
+  for (const [encoding, primaries, transfer] of [
+    ["srgb", "bt709", "bt709"],
+    ["display-p3", "smpte432", "iec61966-2-1"],
+    ["bt2020-hlg", "bt2020", "hlg"],
+    ["bt2020-pq", "bt2020", "pq"],
+  ]) {
+    const colorSpace = { primaries, transfer, matrix: "bt709", fullRange: true };
+    const { video, planes } = picture("I420", { colorSpace });
+    const { matrix, fullRange } = colorSpace;
+    const plain = { width: WIDTH, height: HEIGHT, format: "I420", planes, colorSpace: { matrix, fullRange } };
+    const [made] = await levels(new Frame(video, DEPTH));
+    equal(made, (await levels(new Frame(plain, DEPTH, { encoding })))[0], encoding);
+    video.close();
+  }
+
   // A part of a picture is that part.
   const { video, planes } = picture("I420", {
     visibleRect: { x: 16, y: 12, width: 32, height: 24 },

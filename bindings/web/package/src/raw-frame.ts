@@ -108,7 +108,7 @@ function rawFrameOf(colour: PackedColour | PlanarColour, depth: DepthImage, opti
   const pixels = COLOUR_BYTES[format] ?? [];
   const [width, height] = size("colour", colour);
   const space = colour.colorSpace;
-  const { matrix, fullRange } = (typeof space === "object" && space) || {};
+  const { matrix, fullRange } = ("planes" in colour && colour.colorSpace) || {};
   const bt709 = MATRICES[matrix ?? "smpte170m"];
   if (bt709 === undefined)
     throw new PhasefrontError(
