@@ -619,7 +619,7 @@ mod write {
         cases.push(one);
 
         let mut one = case("a network seeded by the plane sweep", vec![plain.clone()]);
-        one["method"] = json!("seeded-8-80-int8.onnx");
+        one["method"] = json!("unbundled/seeded-8-80-int8.onnx");
         cases.push(one);
 
         let mut one = case("what suits the depth", vec![plain.clone()]);

@@ -1,4 +1,4 @@
-"""The bundled networks as torch modules."""
+"""The networks of Phasefront as torch modules."""
 
 from pathlib import Path
 
@@ -8,16 +8,16 @@ MODELS = Path(__file__).parent / "models"
 
 
 def from_pretrained(name, models=MODELS):
-    """Returns (Chain, Display): a bundled network by its name, such as rgbd-15, in float32, and the display that it was
+    """Returns (Chain, Display): a network of Phasefront by its name, such as rgbd-15, in float32, and the display that it was
     trained for.
 
     `models` is the folder of the .onnx files, by default that of this package. `data.network_input` makes the input of a
     scene, and `Chain.field` gives the field. Raises ExportError for another name.
     """
-    file = Path(models) / f"{name}.onnx"
-    if not file.is_file():
-        known = sorted(p.stem for p in Path(models).glob("*.onnx") if not p.stem.endswith(("-int8", "-prefilter")))
-        if not known:
-            raise ExportError(f"{models}: no networks here; say where the folder models of Phasefront lies")
-        raise ExportError(f"no bundled network is called {name}; there are {', '.join(known)}")
-    return read_onnx(file)
+    files = {file.stem: file for file in sorted(Path(models).glob("**/*.onnx")) if not file.stem.endswith("-int8")}
+    if not files:
+        raise ExportError(f"{models}: no networks here; say where the folder models of Phasefront lies")
+    if name not in files:
+        known = [stem for stem in files if not stem.endswith("-prefilter")]
+        raise ExportError(f"no network of Phasefront is called {name}; there are {', '.join(known)}")
+    return read_onnx(files[name])

@@ -285,7 +285,7 @@ mod tests {
         let display = Display::from_toml("width = 33\nheight = 19\noffset_mm = 6").unwrap();
         let target = &Target::from(display.clone());
         let in_the_middle = &Target::from(display.clone().with_offset_m(0.0).unwrap());
-        let seeded = network(include_bytes!("../../../models/seeded-8-80.onnx"));
+        let seeded = network(include_bytes!("../../../models/unbundled/seeded-8-80.onnx"));
         let int8 = network(include_bytes!("../../../models/rgbd-8-int8.onnx"));
         let sweep = Sweep::of_planes(&display, 8);
         let deep = network(include_bytes!("../../../models/ddpm-8-prefilter.onnx"));

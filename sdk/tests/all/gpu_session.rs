@@ -112,7 +112,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
 #[test]
 fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(Size { width: W, height: H });
-    let seeded = Network::from_onnx(include_bytes!("../../../models/seeded-8-80.onnx")).unwrap();
+    let seeded = Network::from_onnx(include_bytes!("../../../models/unbundled/seeded-8-80.onnx")).unwrap();
     let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
     for (method, word) in [(sweep, "the sweep"), (Method::Seeded(Arc::new(seeded)), "Layers")] {
         plain.quality_levels[0].method = method;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// The name of the bundled pair of a network and its pre-filter for the deep double phase method.
 pub const DEEP: &str = PAIR.name;
 
-/// The names of the networks in the source tree's `models` folder that are not bundled.
+/// The names of the networks that are not bundled, in the source tree's folder `models/unbundled`.
 const FILES: [&str; 6] = [
     "ldi3-15",
     "natural-8",
@@ -64,10 +64,12 @@ fn unknown(path: &Path, name: &str, why: &std::io::Error) -> Error {
     Error::file(
         path,
         if FILES.contains(&name) {
-            format!("is not bundled ({bundled} are), but a file of the source tree: --network models/{name}.onnx")
+            format!(
+                "is not bundled ({bundled} are), but a file of the source tree: --network models/unbundled/{name}.onnx"
+            )
         } else {
             format!(
-                "is neither a bundled network ({bundled}) nor a file that can be read ({why}); other networks are files, as models/rgbd-30.onnx of the source tree: --network FILE.onnx"
+                "is neither a bundled network ({bundled}) nor a file that can be read ({why}); other networks are files, as models/unbundled/rgbd-30.onnx of the source tree: --network FILE.onnx"
             )
         },
     )
@@ -81,14 +83,17 @@ mod tests {
 
     #[test]
     fn every_network_of_the_source_tree_is_bundled_or_known_as_a_file() {
-        let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
-        let names = std::fs::read_dir(models).unwrap().filter_map(|entry| {
-            let path = entry.unwrap().path();
-            let is_card = path.extension().is_some_and(|e| e == "md");
-            is_card.then(|| path.file_stem().unwrap().to_str().unwrap().to_owned())
-        });
+        let cards = |folder: &str| -> BTreeSet<String> {
+            let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(folder);
+            let paths = std::fs::read_dir(models).unwrap().map(|entry| entry.unwrap().path());
+            let cards =
+                paths.filter(|path| path.extension().is_some_and(|e| e == "md") && !path.ends_with("README.md"));
+            cards
+                .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
+                .collect()
+        };
         let bundled = NETWORKS.iter().map(|model| model.name).chain([DEEP]);
-        let known: BTreeSet<_> = bundled.chain(FILES).map(str::to_owned).collect();
-        assert_eq!(names.collect::<BTreeSet<_>>(), known);
+        assert_eq!(cards(""), bundled.map(str::to_owned).collect());
+        assert_eq!(cards("unbundled"), FILES.map(str::to_owned).into());
     }
 }

@@ -33,7 +33,7 @@ impl Networks {
             text += &format!("\n{name:10} {layers:6}  {input:7} {offset}");
         }
         text += "\n8 and 15 are short for rgbd-8 and rgbd-15. Each comes as int8 and f32 (--precision), for a pitch of 8 µm, 638, 520 and 450 nm.";
-        text += "\nOther networks are files: --network FILE.onnx; the source tree has some in models/.";
+        text += "\nOther networks are files: --network FILE.onnx; the source tree has some in models/unbundled/.";
         terminal::print(json, &json!(values), text);
         Ok(())
     }

@@ -831,7 +831,7 @@ fn networks_that_cannot_be_used_are_named() {
         (
             "one of the source tree",
             made(&["--network", "rgbd-30"]),
-            &["rgbd-30: is not bundled", "--network models/rgbd-30.onnx"],
+            &["rgbd-30: is not bundled", "--network models/unbundled/rgbd-30.onnx"],
         ),
     ]);
 }
@@ -966,7 +966,7 @@ fn auto_sweeps_clean_depth_and_leaves_noisy_depth_to_a_network() {
 fn a_network_for_layers_takes_a_layered_depth_image() {
     let folder = Folder::new();
     ldi::write(&folder.path("a"), 5, Size { width: 61, height: 47 }, 2);
-    let network = format!("{MODELS}/ldi3-15.onnx");
+    let network = format!("{MODELS}/unbundled/ldi3-15.onnx");
     let call = ["hologram", "--ldi", "a", "--network", &network, "-o", "h.png"];
     let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&[&call[..], &["--json"]].concat())).unwrap();
     assert!(made["stage_ms"]["network"].is_number(), "{made}");

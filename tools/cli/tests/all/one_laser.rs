@@ -17,7 +17,10 @@ use serde_json::Value;
 use std::fs;
 
 /// A network that corrects the sweep's field.
-const SEEDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/seeded-8-80-int8.onnx");
+const SEEDED: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../models/unbundled/seeded-8-80-int8.onnx"
+);
 const W: usize = 48;
 const H: usize = 32;
 const FRAME: [&str; 6] = ["--rgb", "rgb.png", "--depth", "depth.png", "--display", "one.toml"];

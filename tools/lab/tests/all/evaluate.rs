@@ -465,7 +465,7 @@ fn a_focal_stack_is_the_fullest_bins_and_random_others() {
 fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     let data = Data::new();
     let network = networks::network("8", Some(Precision::Float32)).unwrap();
-    let layers = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/ldi3-15.onnx");
+    let layers = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/unbundled/ldi3-15.onnx");
     let layers = networks::network(layers, None).unwrap();
     let judged = [("8", &network), ("layers", &layers)]
         .map(|(name, n)| Method::network(name, n, SIZE, &data.manifest.display).unwrap());

@@ -105,7 +105,7 @@ fn the_fast_path_agrees_with_tract() {
 
 #[test]
 fn the_fast_path_of_networks_in_files_agrees_with_tract() {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/unbundled");
     for name in ["rgbd-30", "rgbd-15-wide", "seeded-8-80"] {
         for (precision, suffix) in [(Precision::Int8, "-int8"), (Precision::Float32, "")] {
             let file = std::fs::read(models.join(format!("{name}{suffix}.onnx"))).unwrap();
@@ -157,7 +157,7 @@ fn other_displays_are_served_by_physics() {
     }
     // A network for twice the depth also serves the paper's display, and serves a display with twice its λ·V/p² better
     // than visible waves do.
-    let wide = Arc::new(Network::from_onnx(include_bytes!("../../../../models/rgbd-15-wide.onnx")).unwrap());
+    let wide = Arc::new(Network::from_onnx(include_bytes!("../../../../models/unbundled/rgbd-15-wide.onnx")).unwrap());
     assert!(psnr_of(&wide, "") > trained - 0.5);
     let twice = "pitch_um = 5.66";
     let display = Display::from_toml(twice).unwrap();
@@ -184,7 +184,7 @@ fn displays_beyond_what_was_trained_are_refused() {
         let why = network.check_display(&display).unwrap_err().to_string();
         assert!(why.contains(what) && !why.contains('\n'), "{why}");
     }
-    let cylinder = Network::from_onnx(include_bytes!("../../../../models/rgbd-15-cylinder.onnx")).unwrap();
+    let cylinder = Network::from_onnx(include_bytes!("../../../../models/unbundled/rgbd-15-cylinder.onnx")).unwrap();
     cylinder.check_display(&Display::default()).unwrap();
     let why = cylinder.check_display(&Display::from_toml("volume_depth_mm = 3").unwrap());
     assert!(why.unwrap_err().to_string().contains("of one display"));

@@ -42,7 +42,7 @@ class BenchmarkTest {
     @Test
     fun aRecordHasEveryRunWithItsStagesAndConditions() {
         val lines = mutableListOf<String>()
-        val runs = Run.all(HologramNetwork.fromFile(System.getProperty("phasefront.suite") + "/../../models/rgbd-30-int8.onnx"))
+        val runs = Run.all(HologramNetwork.fromFile(System.getProperty("phasefront.suite") + "/../../models/unbundled/rgbd-30-int8.onnx"))
         val record = benchmark(runs, HologramDisplay(width = 64, height = 48))
             .record(JSONObject().put("model", "a test"), { true }, lines::add)
         // tests/kotlin converts it to a table.
