@@ -5,9 +5,10 @@ export CARGO_TARGET_DIR := env("CARGO_TARGET_DIR", cache_directory() / "phasefro
 _default:
     @just --list
 
-# Check formatting, names, documents and lints, and run the unit tests
+# Check formatting, documents, spelling and lints, and run the unit tests
 check:
-    tests/run skips names formatting documents spelling lints 'unit tests'
+    tests/run skips formatting documents spelling lints
+    cargo test --release --workspace --lib
 
 # Run the quick tests, or the Rust tests whose names contain FILTER
 test FILTER="":

@@ -1,9 +1,9 @@
-# Makes the documents of the Kotlin API and its artefact for JVMs by Maven. tests/kotlin and release/linux source this
+# Makes the documents of the Kotlin API and its artefact for JVMs by Maven. android/test and release/linux source this
 # file and set `cache`.
 # shellcheck shell=bash
 
 # Stays offline if an earlier run fetched everything for these pom.xml files.
-fetched="$cache/maven/fetched-$(cat android/pom.xml tests/maven/pom.xml | sha256sum | cut -c 1-16)"
+fetched="$cache/maven/fetched-$(cat android/pom.xml android/consumer/pom.xml | sha256sum | cut -c 1-16)"
 offline=()
 [ ! -e "$fetched" ] || offline=(--offline -Daether.offline.protocols=file)
 maven() {

@@ -16,9 +16,10 @@ as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
-# Installs Debian packages, or fails. Uses a lock, because steps run in parallel and apt-get cannot.
+# Names Debian packages and installs them, or fails. Uses a lock, because steps run in parallel and apt-get cannot.
 install() {
     need apt-get || return 1
+    echo "installing from Debian: $*" >&2
     (
         flock 9
         get() { as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=600 "$@" >/dev/null 2>&1; }
@@ -40,6 +41,17 @@ build_library() {
     need cargo || cannot 'cargo is missing; see https://rustup.rs'
     cargo build --release --quiet --workspace || exit 1
     cargo test --release --quiet --workspace --test conformance >/dev/null || exit 1
+}
+
+# Installs the packages that bindings/web/package.json names, or fails.
+npm_packages() {
+    need npm || install nodejs npm || cannot 'npm is missing, and apt-get could not install it'
+    (
+        flock 9
+        [ bindings/web/node_modules/.package-lock.json -nt bindings/web/package.json ] ||
+            { echo 'installing from npm: what bindings/web/package.json names' >&2 &&
+                npm install --silent --no-fund --no-audit --no-package-lock --prefix bindings/web; }
+    ) 9<bindings/web/package.json || cannot 'npm could not install what bindings/web/package.json names'
 }
 
 # Builds tests/counting.c for LD_PRELOAD and sets `counter` to its path.

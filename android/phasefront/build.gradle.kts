@@ -71,7 +71,7 @@ android {
     }
 
     sourceSets["main"].apply {
-        // `core` uses no Android class, so pom.xml and tests/kotlin test it on a JVM.
+        // `core` uses no Android class, so pom.xml and android/test test it on a JVM.
         kotlin.srcDirs("src/core/kotlin", generated)
         // The third-party notices of the library.
         resources.srcDir("src/core/resources")

@@ -31,7 +31,7 @@ android {
     }
 
     sourceSets["main"].apply {
-        // `core` uses no Android class except org.json, so pom.xml and tests/kotlin test it on a JVM.
+        // `core` uses no Android class except org.json, so pom.xml and android/test test it on a JVM.
         kotlin.srcDir("src/core/kotlin")
         // The project's sample scene.
         assets.srcDir("../../samples")

@@ -1,4 +1,4 @@
-"""Tests that a frame allocates nothing of an image's size. `tests/python` loads `tests/counting.c`, which counts what the
+"""Tests that a frame allocates nothing of an image's size. `bindings/python/test` loads `tests/counting.c`, which counts what the
 process allocates: arrays and the library's memory.
 """
 
@@ -19,7 +19,7 @@ PLANE = WIDTH * HEIGHT
 @pytest.fixture(scope="module")
 def allocated():
     counter = getattr(ctypes.CDLL(None), "allocated_bytes", None)
-    assert counter is not None, "nothing counts: run tests/python, which loads tests/counting.c"
+    assert counter is not None, "nothing counts: run bindings/python/test, which loads tests/counting.c"
     counter.restype = ctypes.c_uint64
     before = counter()
     numpy.empty(PLANE, numpy.uint8)

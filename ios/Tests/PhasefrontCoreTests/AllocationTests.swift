@@ -5,7 +5,7 @@
 
     @testable import PhasefrontCore
 
-    /// Tests that a frame allocates nothing of an image's size, neither in Swift nor in the library. `tests/swift` loads
+    /// Tests that a frame allocates nothing of an image's size, neither in Swift nor in the library. `ios/test` loads
     /// `tests/counting.c`, which counts what the process allocates.
     final class AllocationTests: XCTestCase {
         private static let (width, height) = (640, 480)
@@ -14,7 +14,7 @@
 
         private func counter() throws -> @convention(c) () -> UInt64 {
             let symbol = try XCTUnwrap(
-                dlsym(nil, "allocated_bytes"), "nothing counts: run tests/swift, which loads tests/counting.c")
+                dlsym(nil, "allocated_bytes"), "nothing counts: run ios/test, which loads tests/counting.c")
             return unsafeBitCast(symbol, to: (@convention(c) () -> UInt64).self)
         }
 

@@ -1,4 +1,4 @@
-//! Tests `phasefront view` and `phasefront judge`: the size limits of the pages, and the table. `tests/browser` tests
+//! Tests `phasefront view` and `phasefront judge`: the size limits of the pages, and the table. `pages` tests
 //! the pages in a browser.
 use crate::folder;
 use crate::ldi;

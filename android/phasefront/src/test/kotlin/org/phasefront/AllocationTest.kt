@@ -8,7 +8,7 @@ import kotlin.test.Test
 import kotlin.test.assertTrue
 
 /**
- * Tests that a frame allocates nothing of an image's size, neither on Java's heap nor elsewhere. `tests/kotlin` loads
+ * Tests that a frame allocates nothing of an image's size, neither on Java's heap nor elsewhere. `android/test` loads
  * `tests/counting.c`, which counts what the process allocates: direct buffers and the library's memory.
  */
 class AllocationTest {

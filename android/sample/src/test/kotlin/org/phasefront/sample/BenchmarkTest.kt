@@ -45,7 +45,7 @@ class BenchmarkTest {
         val runs = Run.all(HologramNetwork.fromFile(System.getProperty("phasefront.suite") + "/../../models/unbundled/rgbd-30-int8.onnx"))
         val record = benchmark(runs, HologramDisplay(width = 64, height = 48))
             .record(JSONObject().put("model", "a test"), { true }, lines::add)
-        // tests/kotlin converts it to a table.
+        // android/test converts it to a table.
         File(System.getProperty("phasefront.record")).writeText(record.toString())
         val read = JSONObject(record.toString())
         assertEquals(setOf("phasefront", "device", "runs"), read.keySet())

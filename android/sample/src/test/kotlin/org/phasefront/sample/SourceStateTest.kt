@@ -3,7 +3,7 @@ package org.phasefront.sample
 import kotlin.test.Test
 import kotlin.test.assertEquals
 
-/** iOS's sample has the same table, in tests/apple/Day.swift. */
+/** iOS's sample has the same table, in ios/stand-ins/Day.swift. */
 class SourceStateTest {
     private val states = listOf(
         SourceState.Stopped,

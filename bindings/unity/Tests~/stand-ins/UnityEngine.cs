@@ -1,4 +1,4 @@
-// The part of Unity that the sample uses, declared by hand, so that tests/c checks its types without Unity. Nothing here
+// The part of Unity that the sample uses, declared by hand, so that bindings/c/test checks its types without Unity. Nothing here
 // runs or ships.
 using System;
 

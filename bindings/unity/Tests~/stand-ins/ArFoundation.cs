@@ -1,4 +1,4 @@
-// The part of AR Foundation that the sample uses, declared by hand, so that tests/c checks its types without Unity. Nothing
+// The part of AR Foundation that the sample uses, declared by hand, so that bindings/c/test checks its types without Unity. Nothing
 // here runs or ships. Source: https://docs.unity3d.com/Packages/com.unity.xr.arfoundation@5.0/api/
 using System;
 

@@ -1,4 +1,4 @@
-// Runs a WebAssembly program for Cargo: `node tests/wasi.js PROGRAM [ARGUMENT…]`.
+// Runs a WebAssembly program for Cargo: `node wasi.cjs PROGRAM [ARGUMENT…]`.
 const { readFileSync } = require("node:fs");
 const { WASI } = require("node:wasi");
 

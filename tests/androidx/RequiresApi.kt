@@ -1,5 +1,0 @@
-// A substitute for the type checks of `tests/kotlin`: the original is only on Google's Maven. It neither runs nor
-// ships.
-package androidx.annotation
-
-annotation class RequiresApi(val value: Int)
