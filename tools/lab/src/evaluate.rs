@@ -11,17 +11,19 @@ mod ceiling;
 use crate::dataset::{self, Manifest};
 use crate::evaluate::ceiling::Ceiling;
 use crate::sensor::Sensor;
-use ndarray::{Array2, Array3, Axis, concatenate};
+use ndarray::{Array2, Array3, Axis, concatenate, s};
 use num_complex::Complex32;
 use phasefront::Size;
 use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
 use phasefront_core::display::levels::LevelsMut;
+use phasefront_core::frame::light_to_srgb;
 use phasefront_core::method::MethodPlan;
 use phasefront_core::method::network::InputKind;
 use phasefront_core::method::seeded::SeededPlan;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::pipeline::display_plan::{DisplayPlan, remove_mean_phase};
+use phasefront_core::view::colours::ViewColours;
 use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use phasefront_exact::incoherent::{self, Natural, Pupil};
 use phasefront_exact::point_based::{self, Occlusion};
@@ -31,6 +33,7 @@ use phasefront_io::dice::Dice;
 use phasefront_io::display::calibration::{self, AberrationFile};
 use phasefront_io::hologram::AberratedOptics;
 use phasefront_io::ldi::{Ldi, LdiLayer};
+use phasefront_io::picture::difference;
 use phasefront_io::{Result, picture};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -337,6 +340,9 @@ pub struct Judged {
     pub coherent: Figures,
     /// Against incoherent light.
     pub natural: Natural,
+    /// The mean CIEDE2000 of the colours at the midpoint from those of the coherent wave, as
+    /// [`difference::of_pictures`] gives it for the light of the lasers.
+    pub ciede2000: f64,
 }
 
 impl Judged {
@@ -353,7 +359,8 @@ impl Judged {
                 brightness: mean(|f| f.brightness),
                 light: mean(|f| f.light),
             },
-            natural: Natural::mean(scenes.map(|judged| judged.natural)),
+            natural: Natural::mean(scenes.clone().map(|judged| judged.natural)),
+            ciede2000: scenes.map(|judged| judged.ciede2000).sum::<f64>() / count,
         }
     }
 }
@@ -401,7 +408,24 @@ impl<'a> Truths<'a> {
                 ..judge(coherent, &self.coherent, margin)?
             },
             natural: of_pupil.judge(natural, margin)?,
+            ciede2000: self.colour_difference(&coherent[0], margin),
         })
+    }
+}
+
+impl Truths<'_> {
+    /// Returns the difference of the colours of `view`, at the midpoint, without `margin` pixels at the border.
+    fn colour_difference(&self, view: &Array3<f32>, margin: usize) -> f64 {
+        let colours = ViewColours::Srgb(light_to_srgb(self.display));
+        let light = |view: &Array3<f32>| {
+            let (_, height, width) = view.dim();
+            let inner = s![.., margin..height - margin, margin..width - margin];
+            difference::light_of_view(view.slice(inner), &colours)
+        };
+        match (light(view), light(&self.coherent[0])) {
+            (Some(view), Some(truth)) => difference::of_pictures(view.view(), truth.view()),
+            _ => unreachable!("views are light"),
+        }
     }
 }
 

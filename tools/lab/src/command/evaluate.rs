@@ -16,7 +16,8 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Evaluate methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks;
-/// brightness relative to the truth; and the share of the modulator's light that passes the aperture
+/// colours, as CIEDE2000 of the light of squares of 8 pixels at the midpoint; brightness relative to the truth; and the
+/// share of the modulator's light that passes the aperture
 ///
 /// A focal stack consists of a scene's 15 most frequent depths and 5 random ones.
 #[derive(Args)]
@@ -349,7 +350,7 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
     );
     let depths = widest(5, &depth);
     let mut text = format!(
-        "{:depths$}  wrong  {:method$}  {:shown$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  natural dB  in focus  out of focus  natural SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "{:depths$}  wrong  {:method$}  {:shown$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  natural dB  in focus  out of focus  natural SSIM  CIEDE2000  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
         "depth", "method", "shown"
     );
     for row in rows {
@@ -359,10 +360,14 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
             .iter()
             .map(|(_, f)| f.coherent.amplitude_psnr)
             .fold(f64::INFINITY, f64::min);
-        let Judged { coherent, natural } = row.mean;
+        let Judged {
+            coherent,
+            natural,
+            ciede2000,
+        } = row.mean;
         let db = |psnr: Option<f64>| psnr.map_or_else(|| "–".to_owned(), |psnr| format!("{psnr:.2}"));
         text += &format!(
-            "\n{:depths$}  {:4.1}%  {:method$}  {:shown$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.2}  {:>8}  {:>12}  {:12.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
+            "\n{:depths$}  {:4.1}%  {:method$}  {:shown$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.2}  {:>8}  {:>12}  {:12.4}  {ciede2000:9.2}  {:10.3}  {:.3}  {least:13.2} ({worst})",
             depth(row),
             100.0 * row.wrong_depth,
             row.method,

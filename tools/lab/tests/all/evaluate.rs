@@ -214,6 +214,34 @@ fn the_truth_is_the_truth_and_what_is_visible_is_nearer_to_it_than_the_image() {
     assert!(visible.coherent.focal_ssim > rgb.coherent.focal_ssim);
 }
 
+/// The true wave has the true colours. A tenth less light of all lasers changes them a little, a quarter less of green
+/// much more.
+#[test]
+fn colours_are_judged_by_light() {
+    let data = Data::new();
+    let display = &data.manifest.display;
+    let dimmed = |name: &str, factors: [f32; 3]| {
+        Method::new(name, move |ldi| {
+            let mut field = sm_lbm::hologram(ldi, display, PLANES, &|_, _| {})?;
+            for (mut plane, factor) in field.outer_iter_mut().zip(factors) {
+                plane.mapv_inplace(|v| v * factor);
+            }
+            Ok(field)
+        })
+    };
+    let methods = [
+        dimmed("true", [1.0; 3]),
+        dimmed("dim", [0.95; 3]),
+        dimmed("tinted", [1.0, 0.85, 1.0]),
+    ];
+    let rows = data.evaluate(&methods, &[Shown::complex()]);
+    let [same, dim, tinted] = [0, 1, 2].map(|i| rows[i].mean.ciede2000);
+    assert!(same < 1e-3, "{same}");
+    // L* + 16 goes with the cube root of light and is 3.4 % less: 0.5 of L* in the dark, 3.9 in white.
+    assert!((0.5..3.9).contains(&dim), "{dim}");
+    assert!(tinted > 2.0 * dim, "{tinted} {dim}");
+}
+
 /// Tests that the holograms of a data set that corrects an aberration are all viewed through it (Fig. 8).
 #[test]
 fn holograms_that_correct_an_aberration_are_judged_through_it() {
