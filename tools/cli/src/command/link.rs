@@ -10,7 +10,7 @@ use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Find out whether the cable sends limited range, YCbCr or scaled pixels, all of which ruin phase
+/// Find out whether the link to the modulator scales, filters, turns, covers or recolours pixels, all of which ruin phase
 #[derive(Subcommand)]
 pub(crate) enum Link {
     Pattern(Pattern),
@@ -50,11 +50,11 @@ impl Link {
 }
 
 fn checked(size: Size) -> Result<Size> {
-    if size.width >= 512 && size.height >= 24 {
+    if size.width >= 512 && size.height >= 96 {
         Ok(size)
     } else {
         Err(Error::Input(format!(
-            "a pattern of {size}; its 256 steps and six bands need at least 512×24"
+            "a pattern of {size}; its 256 steps and eight bands need at least 512×96"
         )))
     }
 }
@@ -78,11 +78,23 @@ impl Read {
     fn run(self, json: bool) -> Result<()> {
         let capture = packed::Image::read(&self.capture)?;
         checked(capture.size).map_err(|e| Error::file(&self.capture, e))?;
-        let reading = link::read(&capture, checked(self.size)?);
-        let text = if reading.faults.is_empty() {
-            "every pixel arrives as it is".into()
-        } else {
-            reading.faults.join("\n")
+        let sent = checked(self.size)?;
+        let reading = link::read(&capture, sent).ok_or_else(|| {
+            Error::file(
+                &self.capture,
+                format!(
+                    "does not show the pattern that `phasefront link pattern --size {}x{}` writes",
+                    sent.width, sent.height
+                ),
+            )
+        })?;
+        let text = match reading.faults.is_empty() {
+            true if reading.noise < 0.05 => "every pixel arrives as it is".into(),
+            true => format!(
+                "every pixel arrives as it is, to the capture's noise of {:.1} levels",
+                reading.noise
+            ),
+            false => reading.faults.join("\n"),
         };
         terminal::print(json, &json!(reading), text);
         match reading.faults.len() {
