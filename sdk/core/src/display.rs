@@ -260,6 +260,25 @@ impl Display {
         self.wavelengths_m.len()
     }
 
+    /// Returns, for each laser, the phase of a path that has one turn at the wavelength `at_nm`, in turns: at_nm/λ. It
+    /// leaves out the dispersion of the modulator's material.
+    ///
+    /// # Errors
+    /// Returns an error if `at_nm` is not the wavelength of light that displays use, 300 to 2000 nm.
+    #[doc(hidden)]
+    pub fn phase_factors(&self, at_nm: f64) -> Result<Vec<f64>> {
+        if !(300.0..=2000.0).contains(&at_nm) {
+            return Err(Error::Display(format!(
+                "at_nm is {at_nm}; it is the wavelength of a measurement, 300 to 2000 nm"
+            )));
+        }
+        Ok(self
+            .wavelengths_m
+            .iter()
+            .map(|wavelength_m| at_nm * 1e-9 / wavelength_m)
+            .collect())
+    }
+
     /// Returns the depth V of the volume, in metres.
     pub fn volume_depth_m(&self) -> f64 {
         self.volume_depth_m

@@ -117,9 +117,14 @@ impl DisplayFlags {
             file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
             file.device.display = file.target.display.clone();
         }
-        if let Some(turns) = &file.target.panel.levels_turns
-            && let Some(gap) = gap(turns)
-        {
+        let lasers = file.device.lasers_turns.iter().flatten();
+        let widest = file
+            .device
+            .levels_turns
+            .iter()
+            .chain(lasers)
+            .filter_map(|turns| gap(turns));
+        if let Some(gap) = widest.reduce(f64::max) {
             log::warn!(
                 "the modulator's levels reach {:.2} of 2π; phases beyond become the nearest that they show, at most {:.2} rad away",
                 1.0 - gap,

@@ -1,6 +1,7 @@
 //! Display files: the TOML file of a display and the files that it refers to.
 
 pub mod calibration;
+mod lut;
 mod panel;
 pub mod spatial;
 
@@ -62,7 +63,10 @@ impl DisplayFile {
     /// Returns the parts of the calibration that a hologram file does not store, by their keys in the display file.
     pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
         let keys = [
-            ("per_pixel", phase_only && self.target.response.size().is_some()),
+            (
+                "per_pixel or phases of each laser",
+                phase_only && self.target.response.size().is_some(),
+            ),
             ("laser", phase_only && self.target.illumination.is_some()),
             ("aberration", self.aberration.is_some()),
             ("model", phase_only && self.target.model.is_some()),
@@ -114,6 +118,7 @@ pub fn uncalibrated(name: &str) -> Result<toml::Table> {
             };
             match table.get_mut("flatness") {
                 Some(toml::Value::Array(names)) => names.iter_mut().try_for_each(absolute)?,
+                Some(toml::Value::Table(at)) => at.get_mut("file").map_or(Ok(()), absolute)?,
                 Some(name) => absolute(name)?,
                 None => {}
             }
@@ -165,6 +170,21 @@ const NAMED: [&str; 5] = ["lut", "per_pixel", "laser", "aberration", "model"];
 /// The keys that define the phase of each level. A file has at most one of them.
 const PHASES: [&str; 4] = ["lut", "per_pixel", "levels_turns", "range_turns"];
 
+/// Returns the keys of `table` whose one value serves all lasers, although it holds for one wavelength.
+fn one_for_all(table: &toml::Table) -> Vec<&'static str> {
+    let one = |key: &str| match table.get(key) {
+        Some(toml::Value::String(_)) => true,
+        Some(toml::Value::Array(values)) => key == "levels_turns" && !values.iter().any(toml::Value::is_array),
+        Some(toml::Value::Float(turns)) => *turns != 1.0,
+        Some(toml::Value::Integer(turns)) => *turns != 1,
+        _ => false,
+    };
+    ["lut", "levels_turns", "range_turns", "flatness"]
+        .into_iter()
+        .filter(|key| one(key))
+        .collect()
+}
+
 /// Checks the keys in the `table` of the display file at `path`.
 fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
     let known = [&keys::DISPLAY[..], &keys::DEVICE, &NAMED, &panel::KEYS].concat();
@@ -183,25 +203,29 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 }
 
 /// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser`, `aberration` and `model` name files relative to
-/// it: `lut` is a text file of 256 levels in one or two columns, and [`crate::display::calibration`] describes the
-/// others. [`ModulatorSpec`] and `crate::display::panel` describe the remaining keys.
+/// it: `crate::display::lut` describes `lut`, and [`crate::display::calibration`] the others. [`ModulatorSpec`] and `crate::display::panel` describe the remaining keys.
 ///
 /// # Errors
 /// Returns an error if a file is missing or has invalid contents.
 pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let mut table = parse(path)?;
     check_keys(path, &table)?;
+    let one_for_all = one_for_all(&table);
+    let luts = lut::take(path, &mut table)?;
     let mut named = |key: &str| match table.remove(key) {
         None => Ok(None),
         Some(toml::Value::String(name)) => Ok(Some(path.with_file_name(name))),
         Some(_) => Err(Error::file(path, format!("{key} must be the name of a file"))),
     };
-    let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
+    let per_pixel_path = named("per_pixel")?;
     let (laser_path, aberration_path, model_path) = (named("laser")?, named("aberration")?, named("model")?);
     let panel = panel::take(path, &mut table)?;
     let device = ModulatorSpec::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
     let display = &device.display;
-    let lut = lut_path.map(|path| read_lut(&path, display)).transpose()?;
+    let (lut, of_lasers) = match luts {
+        None => (None, None),
+        Some(luts) => luts.read(path, display)?,
+    };
     let per_pixel = match per_pixel_path {
         None => None,
         Some(path) => {
@@ -222,6 +246,7 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let mut target = device.target()?;
     let calibrated = match (per_pixel, lut) {
         (Some(table), _) => Some(Response::PerPixel(table)),
+        (None, None) if of_lasers.is_some() => of_lasers.map(|table| Response::PerPixel(Arc::new(table))),
         (None, Some(lut)) => Some(Response::lut(lut)),
         (None, None) => None,
     };
@@ -242,47 +267,20 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
             Some(aberration)
         }
     };
+    if target.display.colours() > 1 && !one_for_all.is_empty() {
+        log::warn!(
+            "{}: {} holds for one wavelength, and the display has {} lasers; write at which it was measured (docs/devices.md, at_nm), or a value for each laser",
+            path.display(),
+            one_for_all.join(" and "),
+            target.display.colours()
+        );
+    }
     Ok(DisplayFile {
         target,
         device,
         lut,
         aberration,
     })
-}
-
-/// Reads a look-up table for `display`: a text file of 256 levels, or of two columns, the numbers 0 to 255 in any order
-/// and their levels (a Meadowlark `.lut`).
-fn read_lut(path: &Path, display: &Display) -> Result<[u8; 256]> {
-    let text = input::text(path)?;
-    let refuse = |why: String| Err(Error::file(path, why));
-    // Editors on Windows write a byte-order mark.
-    let numbers = text.trim_start_matches('\u{feff}').split_whitespace();
-    let numbers: std::result::Result<Vec<u16>, _> = numbers.map(str::parse).collect();
-    let mut numbers = numbers.map_err(|e| Error::file(path, format!("holds what is no level of 0..=255: {e}")))?;
-    if numbers.len() == 512 {
-        let mut pairs: Vec<_> = numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect();
-        pairs.sort();
-        if !pairs.iter().map(|(step, _)| usize::from(*step)).eq(0..256) {
-            return refuse("has 512 numbers; in two columns, the first holds each of 0 to 255 once".into());
-        }
-        numbers = pairs.into_iter().map(|(_, level)| level).collect();
-        if let Some(voltage) = numbers.iter().find(|number| **number > 255) {
-            return refuse(format!(
-                "holds the driver's voltage {voltage}, and images hold levels up to 255; load the file into the modulator's driver and leave lut out"
-            ));
-        }
-    }
-    let levels: std::result::Result<Vec<u8>, _> = numbers.into_iter().map(u8::try_from).collect();
-    let levels = levels.map_err(|e| Error::file(path, format!("holds what is no level of 0..=255: {e}")))?;
-    let lut = lut_of(&levels).map_err(|e| Error::file(path, e))?;
-    let most = lut.into_iter().max().unwrap_or_default();
-    if u32::from(most) >> display.bits() != 0 {
-        return refuse(format!(
-            "holds a level of {most}, over the {} bits of the display",
-            display.bits()
-        ));
-    }
-    Ok(lut)
 }
 
 /// Converts levels to a look-up table.

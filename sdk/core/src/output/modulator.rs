@@ -9,15 +9,18 @@
 //! # Ok::<(), phasefront::Error>(())
 //! ```
 
+use crate::Size;
 use crate::display::Display;
 use crate::display::panel::Panel;
 use crate::display::response::Response;
+use crate::display::response::per_pixel::PerPixel;
 use crate::display::target::Target;
 use crate::output::{Cells, Layout, Split};
 use crate::runtime::error::{Error, Result};
 use crate::runtime::keys;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A modulator as its file describes it.
 #[derive(Debug, Clone)]
@@ -33,8 +36,10 @@ pub struct ModulatorSpec {
     /// Whether the whole frame is flipped top to bottom.
     pub flip_y: bool,
     /// The phase of each level in turns of 2π, starting with level 0. `None` if the levels are evenly spaced over one
-    /// turn.
+    /// turn, or if they differ from laser to laser.
     pub levels_turns: Option<Vec<f64>>,
+    /// The phase of each level in turns of 2π for each laser, if they differ from laser to laser.
+    pub lasers_turns: Option<Vec<Vec<f64>>>,
     /// The frame rate in hertz.
     pub rate_hz: Option<f64>,
     /// The source of each figure, by its key in the file.
@@ -64,13 +69,28 @@ struct ModulatorToml {
     flip_x: bool,
     #[serde(default)]
     flip_y: bool,
-    levels_turns: Option<Vec<f64>>,
-    range_turns: Option<f64>,
+    levels_turns: Option<TurnsToml<Vec<f64>>>,
+    range_turns: Option<TurnsToml<f64>>,
     rate_hz: Option<f64>,
     #[serde(default)]
     sources: BTreeMap<String, String>,
     #[serde(default)]
     unconfirmed: BTreeMap<String, String>,
+}
+
+/// Phases of levels: of all lasers, of each, or at the wavelength at which they were measured.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum TurnsToml<T> {
+    All(T),
+    Lasers(Vec<T>),
+    At { turns: T, at_nm: f64 },
+}
+
+/// Phases of levels as the target takes them.
+enum Turns {
+    All(Vec<f64>),
+    Lasers(Vec<Vec<f64>>),
 }
 
 #[derive(Deserialize)]
@@ -160,13 +180,20 @@ impl ModulatorSpec {
             .collect();
         let display = Display::deserialize(table).map_err(|e| refuse(keys::message(&e)))?;
         let own = ModulatorToml::deserialize(own).map_err(|e| match keys::message(&e) {
+            message if message.contains("TurnsToml") => refuse(
+                "levels_turns and range_turns are numbers for all lasers, a list of them with one for each laser, or { turns = …, at_nm = 638 }",
+            ),
             message if message.contains("untagged") => refuse(format!(
                 "packing must be {}, or say which bits red, green and blue hold, or memory and layout of cells",
                 NAMED.map(|(name, _)| name).join(", ")
             )),
             message => refuse(message),
         })?;
-        let levels_turns = levels(&own, &display)?;
+        let (levels_turns, lasers_turns) = match levels(&own, &display)? {
+            None => (None, None),
+            Some(Turns::All(turns)) => (Some(turns), None),
+            Some(Turns::Lasers(turns)) => (None, Some(turns)),
+        };
         let packing = match &own.packing {
             None => Packing::default_for(&display),
             Some(packing) => packing.packing()?,
@@ -186,6 +213,7 @@ impl ModulatorSpec {
             flip_x: own.flip_x,
             flip_y: own.flip_y,
             levels_turns,
+            lasers_turns,
             rate_hz: own.rate_hz,
             sources: own.sources,
             unconfirmed: own.unconfirmed,
@@ -198,9 +226,13 @@ impl ModulatorSpec {
     /// Returns an error if levels of more than 8 bits are not evenly spaced over one turn.
     pub fn target(&self) -> Result<Target> {
         let target = Target::from(&self.display);
-        match &self.levels_turns {
-            None => Ok(target),
-            Some(turns) => Ok(Target {
+        match (&self.levels_turns, &self.lasers_turns) {
+            (None, None) => Ok(target),
+            (_, Some(turns)) => Ok(Target {
+                response: Response::PerPixel(Arc::new(of_lasers(self.display.size(), turns)?)),
+                ..target
+            }),
+            (Some(turns), None) => Ok(Target {
                 response: Response::of_turns(turns)?,
                 panel: Panel {
                     levels_turns: Some(turns.clone()),
@@ -212,29 +244,78 @@ impl ModulatorSpec {
     }
 }
 
+/// Returns the table of a modulator whose level l shows the phase `turns[laser][l]`, in turns.
+fn of_lasers(size: Size, turns: &[Vec<f64>]) -> Result<PerPixel> {
+    let reach: Vec<f64> = turns.iter().map(|turns| turns[turns.len() - 1]).collect();
+    PerPixel::of_lasers(size, &reach, |laser, phase| {
+        let turns = &turns[laser];
+        let after = turns.partition_point(|turn| *turn < phase).clamp(1, turns.len() - 1);
+        let (from, to) = (turns[after - 1], turns[after]);
+        (after - 1) as f64 + (phase - from) / (to - from)
+    })
+}
+
 /// Returns the phase of each level in turns, or `None` if the levels are evenly spaced over one turn.
-fn levels(of: &ModulatorToml, display: &Display) -> Result<Option<Vec<f64>>> {
+///
+/// A level retards light by the same path at every wavelength if the birefringence (or a mirror's height) does, so its
+/// phase is that at `at_nm` times at_nm/λ. The dispersion of liquid crystals is left out; it makes the phase of shorter
+/// waves a few percent larger.
+fn levels(of: &ModulatorToml, display: &Display) -> Result<Option<Turns>> {
     let count = 1usize << display.bits();
-    let turns = match (&of.levels_turns, of.range_turns) {
-        (None, None | Some(1.0)) => return Ok(None),
+    let even = |range: &f64| (0..count).map(|level| range * level as f64 / count as f64).collect();
+    let all = match (&of.levels_turns, &of.range_turns) {
+        (None, None | Some(TurnsToml::All(1.0))) => return Ok(None),
         (Some(_), Some(_)) => return Err(refuse("levels_turns and range_turns say the same; give one")),
-        (Some(turns), None) => turns.clone(),
-        (None, Some(range)) => (0..count).map(|level| range * level as f64 / count as f64).collect(),
+        (Some(turns), None) => by_laser(turns, display, Vec::clone)?,
+        (None, Some(range)) => by_laser(range, display, even)?,
     };
     if display.bits() > 8 {
         return Err(refuse(
             "levels_turns and range_turns are for at most 8 bits; over that levels are even over one turn",
         ));
     }
-    if turns.len() != count {
+    let lasers = match &all {
+        Turns::All(turns) => std::slice::from_ref(turns),
+        Turns::Lasers(_) if display.bits() != 8 => {
+            return Err(refuse("levels_turns and range_turns of each laser are for 8 bits"));
+        }
+        Turns::Lasers(lasers) => lasers,
+    };
+    for turns in lasers {
+        if turns.len() != count {
+            return Err(refuse(format!(
+                "levels_turns has {} levels; {} bits have {count}",
+                turns.len(),
+                display.bits()
+            )));
+        }
+        Response::of_turns(turns)?;
+    }
+    Ok(Some(all))
+}
+
+/// Returns the phases of levels that `given` says, for all lasers or for each laser of `display`.
+fn by_laser<T>(given: &TurnsToml<T>, display: &Display, turns: impl Fn(&T) -> Vec<f64>) -> Result<Turns> {
+    let lasers: Vec<Vec<f64>> = match given {
+        TurnsToml::All(all) => return Ok(Turns::All(turns(all))),
+        TurnsToml::Lasers(each) => each.iter().map(turns).collect(),
+        TurnsToml::At { turns: at, at_nm } => {
+            let factors = display.phase_factors(*at_nm)?;
+            let of = |factor: &f64| turns(at).iter().map(|turn| turn * factor).collect();
+            factors.iter().map(of).collect()
+        }
+    };
+    if lasers.len() != display.colours() {
         return Err(refuse(format!(
-            "levels_turns has {} levels; {} bits have {count}",
-            turns.len(),
-            display.bits()
+            "levels_turns or range_turns for {} lasers; the display has {}",
+            lasers.len(),
+            display.colours()
         )));
     }
-    Response::of_turns(&turns)?;
-    Ok(Some(turns))
+    Ok(match <[Vec<f64>; 1]>::try_from(lasers) {
+        Ok([one]) => Turns::All(one),
+        Err(lasers) => Turns::Lasers(lasers),
+    })
 }
 
 impl PackingToml {
@@ -264,6 +345,7 @@ impl From<Display> for ModulatorSpec {
             flip_x: false,
             flip_y: false,
             levels_turns: None,
+            lasers_turns: None,
             rate_hz: None,
             sources: BTreeMap::new(),
             unconfirmed: BTreeMap::new(),
@@ -312,7 +394,6 @@ impl Packing {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::Size;
     use crate::output::BitPlanes;
 
     /// Returns the levels in `text`, one hexadecimal digit for each of 256 steps of 2π.

@@ -78,7 +78,10 @@ fn calibrated(file: &DisplayFile) -> Vec<&'static str> {
     let target = &file.target;
     let keys = [
         ("lut", file.lut.is_some()),
-        ("per_pixel", target.response.size().is_some()),
+        (
+            "per_pixel or lut of each laser",
+            target.response.size().is_some() && file.device.lasers_turns.is_none(),
+        ),
         ("laser", target.illumination.is_some()),
         ("aberration", file.aberration.is_some()),
         ("model", target.model.is_some()),
@@ -113,6 +116,18 @@ fn describe(file: &DisplayFile) -> String {
     if let Some(turns) = device.levels_turns.as_ref().and_then(|turns| turns.last()) {
         text += &format!("\n{:12} {} turns at the last level", "range", rounded(*turns));
     }
+    if let Some(lasers) = &device.lasers_turns {
+        let ends: Vec<_> = lasers
+            .iter()
+            .filter_map(|turns| turns.last())
+            .map(|end| rounded(*end).to_string())
+            .collect();
+        text += &format!(
+            "\n{:12} {} turns at the last level of each laser",
+            "range",
+            ends.join(", ")
+        );
+    }
     if let Some(rate) = device.rate_hz {
         text += &format!("\n{:12} {} Hz", "rate", rounded(rate));
     }
@@ -137,7 +152,7 @@ fn object(name: &str, device: &ModulatorSpec) -> serde_json::Value {
         "name": Path::new(name).file_stem().and_then(|stem| stem.to_str()), "title": device.name,
         "width": display.size().width, "height": display.size().height, "pitch_um": display.pitch_m() * 1e6,
         "bits": display.bits(), "packing": packing(device), "flip_x": device.flip_x, "flip_y": device.flip_y,
-        "levels_turns": device.levels_turns, "rate_hz": device.rate_hz,
+        "levels_turns": device.levels_turns, "lasers_turns": device.lasers_turns, "rate_hz": device.rate_hz,
         "sources": device.sources, "unconfirmed": device.unconfirmed,
     })
 }

@@ -118,6 +118,156 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
     assert!(errors.contains("--display"), "{errors}");
 }
 
+/// Returns the PSNR of each colour's picture in dB, as an aperture of the whole first order shows the `levels` of a panel
+/// that retards light of colour c by `turns[c]` of 2π at level 256. The brightness is fitted.
+fn shown_on(levels: &[u16], turns: [f64; 3], picture: &image::RgbImage) -> [f64; 3] {
+    use num_complex::Complex64;
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let mut planner = rustfft::FftPlanner::new();
+    let mut transform = |field: &mut [Complex64], inverse: bool| {
+        let direction = match inverse {
+            true => rustfft::FftDirection::Inverse,
+            false => rustfft::FftDirection::Forward,
+        };
+        planner.plan_fft(width, direction).process(field);
+        let columns = planner.plan_fft(height, direction);
+        for x in 0..width {
+            let mut column: Vec<_> = (0..height).map(|y| field[y * width + x]).collect();
+            columns.process(&mut column);
+            (0..height).for_each(|y| field[y * width + x] = column[y]);
+        }
+    };
+    std::array::from_fn(|colour| {
+        let levels = &levels[colour * width * height..][..width * height];
+        let phase = |level: &u16| f64::from(*level) / 256.0 * turns[colour] * std::f64::consts::TAU;
+        let mut field: Vec<_> = levels.iter().map(|level| Complex64::cis(phase(level))).collect();
+        transform(&mut field, false);
+        for (at, value) in field.iter_mut().enumerate() {
+            let frequency = |at: usize, of: usize| (at.min(of - at)) as f64 / of as f64;
+            let (fy, fx) = (frequency(at / width, height), frequency(at % width, width));
+            if fx * fx + fy * fy > 0.25 {
+                *value = Complex64::ZERO;
+            }
+        }
+        transform(&mut field, true);
+        let seen: Vec<f64> = field.iter().map(|value| value.norm()).collect();
+        let want: Vec<f64> = picture
+            .pixels()
+            .map(|pixel| f64::from(pixel.0[colour]) / 255.0)
+            .collect();
+        let gain = seen.iter().zip(&want).map(|(a, b)| a * b).sum::<f64>() / seen.iter().map(|a| a * a).sum::<f64>();
+        let errors = seen.iter().zip(&want).map(|(a, b)| (gain * a - b).powi(2));
+        -10.0 * (errors.sum::<f64>() / want.len() as f64).log10()
+    })
+}
+
+/// A panel is measured once, at 638 nm, where 256 levels are a turn. Its path is the same for all lasers, so they are 1.23
+/// turns of green and 1.42 of blue.
+#[test]
+fn one_measurement_of_a_panel_serves_three_lasers() {
+    let folder = Folder::new();
+    let picture = image::RgbImage::from_fn(160, 128, |x, y| {
+        let wave = |of: f64| (127.0 + 100.0 * (of / 9.0).sin()) as u8;
+        image::Rgb([
+            wave(f64::from(x + y)),
+            wave(f64::from(2 * x)),
+            wave(f64::from(3 * y) - f64::from(x)),
+        ])
+    });
+    picture.save(folder.path("rgb.png")).unwrap();
+    image::GrayImage::from_pixel(160, 128, image::Luma([128]))
+        .save(folder.path("depth.png"))
+        .unwrap();
+    let table: String = (0..256).map(|level| format!("{level}\n")).collect();
+    fs::write(folder.path("lut.txt"), table).unwrap();
+    let turns: Vec<String> = (0..256).map(|level| format!("{}", f64::from(level) / 256.0)).collect();
+    let turns = turns.join(", ");
+    let panel = [1.0, 638.0 / 520.0, 638.0 / 450.0];
+    let made = |name: &str, line: &str| {
+        fs::write(folder.path("d.toml"), format!("width = 160\nheight = 128\n{line}\n")).unwrap();
+        let output = format!("{name}.png");
+        let frame = [
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--method",
+            "sweep",
+            "--rgb-encoding",
+            "amplitude",
+        ];
+        let told = folder.run(&[&frame[..], &["--display", "d.toml", "-o", &output]].concat());
+        let said = String::from_utf8(told.stderr).unwrap();
+        assert!(told.status.success(), "{said}");
+        (levels(&folder.path(&output)), said)
+    };
+    let ideal = shown_on(&made("ideal", "").0, [1.0; 3], &picture);
+    assert!(ideal.iter().all(|psnr| *psnr > 25.0), "{ideal:?}");
+    for line in [
+        "range_turns = { turns = 1.0, at_nm = 638 }",
+        "range_turns = { turns = 1.0906666666666667, at_nm = 585 }",
+        "range_turns = [1.0, 1.226923, 1.417778]",
+        &format!("levels_turns = {{ turns = [{turns}], at_nm = 638 }}"),
+        "lut = { file = \"lut.txt\", at_nm = 638 }",
+    ] {
+        let (levels, said) = made("panel", line);
+        assert!(!said.contains("one wavelength"), "{line}: {said}");
+        let shown = shown_on(&levels, panel, &picture);
+        println!("{:.40}: ideal {ideal:.1?}, shown {shown:.1?}", line);
+        for colour in 0..3 {
+            assert!(
+                shown[colour] > ideal[colour] - 1.0,
+                "{line}: {shown:?}, ideally {ideal:?}"
+            );
+        }
+    }
+    // One table for all lasers is for one of them, and is told so.
+    let (levels, said) = made("panel", "lut = \"lut.txt\"");
+    assert!(
+        said.contains("lut holds for one wavelength, and the display has 3 lasers"),
+        "{said}"
+    );
+    let shown = shown_on(&levels, panel, &picture);
+    println!("one for all: {shown:.1?}");
+    assert!(shown[0] > ideal[0] - 1.0 && shown[2] < ideal[2] - 6.0, "{shown:?}");
+    // A view needs the display's file, and is that of the ideal panel.
+    made("panel", "range_turns = { turns = 1.0, at_nm = 638 }");
+    let view = folder.succeeds(&[
+        "refocus",
+        "panel.png",
+        "--display",
+        "d.toml",
+        "--z-mm",
+        "0",
+        "-o",
+        "view.png",
+    ]);
+    assert!(!view.is_empty());
+    let seen = picture::read_rgb(&folder.path("view.png")).unwrap();
+    folder.succeeds(&["refocus", "ideal.png", "--z-mm", "0", "-o", "ideal-view.png"]);
+    let best = picture::read_rgb(&folder.path("ideal-view.png")).unwrap();
+    let alike = phasefront_core::optics::metrics::compare(seen.view(), best.view()).unwrap();
+    assert!(alike.psnr_overall > 35.0, "{}", alike.psnr_overall);
+}
+
+#[test]
+fn wrong_values_of_each_laser_are_named() {
+    let folder = Folder::new();
+    fs::write(folder.path("lut.txt"), "0\n".repeat(255) + "9\n").unwrap();
+    for (line, word) in [
+        ("range_turns = [1.0, 1.2]", "for 2 lasers; the display has 3"),
+        ("range_turns = \"1.0\"", "at_nm"),
+        ("range_turns = { turns = 1.0, at_nm = 0.638 }", "at_nm is 0.638"),
+        ("lut = [\"lut.txt\"]", "names 1 files; the display has 3"),
+        ("bits = 4\nrange_turns = [1.0, 1.2, 1.4]", "8 bits"),
+    ] {
+        fs::write(folder.path("d.toml"), line).unwrap();
+        let said = folder.fails(&["devices", "d.toml"], 1);
+        assert!(said.contains(word), "{line}: {said}");
+    }
+}
+
 #[test]
 fn maps_of_one_image_become_bit_planes() {
     let folder = Folder::new();

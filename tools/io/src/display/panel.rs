@@ -3,13 +3,15 @@
 //! ```toml
 //! carrier_mrad = [4.0, 0.0]              # right and down, the same for all colours
 //! lens_mm = 300.0                        # positive focuses light toward the viewer
-//! flatness = "CAL_LSH0802200_520nm.bmp"  # or one file for each colour
+//! flatness = { file = "CAL_LSH0802200_520nm.bmp", at_nm = 520 }  # or one file for each colour
 //! shift_px = [[0.5, 0.0], [0.0, 0.0], [-0.25, 1.0]]   # red, green, blue, or the one laser: right and down
 //! scale = [1.001, 1.0, 0.998]
 //! ```
 //!
 //! A flatness file is a grey image of the modulator's size whose full range is 2π (Hamamatsu's correction pattern), or
-//! a CSV of levels 0 to 1023 whose first row and column are coordinates (Santec). It is added to the phases modulo 2π.
+//! a CSV of levels 0 to 1023 whose first row and column are coordinates (Santec), separated by commas, semicolons or
+//! tabs. It is added to the phases modulo 2π. A map measured at one wavelength is unwrapped, and each laser of the
+//! wavelength λ takes it times at_nm/λ: the path that it makes up for is the same.
 
 use crate::input::{self, MOST_PICTURE};
 use crate::output::has_extension;
@@ -42,6 +44,7 @@ pub(crate) struct PanelToml {
 enum FlatnessToml {
     One(String),
     Colours([String; 3]),
+    At { file: String, at_nm: f64 },
 }
 
 /// The names of these keys.
@@ -55,7 +58,7 @@ pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
     PanelToml::deserialize(own).map_err(|e| match e.message() {
         message if message.contains("untagged") => Error::file(
             path,
-            "flatness must be the name of a file, or of three, for red, green and blue",
+            "flatness must be the name of a file, of three, for red, green and blue, or { file = …, at_nm = 520 }",
         ),
         _ => Error::file(path, keys::message(&e)),
     })
@@ -68,16 +71,20 @@ impl PanelToml {
         panel.carrier_rad = self.carrier_mrad.unwrap_or_default().map(|mrad| mrad / 1e3);
         panel.lens_m = self.lens_mm.map(|mm| mm / 1e3);
         let modulator = target.display.size();
-        let names = match self.flatness {
-            None => vec![],
-            Some(FlatnessToml::One(name)) => vec![name],
-            Some(FlatnessToml::Colours(names)) => names.into(),
+        let read = |name: &String| read_flatness(&path.with_file_name(name), modulator);
+        let maps = match &self.flatness {
+            None => None,
+            Some(FlatnessToml::One(name)) => Some(read(name)?),
+            Some(FlatnessToml::Colours(names)) => Some(names.iter().map(read).collect::<Result<Vec<_>>>()?.concat()),
+            Some(FlatnessToml::At { file, at_nm }) => {
+                let factors = target.display.phase_factors(*at_nm).map_err(|e| Error::file(path, e))?;
+                let turns = unwrapped(&read(file)?, modulator.width)
+                    .map_err(|why| Error::file(path.with_file_name(file), why))?;
+                let scaled = |factor: f64| turns.iter().map(move |turn| (turn * factor).round() as i64 as u16);
+                Some(factors.into_iter().flat_map(scaled).collect())
+            }
         };
-        if !names.is_empty() {
-            let maps = names
-                .iter()
-                .map(|name| read_flatness(&path.with_file_name(name), modulator));
-            let maps = maps.collect::<Result<Vec<_>>>()?.concat();
+        if let Some(maps) = maps {
             panel.flatness = Some(Flatness::new(modulator, maps)?);
         }
         target.registration = Registration {
@@ -105,6 +112,29 @@ fn read_flatness(path: &Path, size: Size) -> Result<Vec<u16>> {
         ));
     }
     Ok(turns)
+}
+
+/// Returns `map`, in units of 2π/65536, without jumps of a turn: each pixel lies within half a turn of the one to its
+/// left, and the first pixel of a row of the one above.
+fn unwrapped(map: &[u16], width: usize) -> std::result::Result<Vec<f64>, String> {
+    let apart = |value: u16, before: u16| f64::from(value.wrapping_sub(before) as i16);
+    let mut turns: Vec<f64> = Vec::with_capacity(map.len());
+    for (at, &value) in map.iter().enumerate() {
+        turns.push(match (at % width, at / width) {
+            (0, 0) => f64::from(value),
+            (0, _) => turns[at - width] + apart(value, map[at - width]),
+            _ => turns[at - 1] + apart(value, map[at - 1]),
+        });
+    }
+    let torn = (width..turns.len()).find(|at| (turns[*at] - turns[at - width]).abs() > 32768.0);
+    match torn {
+        None => Ok(turns),
+        Some(at) => Err(format!(
+            "jumps at row {}, column {}, so its phases at other wavelengths are unknown; give a map for each laser",
+            at / width,
+            at % width
+        )),
+    }
 }
 
 fn read_image(path: &Path) -> Result<(Size, Vec<u16>)> {
@@ -138,17 +168,21 @@ fn read_csv(path: &Path) -> Result<(Size, Vec<u16>)> {
         String::from_utf8(input::bytes(path, MOST_PICTURE)?).map_err(|_| Error::file(path, "is not text in UTF-8"))?;
     let mut turns = Vec::new();
     let mut width = None;
+    // Where the comma is the decimal sign, programs separate by semicolons.
+    let separator = [';', '\t'].into_iter().find(|sign| text.contains(*sign)).unwrap_or(',');
     let lines = text
+        .trim_start_matches('\u{feff}')
         .lines()
         .enumerate()
         .skip(1)
         .filter(|(_, line)| !line.trim().is_empty());
     for (number, line) in lines {
         let before = turns.len();
-        for value in line.split(',').skip(1) {
-            let level: u16 = (value.trim().parse().ok().filter(|level| *level < 1024))
+        for value in line.trim_end_matches(['\r', separator]).split(separator).skip(1) {
+            let level: Option<f64> = value.trim().replace(',', ".").parse().ok();
+            let level = (level.filter(|level| (0.0..1024.0).contains(level)))
                 .ok_or_else(|| Error::file(path, format!("line {}: {value:?} is no level of 0..=1023", number + 1)))?;
-            turns.push(level << 6);
+            turns.push((level * 64.0).round() as u16);
         }
         let count = turns.len() - before;
         if *width.get_or_insert(count) != count {
@@ -180,6 +214,28 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    /// A bowl of 3.4 turns at 520 nm is one of 3.4·520/λ turns at λ.
+    #[test]
+    fn a_map_of_one_wavelength_serves_the_others() {
+        let bowl = |at: usize, factor: f64| {
+            let (y, x) = ((at / 64) as f64 - 24.0, (at % 64) as f64 - 32.0);
+            (65536.0 * 3.4 * factor * (x * x + y * y) / 1600.0).round() as i64 as u16
+        };
+        let map: Vec<u16> = (0..64 * 48).map(|at| bowl(at, 1.0)).collect();
+        let turns = unwrapped(&map, 64).unwrap();
+        for factor in [520.0 / 638.0, 1.0, 520.0 / 450.0] {
+            // The constant phase of whole turns differs, which is not seen.
+            let constant = (turns[0] * factor).round() as i64 as u16;
+            let constant = constant.wrapping_sub(bowl(0, factor));
+            for (at, turn) in turns.iter().enumerate() {
+                let scaled = ((turn * factor).round() as i64 as u16).wrapping_sub(constant);
+                assert!((scaled.wrapping_sub(bowl(at, factor)) as i16).abs() <= 2, "{at}");
+            }
+        }
+        let steep: Vec<u16> = (0..64 * 48).map(|at| (at * at * 977) as u16).collect();
+        assert!(unwrapped(&steep, 64).unwrap_err().contains("a map for each laser"));
+    }
+
     #[test]
     fn makers_maps_are_read_and_others_refused() {
         let folder = tempfile::tempdir().unwrap();
@@ -205,6 +261,18 @@ mod tests {
         std::fs::write(path("santec.csv"), "Y/X,0,1,2\n0,5,6,7\n1,1021,1022,1023\n").unwrap();
         let read = read_flatness(&path("santec.csv"), Size { width: 3, height: 2 }).unwrap();
         assert_eq!(read, [5, 6, 7, 1021, 1022, 1023].map(|v| v << 6));
+        for (name, text) in [
+            ("semicolons.csv", "Y/X;0;1;2\r\n0;5;6,5;7\r\n1;1021;1022;1023\r\n"),
+            (
+                "tabs.csv",
+                "\u{feff}Y/X\t0\t1\t2\n0\t5.0\t6.5\t7\n1\t1021\t1022\t1023\t\n",
+            ),
+            ("decimals.csv", "Y/X,0,1,2\n0,5.0,6.5,7.00\n1,1021,1022,1023\n"),
+        ] {
+            std::fs::write(path(name), text).unwrap();
+            let read = read_flatness(&path(name), Size { width: 3, height: 2 }).unwrap();
+            assert_eq!(read, [320, 416, 448, 1021 << 6, 1022 << 6, 1023 << 6], "{name}");
+        }
 
         image::RgbImage::from_pixel(3, 2, image::Rgb([1, 2, 3]))
             .save(path("colour.png"))

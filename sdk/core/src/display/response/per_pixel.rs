@@ -129,6 +129,28 @@ impl PerPixel {
         })
     }
 
+    /// Creates a table whose curve depends on the laser alone. `level` returns the level of a phase, in turns, for the
+    /// laser with an index, and `reach` is the phase of each laser's last level, in turns; from half-way between it and
+    /// a whole turn, phase 0 is nearer. There are as many lasers as `reach` has values, 3 or 1.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Self::new`].
+    #[doc(hidden)]
+    pub fn of_lasers(size: Size, reach: &[f64], level: impl Fn(usize, f64) -> f64) -> Result<Self> {
+        let spacing = size.width.max(size.height).saturating_sub(1).max(1);
+        let (rows, columns) = nodes(size, spacing);
+        let most = f64::from(u16::MAX) / f64::from(FRACTIONS);
+        let (mut levels, mut turns) = (Vec::new(), Vec::new());
+        for (laser, reach) in reach.iter().enumerate() {
+            for _ in 0..rows * columns {
+                let phases = (0..=MAX_INTERVALS).map(|k| k as f64 / MAX_INTERVALS as f64);
+                levels.extend(phases.map(|phase| level(laser, phase).clamp(0.0, most) as f32));
+                turns.push(((reach.min(1.0) + 1.0) / 2.0) as f32 * TAU);
+            }
+        }
+        Self::new(size, spacing, MAX_INTERVALS, &levels, &turns)
+    }
+
     /// Reads a table from the bytes of a file.
     ///
     /// # Errors
