@@ -1,8 +1,10 @@
 //! Hologram files: modulator levels in a PNG, or a complex field in a `.npy`, with the data needed to view them again.
 
 pub mod packed;
+mod phase_map;
 mod views;
 
+pub use phase_map::read_for;
 use phasefront::Size;
 pub use views::{AberratedOptics, check_z};
 
@@ -86,6 +88,16 @@ impl HologramInfo {
             levels_turns: None,
             calibrated: Vec::new(),
             srgb_of_light: None,
+        }
+    }
+
+    /// Creates the info of levels for `display`, of which nothing else is known.
+    pub fn of_levels(display: &DisplayFile) -> Self {
+        HologramInfo {
+            lut: display.lut.map(Vec::from),
+            levels_turns: display.target.panel.levels_turns.clone(),
+            calibrated: display.calibrated(true),
+            ..Self::new(display.target.display.clone())
         }
     }
 
@@ -388,8 +400,13 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
         let field = npy::read_field(npy::open(path)?).map_err(|why| Error::file(path, why))?;
         let beside = path.with_extension("json");
         output::reading(&beside)?;
-        let text = file::read_text(&beside)
-            .map_err(|e| Error::file(&beside, format!("is needed beside {}: {e}", path.display())))?;
+        let text = file::read_text(&beside).map_err(|e| {
+            let path = path.display();
+            Error::file(
+                &beside,
+                format!("is needed beside {path}, or --display for phases of other software: {e}"),
+            )
+        })?;
         let info: HologramInfo = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
         info.check().map_err(|e| Error::file(&beside, e))?;
         let colours = info.display.colours();
@@ -404,7 +421,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
     let Description { info, levels: written } = read_description(path)?.ok_or_else(|| {
         Error::file(
             path,
-            "carries no `phasefront` text chunk; it must be a hologram PNG as written by `phasefront hologram`",
+            "carries no `phasefront` text chunk, as a hologram of `phasefront hologram` does; a phase map of other software needs --display",
         )
     })?;
     // Levels are for the pixels of a modulator, so that Exif data that viewers add turn nothing.

@@ -20,6 +20,15 @@ pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
     decode::open_picture(path, Reading::UPRIGHT).map(|(image, _)| image)
 }
 
+/// Drops an alpha channel that says that every pixel is opaque, as screenshots have.
+pub(crate) fn opaque(image: DynamicImage) -> DynamicImage {
+    match &image {
+        DynamicImage::ImageRgba8(rgba) if rgba.pixels().all(|pixel| pixel.0[3] == 255) => image.into_rgb8().into(),
+        DynamicImage::ImageLumaA8(grey) if grey.pixels().all(|pixel| pixel.0[1] == 255) => image.into_luma8().into(),
+        _ => image,
+    }
+}
+
 /// Reads the amplitudes of an image, (3, H, W) in \[0, 1], upright. Grey images give three equal colours. Alpha is
 /// ignored.
 ///

@@ -64,6 +64,12 @@ impl Encode {
         let (_, height, width) = field.dim();
         let values = field.as_slice().expect("standard layout");
         pipeline::field::check(values, Size { width, height }, &target).map_err(|e| Error::file(&self.field, e))?;
+        if is_phase_map(values) {
+            log::warn!(
+                "{}: its amplitude is the same everywhere, as of exp(iφ); encode makes other levels than those of φ. For a phase map give it to `pack`, `refocus` or `show` with --display",
+                self.field.display()
+            );
+        }
         let stage = Stage {
             name: "field",
             time: start.elapsed(),
@@ -111,6 +117,13 @@ impl Encode {
             .map_err(|e| Error::file(&self.field, e))?;
         Ok(Some(hologram.info().clone()))
     }
+}
+
+/// Checks whether `field` has one amplitude and several phases.
+fn is_phase_map(field: &[Complex32]) -> bool {
+    let first = field.first().copied().unwrap_or_default();
+    let one = |value: &Complex32| (value.norm() - first.norm()).abs() <= 1e-4 * first.norm();
+    field.iter().all(one) && field.iter().any(|value| (value - first).norm() > 0.1 * first.norm())
 }
 
 /// Returns the phases of `field`, (C, H, W), in radians.

@@ -14,7 +14,8 @@ use std::path::PathBuf;
 /// Convert a hologram to the frame that a modulator's input takes
 #[derive(Args)]
 pub(crate) struct Pack {
-    /// A hologram PNG; several for one frame of bit planes that shows them one after another
+    /// A hologram PNG, or a phase map of other software: a PNG, BMP or TIFF of levels, a .npy of levels or radians;
+    /// several for one frame of bit planes that shows them one after another
     #[arg(required = true)]
     holograms: Vec<PathBuf>,
     #[command(flatten)]
@@ -32,9 +33,8 @@ impl Pack {
         let display = self.display.read()?;
         packed::declare(&self.output, &display)?;
         let images = match (&self.holograms[..], &self.colour) {
-            ([hologram], None) => {
-                packed::pack(&hologram::read_hologram(hologram)?, &display).map_err(|e| Error::file(hologram, e))?
-            }
+            ([hologram], None) => packed::pack(&hologram::read_for(hologram, Some(&display))?, &display)
+                .map_err(|e| Error::file(hologram, e))?,
             (_, Some(colour)) => {
                 let colour = packed::colour(colour, display.device.display.colours())?;
                 vec![self.planes(&display, colour)?]
@@ -69,7 +69,7 @@ impl Pack {
         };
         let mut maps = Vec::new();
         for path in &self.holograms {
-            let hologram = hologram::read_hologram(path)?;
+            let hologram = hologram::read_for(path, Some(display))?;
             hologram.check_display(display).map_err(|e| Error::file(path, e))?;
             let Hologram::Levels(Levels::Bytes(levels), _) = hologram else {
                 return Err(Error::file(path, "is no hologram of levels of up to 8 bits"));
@@ -92,7 +92,7 @@ impl Pack {
 /// Read the levels back from the frame that a modulator's input takes, as the inverse of `pack`
 #[derive(Args)]
 pub(crate) struct Unpack {
-    /// The frame: one PNG or BMP, or one each for red, green and blue
+    /// The frame: one PNG, BMP or TIFF, or one each for red, green and blue
     #[arg(required = true, num_args = 1..=3)]
     frames: Vec<PathBuf>,
     #[command(flatten)]
@@ -113,15 +113,7 @@ impl Unpack {
         let size = self.size.unwrap_or(modulator.size());
         let images = self.frames.iter().map(|path| packed::Image::read(path));
         let levels = packed::unpack(&images.collect::<Result<Vec<_>>>()?, &display, size)?;
-        let info = HologramInfo {
-            display: modulator.clone(),
-            encoder: None,
-            scale: None,
-            lut: display.lut.map(Vec::from),
-            levels_turns: display.target.panel.levels_turns.clone(),
-            calibrated: display.calibrated(true),
-            srgb_of_light: None,
-        };
+        let info = HologramInfo::of_levels(&display);
         let levels = match modulator.bits() {
             0..=8 => Levels::Bytes(levels.mapv(|level| level as u8)),
             _ => Levels::Words(levels),

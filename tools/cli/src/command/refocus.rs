@@ -14,7 +14,8 @@ use std::path::PathBuf;
     "TOML file of the display that the hologram was made for, or a modulator's name [default: what the hologram says of it]"
 )))]
 pub(crate) struct Refocus {
-    /// A hologram PNG, or a complex .npy with its .json
+    /// A hologram PNG, or a complex .npy with its .json; with --display also a phase map of other software: a PNG, BMP
+    /// or TIFF of levels, a .npy of levels or radians
     hologram: PathBuf,
     /// Focus, mm from the middle of the volume, positive toward the viewer
     #[arg(
@@ -44,7 +45,8 @@ pub(crate) struct Refocus {
 impl Refocus {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         self.check_output()?;
-        let hologram = hologram::read_hologram(&self.hologram)?;
+        let display = self.display.read_if_given()?;
+        let hologram = hologram::read_for(&self.hologram, display.as_ref())?;
         let z_mm: Vec<f64> = match (self.z_mm, self.stack) {
             (Some(z), _) => vec![z],
             (None, count) => {
@@ -55,7 +57,7 @@ impl Refocus {
             }
         };
         let z_m: Vec<f64> = z_mm.iter().map(|z| z / 1e3).collect();
-        let views = match self.display.read_if_given()? {
+        let views = match display {
             None => hologram.views(&z_m),
             Some(display) => hologram.views_on(&display, &z_m),
         }

@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Show frames on a screen, full and unscaled, at its rate; Escape or Q ends it
 #[derive(Args)]
 pub(crate) struct Show {
-    /// Images for the modulator's input, or with --display holograms, which are packed for it; several are shown one
+    /// Images for the modulator's input, or with --display holograms and phase maps, which are packed for it; several are shown one
     /// after another, those of a folder in the order of their names
     #[arg(required = true)]
     frames: Vec<PathBuf>,
@@ -77,7 +77,8 @@ impl Show {
 
     /// Packs a hologram and returns its images, or the image of the selected colour.
     fn packed(&self, path: &Path, display: &DisplayFile) -> Result<Vec<packed::Image>> {
-        let mut images = packed::pack(&hologram::read_hologram(path)?, display).map_err(|e| Error::file(path, e))?;
+        let mut images =
+            packed::pack(&hologram::read_for(path, Some(display))?, display).map_err(|e| Error::file(path, e))?;
         let Some(name) = &self.colour else {
             return Ok(images);
         };

@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// The holograms are files, or one is made of an image by the flags of `hologram`.
 #[derive(Args)]
 pub(crate) struct View {
-    /// Holograms (.png, or .npy with its .json), folders of `video`, or pages of this command, all joined in one page
+    /// Holograms (.png, or .npy with its .json; with --display phase maps of other software), folders of `video`, or pages of this command, all joined in one page
     #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = IMAGE_FLAGS, conflicts_with_all = METHOD_FLAGS)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -225,8 +225,9 @@ impl View {
     }
 
     fn of_hologram(&self, path: &Path) -> Result<Parts> {
-        let hologram = hologram::read_hologram(path)?;
-        let file = self.display_of(hologram.info())?;
+        let given = self.request.display_if_given()?;
+        let hologram = hologram::read_for(path, given.as_ref())?;
+        let file = given.map_or_else(|| hologram.info().display_file(), Ok)?;
         let z_m = self.z_m(&hologram.info().display, STILL_VIEWS);
         let bar = progress_bar(z_m.len() as u64, "views");
         let phase = match &hologram {

@@ -166,13 +166,10 @@ fn shown_on(levels: &[u16], turns: [f64; 3], picture: &image::RgbImage) -> [f64;
 #[test]
 fn one_measurement_of_a_panel_serves_three_lasers() {
     let folder = Folder::new();
+    // Fine detail in every colour, as pictures have: blocks of 3 pixels.
     let picture = image::RgbImage::from_fn(160, 128, |x, y| {
-        let wave = |of: f64| (127.0 + 100.0 * (of / 9.0).sin()) as u8;
-        image::Rgb([
-            wave(f64::from(x + y)),
-            wave(f64::from(2 * x)),
-            wave(f64::from(3 * y) - f64::from(x)),
-        ])
+        let block = (y / 3 * 54 + x / 3).wrapping_mul(0x9E37_79B1);
+        image::Rgb([8, 16, 24].map(|shift| 40 + ((block >> shift) & 127) as u8))
     });
     picture.save(folder.path("rgb.png")).unwrap();
     image::GrayImage::from_pixel(160, 128, image::Luma([128]))
@@ -203,7 +200,7 @@ fn one_measurement_of_a_panel_serves_three_lasers() {
         (levels(&folder.path(&output)), said)
     };
     let ideal = shown_on(&made("ideal", "").0, [1.0; 3], &picture);
-    assert!(ideal.iter().all(|psnr| *psnr > 25.0), "{ideal:?}");
+    assert!(ideal.iter().all(|psnr| *psnr > 15.0), "{ideal:?}");
     for line in [
         "range_turns = { turns = 1.0, at_nm = 638 }",
         "range_turns = { turns = 1.0906666666666667, at_nm = 585 }",
@@ -230,7 +227,7 @@ fn one_measurement_of_a_panel_serves_three_lasers() {
     );
     let shown = shown_on(&levels, panel, &picture);
     println!("one for all: {shown:.1?}");
-    assert!(shown[0] > ideal[0] - 1.0 && shown[2] < ideal[2] - 6.0, "{shown:?}");
+    assert!(shown[0] > ideal[0] - 1.0 && shown[2] < ideal[2] - 5.0, "{shown:?}");
     // A view needs the display's file, and is that of the ideal panel.
     made("panel", "range_turns = { turns = 1.0, at_nm = 638 }");
     let view = folder.succeeds(&[
@@ -320,6 +317,10 @@ fn maps_of_one_image_become_bit_planes() {
 fn what_is_wrong_is_one_line() {
     let folder = Folder::new();
     frame(&folder, Size { width: 48, height: 32 });
+    image::open(folder.path("rgb.png"))
+        .unwrap()
+        .save(folder.path("rgb.jpg"))
+        .unwrap();
     let files = [
         ("key.toml", "widht = 48"),
         ("bits.toml", "bits = 12"),
@@ -374,8 +375,8 @@ fn what_is_wrong_is_one_line() {
         ),
         (&["pack", "h.png", "--display", "ti-plm-p47", "-o", "f.png"], "bits"),
         (
-            &["pack", "rgb.png", "--display", "holoeye-pluto", "-o", "f.png"],
-            "hologram",
+            &["pack", "rgb.jpg", "--display", "holoeye-pluto", "-o", "f.png"],
+            "a picture and no phase map",
         ),
         (
             &["unpack", "rgb.png", "--display", "holoeye-gaea-2", "-o", "f.png"],

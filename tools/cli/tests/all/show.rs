@@ -261,6 +261,17 @@ fn a_screen_shows_exactly_what_it_is_given() {
     let pattern = image::open(folder.path("pattern.png")).unwrap().into_rgb8();
     server.displays(&folder, &["pattern.png"], &[&pattern]);
 
+    // A grey phase map of other software is shown level by level.
+    let map = image::GrayImage::from_fn(640, 480, |x, y| image::Luma([(x * 7 + y * 13) as u8]));
+    map.save(folder.path("map.bmp")).unwrap();
+    std::fs::write(
+        folder.path("one.toml"),
+        "width = 640\nheight = 480\nwavelengths_nm = [532]\n",
+    )
+    .unwrap();
+    let shown: Vec<u8> = map.as_raw().iter().flat_map(|level| [*level; 3]).collect();
+    server.displays(&folder, &["map.bmp", "--display", "one.toml"], &[&shown]);
+
     let told = server.told(&folder, &["show", "frames/0.png", "--seconds", "0.1"]);
     assert_eq!(told["screen"]["width"], 640);
 }

@@ -6,7 +6,7 @@
 use crate::display::DisplayFile;
 use crate::hologram::Hologram;
 use crate::output::{self, Pending};
-use crate::picture::{PngShape, open_image, pending_png};
+use crate::picture::{PngShape, opaque, open_image, pending_png};
 use crate::{Error, Result};
 use image::DynamicImage;
 use ndarray::Array3;
@@ -77,12 +77,12 @@ impl Image {
         pending_png(path, size, &self.bytes, &[])
     }
 
-    /// Reads a PNG or BMP.
+    /// Reads a PNG, BMP or TIFF. Palettes become their colours.
     ///
     /// # Errors
     /// Returns an error if the file is missing, truncated, or of another kind.
     pub fn read(path: &Path) -> Result<Self> {
-        let image = open_image(path)?;
+        let image = opaque(open_image(path)?);
         let size = Size {
             width: image.width() as usize,
             height: image.height() as usize,
@@ -105,6 +105,22 @@ impl Image {
             }
         };
         Ok(Image { size, bytes, kind })
+    }
+}
+
+impl Image {
+    /// Returns the image with the pixels of `kind`: a grey image that a BMP or a palette stores as RGB becomes grey.
+    fn of_kind(&self, kind: Kind) -> Image {
+        let pixels = self.bytes.as_chunks::<3>().0;
+        let is_grey = |[red, green, blue]: &[u8; 3]| red == green && green == blue;
+        match (self.kind, kind) {
+            (Kind::Rgb, Kind::Grey) if pixels.iter().all(is_grey) => Image {
+                size: self.size,
+                bytes: pixels.iter().map(|pixel| pixel[0]).collect(),
+                kind,
+            },
+            _ => self.clone(),
+        }
     }
 }
 
@@ -206,9 +222,14 @@ pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
 /// Returns an error if the images have another number, size or kind.
 pub fn unpack(images: &[Image], display: &DisplayFile, size: Size) -> Result<Array3<u16>> {
     let colours = display.device.display.colours();
+    let wanted = match &display.device.packing {
+        Packing::Images(layout) => kind(*layout),
+        _ => Kind::Rgb,
+    };
+    let images: Vec<Image> = images.iter().map(|image| image.of_kind(wanted)).collect();
     let mut levels = Array3::zeros((colours, size.height, size.width));
     let values = levels.as_slice_mut().expect("standard layout");
-    let fits = |count: usize, size: Size, kind: Kind| match images {
+    let fits = |count: usize, size: Size, kind: Kind| match &images[..] {
         all if all.len() != count => Err(Error::Input(format!(
             "{} images; the display's packing has {count}",
             all.len()

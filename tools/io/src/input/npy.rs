@@ -260,25 +260,67 @@ fn quoted(text: &str) -> Option<(&str, &str)> {
     text[1..].split_once(mark)
 }
 
+/// Returns the shape (C, H, W) of planes; (H, W) is one colour.
+fn planes(shape: &[usize]) -> Said<(usize, usize, usize)> {
+    let shape @ (_, height, width) = match *shape {
+        [height, width] => (1, height, width),
+        [colours, height, width] => (colours, height, width),
+        _ => return Err(format!("has shape {shape:?}; a field is (H, W) or (C, H, W)")),
+    };
+    decode::check(Size { width, height }, MOST_PIXELS)?;
+    Ok(shape)
+}
+
+/// A phase map, (C, H, W).
+pub(crate) enum Map {
+    /// Levels of a modulator.
+    Levels(Array3<u16>),
+    /// Phases in radians.
+    Radians(Array3<f32>),
+    /// Complex values.
+    Field(Array3<Complex32>),
+}
+
+/// Reads a phase map: whole numbers are levels, real ones phases in radians. (H, W) is one colour.
+///
+/// # Errors
+/// Returns an error if the type or the number of axes differs, if the planes have too many pixels, or if the file ends
+/// early.
+pub(crate) fn read_map<R: Read>(npy: Npy<R>) -> Said<Map> {
+    let shape = planes(npy.shape())?;
+    let whole = |level: i64| u16::try_from(level).unwrap_or(u16::MAX);
+    let levels: Said<ArrayD<u16>> = match npy.kind() {
+        u8::NAME => npy.converted(|v: u8| v.into()),
+        u16::NAME => npy.array(),
+        i16::NAME => npy.converted(|v: i16| whole(v.into())),
+        i32::NAME => npy.converted(|v: i32| whole(v.into())),
+        i64::NAME => npy.converted(whole),
+        f32::NAME | f64::NAME | f16::NAME => {
+            let phases: ArrayD<f32> = match npy.kind() {
+                f32::NAME => npy.array(),
+                f64::NAME => npy.converted(|v: f64| v as f32),
+                _ => npy.converted(|v: f16| v.to_f32()),
+            }?;
+            return (phases.into_shape_with_order(shape).map(Map::Radians)).map_err(|e| e.to_string());
+        }
+        _ => return read_field(npy).map(Map::Field),
+    };
+    (levels?.into_shape_with_order(shape).map(Map::Levels)).map_err(|e| e.to_string())
+}
+
 /// Reads a complex field, complex64 or complex128, as (C, H, W). (H, W) is one colour.
 ///
 /// # Errors
 /// Returns an error if the type or the number of axes differs, if the planes have too many pixels, or if the file ends
 /// early.
 pub(crate) fn read_field<R: Read>(npy: Npy<R>) -> Said<Array3<Complex32>> {
-    let shape = match *npy.shape() {
-        [height, width] => (1, height, width),
-        [colours, height, width] => (colours, height, width),
-        _ => return Err(format!("has shape {:?}; a field is (H, W) or (C, H, W)", npy.shape())),
-    };
-    let (_, height, width) = shape;
-    decode::check(Size { width, height }, MOST_PIXELS)?;
+    let shape = planes(npy.shape())?;
     let field: ArrayD<Complex32> = match npy.kind() {
         Complex32::NAME => npy.array(),
         Complex64::NAME => npy.converted(|v: Complex64| Complex32::new(v.re as f32, v.im as f32)),
         _ => {
             return Err(format!(
-                "holds numbers of the type {}; a field is complex: field.astype(numpy.complex64) makes it so",
+                "holds numbers of the type {}; a field is complex. Phases in radians are no field: `phasefront pack`, `refocus` and `show` take them as they are with --display. Amplitudes become a field by field.astype(numpy.complex64)",
                 npy.header.descr
             ));
         }
