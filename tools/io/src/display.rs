@@ -132,7 +132,8 @@ pub fn uncalibrated(name: &str) -> Result<toml::Table> {
 
 fn parse(path: &Path) -> Result<toml::Table> {
     let text = input::text(path)?;
-    toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))
+    let table = toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    ModulatorSpec::on_device(table).map_err(|e| Error::file(path, one_line_of(&e)))
 }
 
 /// Returns the file that --display `name` reads, or `None` if `name` is a device without a file.

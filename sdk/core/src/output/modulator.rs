@@ -159,7 +159,41 @@ impl ModulatorSpec {
         toml::from_str(text).map_err(|e| refuse(keys::message(&e)))
     }
 
-    /// Parses a device from TOML.
+    /// Returns the keys of `table` over those of the bundled device that its key `device` names, without this key. A key
+    /// that says what phase a level shows replaces the device's.
+    ///
+    /// # Errors
+    /// Returns an error if no bundled device has this name.
+    #[doc(hidden)]
+    pub fn on_device(mut table: toml::Table) -> Result<toml::Table> {
+        let mut all = match table.remove("device") {
+            None => return Ok(table),
+            Some(toml::Value::String(name)) => Self::shipped_table(&name)?,
+            Some(_) => {
+                let names: Vec<_> = Self::names().collect();
+                return Err(refuse(format!(
+                    "device must be the name of a modulator: {}",
+                    names.join(", ")
+                )));
+            }
+        };
+        if ["lut", "per_pixel", "levels_turns", "range_turns"]
+            .iter()
+            .any(|key| table.contains_key(*key))
+        {
+            all.remove("levels_turns");
+            all.remove("range_turns");
+        }
+        for figures in ["sources", "unconfirmed"] {
+            if let Some(toml::Value::Table(figures)) = all.get_mut(figures) {
+                figures.retain(|key, _| !table.contains_key(key));
+            }
+        }
+        all.extend(table);
+        Ok(all)
+    }
+
+    /// Parses a device from TOML. The key `device` names a bundled device whose keys hold where the text has none.
     ///
     /// # Errors
     /// Returns an error if the text is not TOML, a key is unknown or a value is impossible.
@@ -173,7 +207,8 @@ impl ModulatorSpec {
     /// # Errors
     /// Returns an error if a key is unknown or a value is impossible.
     #[doc(hidden)]
-    pub fn from_table(mut table: toml::Table) -> Result<Self> {
+    pub fn from_table(table: toml::Table) -> Result<Self> {
+        let mut table = Self::on_device(table)?;
         keys::check(&table, &[&keys::DISPLAY[..], &keys::DEVICE].concat())?;
         let own: toml::Table = (keys::DEVICE.iter())
             .filter_map(|key| Some(((*key).to_owned(), table.remove(*key)?)))
@@ -469,8 +504,35 @@ mod tests {
     }
 
     #[test]
+    fn a_file_builds_on_a_bundled_device() {
+        let text =
+            "device = \"holoeye-pluto\"\nname = \"mine\"\nwavelengths_nm = [532]\noffset_mm = -20\nflip_x = true";
+        let (mine, pluto) = (
+            ModulatorSpec::from_toml(text).unwrap(),
+            ModulatorSpec::shipped("holoeye-pluto").unwrap(),
+        );
+        assert_eq!(mine.display.size(), pluto.display.size());
+        assert_eq!((mine.packing.clone(), mine.rate_hz), (pluto.packing, pluto.rate_hz));
+        assert_eq!((&mine.name[..], mine.display.colours(), mine.flip_x), ("mine", 1, true));
+        // Levels of one's own replace the device's, and so do the sources of figures.
+        let own =
+            ModulatorSpec::from_toml("device = \"ti-plm-p67\"\nbits = 1\npacking = \"grey\"\nlevels_turns = [0, 0.5]")
+                .unwrap();
+        assert_eq!(own.levels_turns, Some(vec![0.0, 0.5]));
+        assert!(!own.unconfirmed.contains_key("levels_turns") && own.sources.contains_key("pitch_um"));
+        let message = ModulatorSpec::from_toml("device = \"pluto\"").unwrap_err().to_string();
+        assert!(message.contains("no device pluto; there are"), "{message}");
+    }
+
+    #[test]
     fn what_cannot_be_is_named_in_one_line() {
         for (text, word) in [
+            ("width = \"1920\"", "width: "),
+            ("name = 3", "name: "),
+            ("wavelengths_nm = 532", "wavelengths_nm: "),
+            ("sources = \"the manual\"", "sources: "),
+            ("flip_x = 1", "flip_x: "),
+            ("device = 3", "device must be the name"),
             ("width = ", "expected"),
             ("widht = 4", "unknown key `widht`; did you mean `width`?"),
             ("pack = \"rgb\"", "unknown key `pack`; did you mean `packing`?"),

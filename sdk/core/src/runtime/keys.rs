@@ -18,7 +18,8 @@ pub const DISPLAY: [&str; 11] = [
 ];
 
 /// The keys that a [`crate::output::modulator::ModulatorSpec`] has in addition to [`DISPLAY`].
-pub const DEVICE: [&str; 9] = [
+pub const DEVICE: [&str; 10] = [
+    "device",
     "name",
     "packing",
     "flip_x",
@@ -62,18 +63,22 @@ pub fn message(error: &toml::de::Error) -> String {
             message.strip_suffix(&format!("expected {kind}"))?
         ))
     };
+    let all = error.to_string();
+    let key = all
+        .lines()
+        .find_map(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+    let of_key = |message: String| match key {
+        Some(key) if !message.contains(key) => format!("{key}: {message}"),
+        _ => message,
+    };
     if let Some(message) = TYPES.into_iter().find_map(of_type) {
-        let all = error.to_string();
-        let key = all
-            .lines()
-            .find_map(|line| line.strip_prefix("in `")?.strip_suffix('`'));
-        return key.map_or(message.clone(), |key| format!("{key}: {message}"));
+        return of_key(message);
     }
     let parts = message
         .strip_prefix("unknown field `")
         .and_then(|rest| rest.rsplit_once("`, expected "));
     match parts {
-        None => message.to_owned(),
+        None => of_key(message.to_owned()),
         // In "one of `a`, `b`", every second part is a key.
         Some((key, known)) => unknown(key, &known.split('`').skip(1).step_by(2).collect::<Vec<_>>()),
     }

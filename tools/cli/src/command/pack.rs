@@ -2,7 +2,7 @@
 
 use clap::Args;
 use phasefront::Size;
-use phasefront::output::Packing;
+use phasefront::output::{Cells, Packing};
 use phasefront_command::flags::{DisplayFlags, parse_size};
 use phasefront_command::terminal;
 use phasefront_io::display::DisplayFile;
@@ -20,7 +20,8 @@ pub(crate) struct Pack {
     holograms: Vec<PathBuf>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// The one colour to show of several holograms; not for one laser
+    /// The one colour to pack, where the modulator takes an image for each colour, or of several holograms; not for one
+    /// laser
     #[arg(long, value_parser = packed::COLOURS)]
     colour: Option<String>,
     /// Output frame: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
@@ -31,18 +32,28 @@ pub(crate) struct Pack {
 impl Pack {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let display = self.display.read()?;
-        packed::declare(&self.output, &display)?;
-        let images = match (&self.holograms[..], &self.colour) {
-            ([hologram], None) => packed::pack(&hologram::read_for(hologram, Some(&display))?, &display)
-                .map_err(|e| Error::file(hologram, e))?,
-            (_, Some(colour)) => {
-                let colour = packed::colour(colour, display.device.display.colours())?;
-                vec![self.planes(&display, colour)?]
+        match &self.colour {
+            None => packed::declare(&self.output, &display)?,
+            Some(_) => output::file(&self.output, &["png"])?,
+        }
+        let colours = display.device.display.colours();
+        let images = match (&self.holograms[..], &display.device.packing) {
+            ([_], Packing::BitPlanes(cells)) if self.colour.is_some() => vec![self.planes(&display, cells)?],
+            ([hologram], _) => {
+                let levels = hologram::read_for(hologram, Some(&display))?;
+                let packed = packed::pack_colour(&levels, &display, self.colour.as_deref());
+                packed.map_err(|e| Error::file(hologram, e))?
             }
-            (_, None) if display.device.display.colours() == 1 => vec![self.planes(&display, 0)?],
-            (_, None) => {
+            (_, Packing::BitPlanes(_)) if self.colour.is_none() && colours > 1 => {
                 return Err(Error::Input(
                     "several holograms in one frame need --colour, which of theirs is shown".into(),
+                ));
+            }
+            (_, Packing::BitPlanes(cells)) => vec![self.planes(&display, cells)?],
+            _ => {
+                return Err(Error::Input(
+                    "several holograms in one frame are for modulators whose frames are bit planes; this one's are not, so pack one at a time"
+                        .into(),
                 ));
             }
         };
@@ -60,12 +71,10 @@ impl Pack {
     }
 
     /// Packs one colour of all holograms into the planes of a frame, one after another.
-    fn planes(&self, display: &DisplayFile, colour: usize) -> Result<packed::Image> {
-        let Packing::BitPlanes(cells) = &display.device.packing else {
-            return Err(Error::Input(
-                "several holograms in one frame are for modulators whose frames are bit planes; this one's are not"
-                    .into(),
-            ));
+    fn planes(&self, display: &DisplayFile, cells: &Cells) -> Result<packed::Image> {
+        let colour = match &self.colour {
+            Some(colour) => packed::colour(colour, display.device.display.colours())?,
+            None => 0,
         };
         let mut maps = Vec::new();
         for path in &self.holograms {

@@ -4,7 +4,6 @@ use clap::Args;
 use phasefront_cli::modulator::show::{self, Screen, Showing};
 use phasefront_command::flags::DisplayFlags;
 use phasefront_command::terminal;
-use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram::{self, packed};
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
@@ -69,25 +68,14 @@ impl Show {
         for path in paths.collect::<Result<Vec<_>>>()?.concat() {
             match &display {
                 None => images.push(packed::Image::read(&path)?),
-                Some(display) => images.append(&mut self.packed(&path, display)?),
+                Some(display) => {
+                    let hologram = hologram::read_for(&path, Some(display))?;
+                    let packed = packed::pack_colour(&hologram, display, self.colour.as_deref());
+                    images.append(&mut packed.map_err(|e| Error::file(&path, e))?);
+                }
             }
         }
         Ok(images)
-    }
-
-    /// Packs a hologram and returns its images, or the image of the selected colour.
-    fn packed(&self, path: &Path, display: &DisplayFile) -> Result<Vec<packed::Image>> {
-        let mut images =
-            packed::pack(&hologram::read_for(path, Some(display))?, display).map_err(|e| Error::file(path, e))?;
-        let Some(name) = &self.colour else {
-            return Ok(images);
-        };
-        match packed::COLOURS.iter().position(|known| known == name) {
-            Some(colour) if images.len() == packed::COLOURS.len() => Ok(vec![images.swap_remove(colour)]),
-            _ => Err(Error::Input(
-                "--colour is for packings of an image a colour; this display has all in one, or one laser".into(),
-            )),
-        }
     }
 }
 

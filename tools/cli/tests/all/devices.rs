@@ -582,3 +582,40 @@ fn tables_of_two_columns_are_read_and_voltages_are_the_drivers() {
         assert!(said.contains(words) && said.lines().count() == 1, "{said}");
     }
 }
+
+#[test]
+fn one_colour_is_packed_and_messages_are_those_of_the_packing() {
+    let folder = Folder::new();
+    frame(&folder, SMALL);
+    let pluto = ["--display", "holoeye-pluto"];
+    folder.succeeds(&[&SMALL_HOLOGRAM[..], &pluto, &["-o", "h.png", "--packed", "all.png"]].concat());
+    folder.succeeds(&[&["pack", "h.png", "--colour", "green", "-o", "green.png"][..], &pluto].concat());
+    let read = |name: &str| Image::read(&folder.path(name)).unwrap();
+    assert_eq!(read("green.png"), read("all-green.png"));
+    assert!(!folder.path("green-green.png").exists());
+    for (arguments, word) in [
+        (&["pack", "h.png", "h.png", "-o", "f.png"][..], "pack one at a time"),
+        (
+            &["pack", "h.png", "h.png", "--colour", "green", "-o", "f.png"],
+            "pack one at a time",
+        ),
+    ] {
+        let said = folder.fails(&[arguments, &pluto].concat(), 1);
+        assert!(said.contains(word), "{said}");
+    }
+    // A file that builds on the device packs alike.
+    fs::write(folder.path("mine.toml"), "device = \"holoeye-pluto\"").unwrap();
+    folder.succeeds(&[
+        "pack",
+        "h.png",
+        "--display",
+        "mine.toml",
+        "--colour",
+        "red",
+        "-o",
+        "red.png",
+    ]);
+    assert_eq!(read("red.png"), read("all-red.png"));
+    let said = folder.succeeds(&["devices", "mine.toml"]);
+    assert!(said.contains("1920x1080"), "{said}");
+}

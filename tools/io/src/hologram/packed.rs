@@ -202,6 +202,23 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     }
 }
 
+/// Packs a hologram like [`pack`], or the image of the colour called `name` alone.
+///
+/// # Errors
+/// Returns the errors of [`pack`], and an error if the packing has not an image for each colour.
+pub fn pack_colour(hologram: &Hologram, display: &DisplayFile, name: Option<&str>) -> Result<Vec<Image>> {
+    let mut images = pack(hologram, display)?;
+    let Some(name) = name else {
+        return Ok(images);
+    };
+    match COLOURS.iter().position(|known| *known == name) {
+        Some(colour) if images.len() == COLOURS.len() => Ok(vec![images.swap_remove(colour)]),
+        _ => Err(Error::Input(
+            "--colour is for packings of an image a colour; this display has all in one, or one laser".into(),
+        )),
+    }
+}
+
 /// Packs `maps` of levels, (H, W) each, into the frame that displays them in sequence.
 ///
 /// # Errors
