@@ -14,6 +14,7 @@ mod link;
 mod multiplex;
 mod networks;
 mod pack;
+mod pattern;
 mod refocus;
 mod show;
 mod video;
@@ -66,6 +67,8 @@ pub(crate) enum Command {
     Show(show::Show),
     Screens(show::Screens),
     #[command(subcommand)]
+    Pattern(pattern::Pattern),
+    #[command(subcommand)]
     Link(link::Link),
     #[command(subcommand)]
     Calibrate(calibrate::Calibrate),
@@ -93,6 +96,7 @@ impl Command {
             Command::Unpack(command) => command.run(json),
             Command::Show(command) => command.run(json),
             Command::Screens(command) => command.run(json),
+            Command::Pattern(command) => command.run(json),
             Command::Link(command) => command.run(json),
             Command::Calibrate(command) => command.run(json),
         }

@@ -204,7 +204,8 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 }
 
 /// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser`, `aberration` and `model` name files relative to
-/// it: `crate::display::lut` describes `lut`, and [`crate::display::calibration`] the others. [`ModulatorSpec`] and `crate::display::panel` describe the remaining keys.
+/// it: `crate::display::lut` describes `lut`, and [`crate::display::calibration`] the others. [`ModulatorSpec`] and
+/// `crate::display::panel` describe the remaining keys.
 ///
 /// # Errors
 /// Returns an error if a file is missing or has invalid contents.

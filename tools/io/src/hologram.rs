@@ -4,7 +4,7 @@ pub mod packed;
 mod phase_map;
 mod views;
 
-pub use phase_map::read_for;
+pub use phase_map::{levels_of_phases, read_for};
 use phasefront::Size;
 pub use views::{AberratedOptics, check_z};
 

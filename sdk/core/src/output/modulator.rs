@@ -159,8 +159,8 @@ impl ModulatorSpec {
         toml::from_str(text).map_err(|e| refuse(keys::message(&e)))
     }
 
-    /// Returns the keys of `table` over those of the bundled device that its key `device` names, without this key. A key
-    /// that says what phase a level shows replaces the device's.
+    /// Returns the keys of `table` over those of the bundled device that its key `device` names, without this key. A
+    /// key that says what phase a level shows replaces the device's.
     ///
     /// # Errors
     /// Returns an error if no bundled device has this name.

@@ -1,6 +1,7 @@
 //! `phasefront devices`: lists the modulators that are known by name, or describes one with all that its file sets.
 
 use clap::Args;
+use phasefront::Display;
 use phasefront::output::Layout;
 use phasefront::output::{ModulatorSpec, Packing};
 use phasefront_command::terminal;
@@ -95,6 +96,46 @@ fn calibrated(file: &DisplayFile) -> Vec<&'static str> {
         .collect()
 }
 
+/// What a display can show at most, by its geometry.
+struct Limits {
+    /// The size of the finest detail that the aperture passes, half a period, in µm.
+    detail_um: f64,
+    /// The largest angle of each laser's light, in degrees.
+    angle_deg: Vec<f64>,
+    /// The distance from the modulator up to which the middle of the frame has the finest detail, in mm. Farther away,
+    /// light of the largest angle comes from beyond the panel's edge.
+    reach_mm: f64,
+}
+
+impl Limits {
+    fn of(display: &Display) -> Self {
+        let finest_m = display.pitch_m() / display.aperture_radius();
+        let angle = |wavelength_m: &f64| (wavelength_m / (2.0 * finest_m)).min(1.0).asin();
+        let size = display.size();
+        let half_m = size.width.min(size.height) as f64 * display.pitch_m() / 2.0;
+        Limits {
+            detail_um: finest_m * 1e6,
+            angle_deg: display.wavelengths_m().iter().map(|l| angle(l).to_degrees()).collect(),
+            reach_mm: half_m / angle(&display.longest_wavelength_m()).tan() * 1e3,
+        }
+    }
+
+    fn describe(&self, display: &Display) -> String {
+        let angles: Vec<_> = self.angle_deg.iter().map(|angle| format!("{angle:.2}")).collect();
+        let mut text = format!("\n{:12} {:.1} um", "detail", self.detail_um);
+        text += &format!("\n{:12} {}° to each side", "angle", angles.join(", "));
+        text += &format!(
+            "\n{:12} {:.0} mm from the modulator with this detail",
+            "reach", self.reach_mm
+        );
+        let farthest_mm = (display.offset_m().abs() + display.volume_depth_m() / 2.0) * 1e3;
+        if farthest_mm > self.reach_mm {
+            text += &format!("; the volume reaches {farthest_mm:.0} mm and is coarser there");
+        }
+        text
+    }
+}
+
 fn describe(file: &DisplayFile) -> String {
     let (device, display) = (&file.device, &file.target.display);
     let lasers: Vec<_> = (display.wavelengths_m().iter())
@@ -113,6 +154,7 @@ fn describe(file: &DisplayFile) -> String {
         "aperture",
         rounded(display.aperture_radius())
     );
+    text += &Limits::of(display).describe(display);
     if let Some(turns) = device.levels_turns.as_ref().and_then(|turns| turns.last()) {
         text += &format!("\n{:12} {} turns at the last level", "range", rounded(*turns));
     }
@@ -167,6 +209,10 @@ fn object_of_file(name: &str, file: &DisplayFile) -> serde_json::Value {
     told["volume_mm"] = rounded(display.volume_depth_m() * 1e3).into();
     told["offset_mm"] = rounded(display.offset_m() * 1e3).into();
     told["aperture"] = display.aperture_radius().into();
+    let limits = Limits::of(display);
+    told["detail_um"] = rounded(limits.detail_um).into();
+    told["angle_deg"] = limits.angle_deg.into_iter().map(rounded).collect();
+    told["reach_mm"] = rounded(limits.reach_mm).into();
     told["calibrated"] = calibrated(file).into();
     told
 }

@@ -10,7 +10,7 @@ use phasefront_io::{Error, Result, output};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Find out whether the link to the modulator scales, filters, turns, covers or recolours pixels, all of which ruin phase
+/// Find out whether the link to the modulator scales, filters, turns, covers or recolours pixels, which ruins phase
 #[derive(Subcommand)]
 pub(crate) enum Link {
     Pattern(Pattern),

@@ -13,8 +13,8 @@ use std::time::Duration;
 /// Show frames on a screen, full and unscaled, at its rate; Escape or Q ends it
 #[derive(Args)]
 pub(crate) struct Show {
-    /// Images for the modulator's input, or with --display holograms and phase maps, which are packed for it; several are shown one
-    /// after another, those of a folder in the order of their names
+    /// Images for the modulator's input, or with --display holograms and phase maps, which are packed for it; several
+    /// are shown one after another, those of a folder in the order of their names
     #[arg(required = true)]
     frames: Vec<PathBuf>,
     /// The screen's number, counted from 1, as in `phasefront screens`

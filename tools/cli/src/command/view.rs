@@ -24,7 +24,8 @@ use std::path::{Path, PathBuf};
 /// The holograms are files, or one is made of an image by the flags of `hologram`.
 #[derive(Args)]
 pub(crate) struct View {
-    /// Holograms (.png, or .npy with its .json; with --display phase maps of other software), folders of `video`, or pages of this command, all joined in one page
+    /// Holograms (.png, or .npy with its .json; with --display phase maps of other software), folders of `video`, or
+    /// pages of this command, all joined in one page
     #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = IMAGE_FLAGS, conflicts_with_all = METHOD_FLAGS)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]

@@ -118,8 +118,8 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
     assert!(errors.contains("--display"), "{errors}");
 }
 
-/// Returns the PSNR of each colour's picture in dB, as an aperture of the whole first order shows the `levels` of a panel
-/// that retards light of colour c by `turns[c]` of 2π at level 256. The brightness is fitted.
+/// Returns the PSNR of each colour's picture in dB, as an aperture of the whole first order shows the `levels` of a
+/// panel that retards light of colour c by `turns[c]` of 2π at level 256. The brightness is fitted.
 fn shown_on(levels: &[u16], turns: [f64; 3], picture: &image::RgbImage) -> [f64; 3] {
     use num_complex::Complex64;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
@@ -161,8 +161,8 @@ fn shown_on(levels: &[u16], turns: [f64; 3], picture: &image::RgbImage) -> [f64;
     })
 }
 
-/// A panel is measured once, at 638 nm, where 256 levels are a turn. Its path is the same for all lasers, so they are 1.23
-/// turns of green and 1.42 of blue.
+/// A panel is measured once, at 638 nm, where 256 levels are a turn. Its path is the same for all lasers, so they are
+/// 1.23 turns of green and 1.42 of blue.
 #[test]
 fn one_measurement_of_a_panel_serves_three_lasers() {
     let folder = Folder::new();

@@ -30,6 +30,7 @@ mod kernels;
 mod misuse;
 mod one_laser;
 mod outputs;
+mod pattern;
 mod phase_maps;
 mod photos;
 mod recordings;

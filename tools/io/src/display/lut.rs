@@ -8,8 +8,8 @@
 //! ```
 //!
 //! A table is a text file of 256 levels, or of two columns, the numbers 0 to 255 in any order and their levels (a
-//! Meadowlark `.lut`). A table of one wavelength λ₀ gives the phase φ of a laser λ the level of the phase φ·λ/λ₀: a level
-//! makes the same path at every wavelength, if the dispersion of the material is left out.
+//! Meadowlark `.lut`). A table of one wavelength λ₀ gives the phase φ of a laser λ the level of the phase φ·λ/λ₀: a
+//! level makes the same path at every wavelength, if the dispersion of the material is left out.
 
 use super::lut_of;
 use crate::{Error, Result, input};

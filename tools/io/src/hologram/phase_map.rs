@@ -18,8 +18,8 @@ use phasefront_core::display::panel::PanelPlan;
 use phasefront_core::display::response::{linear_words, wrap};
 use std::path::Path;
 
-/// Reads a hologram like [`read_hologram`], or a phase map of other software for `display`: a PNG, BMP or TIFF of levels,
-/// or a `.npy` of levels (whole numbers), of phases in radians, or of exp(iφ).
+/// Reads a hologram like [`read_hologram`], or a phase map of other software for `display`: a PNG, BMP or TIFF of
+/// levels, or a `.npy` of levels (whole numbers), of phases in radians, or of exp(iφ).
 ///
 /// # Errors
 /// Returns the errors of [`read_hologram`]. Of a phase map, returns an error if its channels, size or levels do not fit
@@ -122,8 +122,12 @@ fn of_array(path: &Path, display: &DisplayFile) -> std::result::Result<Levels, S
     levels_of_phases(phases, display).map_err(|e| e.to_string())
 }
 
-/// Returns the levels of phases in radians, (C, H, W), that a flat panel shows.
-fn levels_of_phases(mut phases: Array3<f32>, display: &DisplayFile) -> phasefront::Result<Levels> {
+/// Returns the levels of phases in radians, (C, H, W), that a flat panel shows: the panel's flatness, carrier and lens
+/// are added.
+///
+/// # Errors
+/// Returns an error if the phases have more pixels than the modulator, or if a calibration does not fit it.
+pub fn levels_of_phases(mut phases: Array3<f32>, display: &DisplayFile) -> phasefront::Result<Levels> {
     let shape @ (_, height, width) = phases.dim();
     let (size, target) = (Size { width, height }, &display.target);
     phases.mapv_inplace(wrap);

@@ -149,8 +149,8 @@ impl Ramp {
     }
 }
 
-/// Returns the level in which each grey level arrives, from the ramps of grey and of the single colours: where one of them
-/// is covered, the other one is nearer to the level that was sent.
+/// Returns the level in which each grey level arrives, from the ramps of grey and of the single colours: where one of
+/// them is covered, the other one is nearer to the level that was sent.
 pub(super) fn first_curve(ramps: &[Ramp; 4]) -> Vec<f64> {
     let medians: [_; 3] = std::array::from_fn(|c| [ramps[0].medians(c), ramps[1 + c].medians(c)]);
     let nearest = |step: usize, of: &[[Option<f64>; STEPS]; 2]| {

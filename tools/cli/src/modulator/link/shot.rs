@@ -141,8 +141,8 @@ pub(super) struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// Calls `f` with the place (y, x) in the capture and in the pattern of each pixel of `part`, except for a margin of
-    /// 3 pixels of the pattern and what is hidden.
+    /// Calls `f` with the place (y, x) in the capture and in the pattern of each pixel of `part`, except for a margin
+    /// of 3 pixels of the pattern and what is hidden.
     pub(super) fn each(&self, part: Part, mut f: impl FnMut((usize, usize), (usize, usize))) {
         const MARGIN: usize = 3;
         let (rows, columns) = self.layout.area(part);
