@@ -795,8 +795,8 @@ const char *pf_last_error(void);
 // Returns the version of the library, such as "0.1.0". It is always valid.
 const char *pf_version(void);
 
-// Returns the third-party notices of the library as Markdown in UTF-8. An app must show them with its own notices. They are
-// always valid.
+// Returns the third-party notices of the library as Markdown in UTF-8. An app must show them with its own notices.
+// They are always valid.
 const char *pf_third_party_notices(void);
 
 // Creates the target for a display in TOML, such as "width = 1920\npitch_um = 8.0", whose levels are equal steps of

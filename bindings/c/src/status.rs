@@ -71,8 +71,8 @@ pub extern "C" fn pf_version() -> *const c_char {
     VERSION.as_ptr().cast()
 }
 
-/// Returns the third-party notices of the library as Markdown in UTF-8. An app must show them with its own notices. They are
-/// always valid.
+/// Returns the third-party notices of the library as Markdown in UTF-8. An app must show them with its own notices.
+/// They are always valid.
 #[unsafe(no_mangle)]
 pub extern "C" fn pf_third_party_notices() -> *const c_char {
     const NOTICES: &str = concat!(include_str!("../../../ios/Sources/PhasefrontCore/THIRD-PARTY.md"), "\0");
