@@ -47,7 +47,7 @@ pub use phasefront::input::{
     ConfidenceFormat, DepthFormat, DepthRange, Intrinsics, Orientation, RgbEncoding, Rotation, YuvMatrix,
 };
 pub use phasefront::output::{Layout, Placement};
-pub use phasefront::session::{Backend, Thermal};
+pub use phasefront::session::{Backend, Focus, Thermal};
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};
 pub use target::Target;

@@ -108,8 +108,7 @@ mod built_in {
 
     /// Returns the names of the networks.
     pub(super) fn names() -> String {
-        let names: Vec<_> = phasefront::models::NETWORKS.iter().map(|model| model.name).collect();
-        names.join(", ")
+        phasefront::models::names().join(", ")
     }
 
     pub(super) fn pair() -> Option<DeepPair> {

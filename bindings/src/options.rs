@@ -7,7 +7,7 @@ use phasefront::Size;
 use phasefront::Sweep;
 use phasefront::input::DepthRange;
 use phasefront::output::{Layout, Placement};
-use phasefront::session::{self, Backend, Thermal};
+use phasefront::session::{self, Backend, Focus, Thermal};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -61,6 +61,20 @@ pub enum Brightness {
     FrameMax,
 }
 
+/// How what is out of focus looks.
+#[uniffi::remote(Enum)]
+pub enum Focus {
+    /// As a laser shows it, with halos and rings. This is the default.
+    Coherent,
+    /// Soft, as in the world.
+    Natural {
+        /// The number of steps that follow the method, 0 to 1000, each of two transforms for each plane and colour. 30
+        /// bring most of the gain in stills. Without steps, as live frames need it, the method `Auto` without a network
+        /// takes the built-in network for natural focus.
+        steps: usize,
+    },
+}
+
 /// The distances that map to the ends of the volume.
 #[uniffi::remote(Enum)]
 pub enum DepthRange {
@@ -112,6 +126,9 @@ pub struct QualityLevel {
     /// The number of steps at the midpoint; none for the session's number.
     #[uniffi(default = None)]
     pub midpoint_steps: Option<usize>,
+    /// The number of steps of natural focus, in a session with natural focus; none for the session's number.
+    #[uniffi(default = None)]
+    pub focus_steps: Option<usize>,
 }
 
 /// Determines whether a session may change its quality level.
@@ -199,6 +216,8 @@ pub struct SessionOptions {
     /// stills; 1 suits video, where each frame continues from the previous one.
     #[uniffi(default = 0)]
     pub midpoint_steps: usize,
+    /// How what is out of focus looks.
+    pub focus: Focus,
     /// The distances that map to the ends of the volume.
     pub depth_range: DepthRange,
     /// The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
@@ -256,24 +275,15 @@ pub struct Placement {
 }
 
 impl Method {
-    fn core(&self, display: &phasefront::Display) -> phasefront::Method {
+    fn core(&self, display: &phasefront::Display, focus: Focus) -> Result<phasefront::Method, PhasefrontError> {
         let sweep = || Sweep::for_display(display);
-        match self {
+        Ok(match self {
             Method::Auto { network: Some(network) } => phasefront::Method::Auto(sweep(), network.core.clone()),
-            Method::Auto { network: None } => default_method(display),
+            Method::Auto { network: None } => focus.default_method(display)?,
             Method::Sweep => phasefront::Method::Sweep(sweep()),
             Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
-        }
+        })
     }
-}
-
-#[cfg(feature = "built-in-network")]
-use phasefront::models::default_method;
-
-/// Returns the method that needs no network.
-#[cfg(not(feature = "built-in-network"))]
-fn default_method(display: &phasefront::Display) -> phasefront::Method {
-    phasefront::Method::Sweep(Sweep::for_display(display))
 }
 
 /// Returns the default options for `target`: holograms at its modulator's resolution by `method` and AA-DPM with one
@@ -283,7 +293,7 @@ fn default_method(display: &phasefront::Display) -> phasefront::Method {
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
         let method = method.unwrap_or(Method::Auto { network: None });
-        let core = method.core(&target.core.display);
+        let core = method.core(&target.core.display, Focus::Coherent)?;
         let defaults = session::SessionOptions::new(target.core.clone(), core);
         Ok(SessionOptions::new(target, method, defaults))
     })
@@ -324,6 +334,7 @@ impl SessionOptions {
                     height: quality_level.size.height,
                     local_steps: None,
                     midpoint_steps: None,
+                    focus_steps: None,
                 })
                 .collect(),
             quality: match core.quality {
@@ -350,6 +361,7 @@ impl SessionOptions {
             dark_threshold: None,
             local_steps: None,
             midpoint_steps: core.encoder.midpoint_steps,
+            focus: Focus::Coherent,
             depth_range: core.depth.range,
             least_confidence: core.depth.least_confidence,
             threads: core.threads.map(NonZeroUsize::get),
@@ -395,8 +407,14 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             ));
         };
         let target = options.target.core.clone();
-        let method = |quality_level: &QualityLevel| quality_level.method.core(&target.display);
-        let mut to = session::SessionOptions::new(target.clone(), method(best));
+        let focus = |quality_level: &QualityLevel| options.focus.with_steps(quality_level.focus_steps);
+        let method = |quality_level: &QualityLevel| -> Result<_, PhasefrontError> {
+            let focus = focus(quality_level)?;
+            let method = quality_level.method.core(&target.display, focus)?;
+            focus.check(&method)?;
+            Ok(method)
+        };
+        let mut to = session::SessionOptions::new(target.clone(), method(best)?);
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
         to.encoder = (&EncoderOptions {
@@ -407,21 +425,25 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             midpoint_steps: options.midpoint_steps,
         })
             .into();
+        to.encoder.focus_steps = options.focus.steps();
         to.quality_levels = (options.quality_levels.iter())
-            .map(|quality_level| session::QualityLevel {
-                method: method(quality_level),
-                size: Size {
-                    width: quality_level.width,
-                    height: quality_level.height,
-                },
-                backend: None,
-                encoder: Some(phasefront::EncoderOptions {
-                    local_steps: quality_level.local_steps.unwrap_or(to.encoder.local_steps),
-                    midpoint_steps: quality_level.midpoint_steps.unwrap_or(to.encoder.midpoint_steps),
-                    ..to.encoder.clone()
-                }),
+            .map(|quality_level| {
+                Ok(session::QualityLevel {
+                    method: method(quality_level)?,
+                    size: Size {
+                        width: quality_level.width,
+                        height: quality_level.height,
+                    },
+                    backend: None,
+                    encoder: Some(phasefront::EncoderOptions {
+                        local_steps: quality_level.local_steps.unwrap_or(to.encoder.local_steps),
+                        midpoint_steps: quality_level.midpoint_steps.unwrap_or(to.encoder.midpoint_steps),
+                        focus_steps: focus(quality_level)?.steps(),
+                        ..to.encoder.clone()
+                    }),
+                })
             })
-            .collect();
+            .collect::<Result<_, PhasefrontError>>()?;
         to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
         #[cfg(feature = "tract")]

@@ -7,8 +7,8 @@
 
 use phasefront_ffi::{
     Brightness, ColourFormat, ColourInfo, ColourScale, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
-    DepthNetwork, DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawPlanes,
-    RawSession, RgbEncoding, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml,
+    DepthNetwork, DepthRange, Encoding, Focus, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram,
+    RawPlanes, RawSession, RgbEncoding, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml,
     session_options,
 };
 use serde_json::{Value, json};
@@ -108,6 +108,10 @@ fn options(case: &Value) -> SessionOptions {
                 near_m: range[0].as_f64().unwrap() as f32,
                 far_m: range[1].as_f64().unwrap() as f32,
             },
+        },
+        focus: match &case["focus_steps"] {
+            Value::Null => Focus::Coherent,
+            steps => Focus::Natural { steps: int(steps) },
         },
         depth_network: case["depth_network"].as_str().map(|file| {
             let onnx = std::fs::read(folder().join(file)).unwrap();
@@ -522,7 +526,7 @@ mod write {
         let still = |colour: Value, depth: Value| json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false});
         let case = |name: &str, frames: Vec<Value>| {
             json!({"name": name, "method": "network", "mode": "image", "display": display, "levels": 256, "encoding": "anti-alias", "lut": null,
-                   "calibration": null, "brightness": null, "range": null, "depth_network": null, "frames": frames})
+                   "calibration": null, "brightness": null, "range": null, "focus_steps": null, "depth_network": null, "frames": frames})
         };
         let mut cases = Vec::new();
 
@@ -699,6 +703,13 @@ mod write {
             let mut one = case(name, vec![cases[0]["frames"][0].clone()]);
             one["display"] = json!(display);
             one["frames"][0]["colour"]["encoding"] = json!(encoding);
+            cases.push(one);
+        }
+
+        for (steps, name) in [(0, "natural focus by a network"), (2, "natural focus by steps")] {
+            let mut one = case(name, vec![cases[0]["frames"][0].clone()]);
+            one["method"] = json!("default");
+            one["focus_steps"] = json!(steps);
             cases.push(one);
         }
 

@@ -83,9 +83,21 @@ pub const NETWORKS: &[Model] = &[
     },
 ];
 
-/// Returns the network of [`NETWORKS`] called `name`, or `None` if it does not exist or `precision` is not compiled in.
+/// The network for natural focus: it corrects the plane sweep's wave so that what is out of focus is soft.
+pub const NATURAL: &Model = &Model {
+    name: "natural-8",
+    files: files!("natural-8"),
+};
+
+/// Returns the names that [`network`] takes.
+pub fn names() -> Vec<&'static str> {
+    NETWORKS.iter().chain([NATURAL]).map(|model| model.name).collect()
+}
+
+/// Returns the network of [`NETWORKS`] or [`NATURAL`] called `name`, or `None` if it does not exist or `precision` is not
+/// compiled in.
 pub fn network(name: &str, precision: Precision) -> Option<Arc<Network>> {
-    let model = NETWORKS.iter().find(|model| model.name == name)?;
+    let model = NETWORKS.iter().chain([NATURAL]).find(|model| model.name == name)?;
     model.network(precision)
 }
 
@@ -145,6 +157,13 @@ pub fn default_method(display: &Display) -> Method {
     }
 }
 
+/// Returns the method of natural focus for `display`: [`NATURAL`] in int8, or `None` if it was not trained for that
+/// display.
+pub fn natural_method(display: &Display) -> Option<Method> {
+    let network = NATURAL.network(Precision::Int8)?;
+    network.check_display(display).is_ok().then(|| Method::trained(network))
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -158,7 +177,7 @@ mod tests {
     #[test]
     fn every_file_is_a_network_for_the_papers_display() {
         for precision in precisions() {
-            for model in NETWORKS {
+            for model in NETWORKS.iter().chain([NATURAL]) {
                 let network = model.network(precision).unwrap();
                 network.check_display(&Display::default()).unwrap();
             }
@@ -177,6 +196,7 @@ mod tests {
             let display = Display::from_toml(display).unwrap();
             assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
             assert_eq!(default_network(&display).is_some(), trained);
+            assert_eq!(natural_method(&display).is_some(), trained);
             let method = default_method(&display);
             assert_eq!(matches!(method, Method::Auto(..)), trained, "{method:?}");
             assert_eq!(matches!(method, Method::Sweep(_)), !trained, "{method:?}");

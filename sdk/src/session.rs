@@ -19,6 +19,7 @@ mod depth_estimates;
 mod drop_reason;
 mod engine;
 mod event;
+mod focus;
 mod handle;
 mod hologram;
 mod live;
@@ -38,6 +39,7 @@ pub use drop_reason::DropReason;
 #[cfg(feature = "gpu")]
 pub use engine::GpuOptions;
 pub use event::Event;
+pub use focus::Focus;
 pub use handle::SessionHandle;
 pub use hologram::Hologram;
 pub use options::SessionOptions;

@@ -17,7 +17,7 @@ from .networks import field_of, in_turn
 from .stage1 import LIGHT_REACH_PX, Stage1
 
 PLANES = 3  # depths of focus of each sample
-IN_FOCUS_WEIGHT = 5.0
+IN_FOCUS_WEIGHT = 9.0
 IN_FOCUS_PX = 1.5  # blur at which the weight of focus has fallen to a third
 IN_FOCUS, OUT_OF_FOCUS = 2.0, 6.0  # bounds in pixels of the blur of figures
 BRIGHTER_ELSEWHERE = 0.3  # largest logarithm of a frame's full light over that of the crop

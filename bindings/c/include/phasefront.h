@@ -382,6 +382,9 @@ typedef struct PfQualityLevel {
   int32_t local_steps;
   // The number of steps at the midpoint; negative for the session's number.
   int32_t midpoint_steps;
+  // The number of steps of natural focus, in a session with natural focus; negative for the session's number. 0 in
+  // other sessions.
+  int32_t focus_steps;
 } PfQualityLevel;
 
 // A change of the quality level.
@@ -721,6 +724,12 @@ enum PfStatus pf_options_set_local_steps(struct PfOptions *options, uint32_t ste
 // Sets the number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit
 // stills; 1 suits video, where each frame continues from the previous one.
 enum PfStatus pf_options_set_midpoint_steps(struct PfOptions *options, uint32_t steps);
+
+// Sets natural focus: what is out of focus is soft, as in the world. `steps` follow the method, 0 to 1000, each of two
+// transforms for each plane and colour; 30 bring most of the gain in stills. Without steps, as live frames need it,
+// PF_METHOD_AUTO without a network takes the built-in network for natural focus. The default is coherent focus: what is
+// out of focus has halos and rings, as a laser shows it.
+enum PfStatus pf_options_set_natural_focus(struct PfOptions *options, uint32_t steps);
 
 // Sets the distances, in metres, that map to the ends of the volume. The default is the 1st and 99th percentile of the
 // readings.

@@ -160,6 +160,8 @@ static PfOptions *options_of(const cJSON *json, const char *suite, const char *m
         float far_m = (float)cJSON_GetNumberValue(cJSON_GetArrayItem(of(json, "range"), 1));
         ok(pf_options_set_depth_range(options, near_m, far_m), "range");
     }
+    if (!is_null(json, "focus_steps"))
+        ok(pf_options_set_natural_focus(options, (uint32_t)number(json, "focus_steps")), "focus");
     if (!is_null(json, "depth_network")) {
         size_t length = 0;
         uint8_t *onnx = read_file(suite, text(json, "depth_network"), &length);

@@ -29,6 +29,7 @@ from ._ffi import (
     Drops,
     Encoding,
     FileError,
+    Focus,
     FrameError,
     FrameTimes,
     HologramInfo,
@@ -75,7 +76,7 @@ from ._target import Target
 __all__ = [
     "Backend", "Brightness", "Cameras", "ColourFormat", "ColourScale", "Comparison", "ConfidenceFormat", "DeepPair", "DepthFormat",
     "DepthNetwork", "DepthRange",
-    "Display", "DisplayError", "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "FileError", "Frame",
+    "Display", "DisplayError", "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "FileError", "Focus", "Frame",
     "FrameError", "FrameTimes", "Hologram", "HologramInfo", "InternalError", "Intrinsics", "Layout", "LogLevel",
     "Method", "Modulator", "Network", "NetworkError", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
     "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "RgbEncoding", "Rotation",

@@ -298,6 +298,29 @@ class Quality:
     def is_adaptive(self) -> bool: ...
     def is_fixed(self) -> bool: ...
 
+class Focus:
+    """How what is out of focus looks.
+
+    One of:
+        coherent: As a laser shows it, with halos and rings. This is the default.
+        natural: Soft, as in the world.
+    """
+    class coherent(Focus):
+        """As a laser shows it, with halos and rings. This is the default."""
+        def __init__(self) -> None: ...
+    class natural(Focus):
+        """Soft, as in the world.
+
+        Fields:
+            steps: The number of steps that follow the method, 0 to 1000, each of two transforms for each plane and colour. 30
+        bring most of the gain in stills. Without steps, as live frames need it, the method `Auto` without a network
+        takes the built-in network for natural focus.
+        """
+        steps: int
+        def __init__(self, steps: int) -> None: ...
+    def is_coherent(self) -> bool: ...
+    def is_natural(self) -> bool: ...
+
 class DepthRange:
     """The distances that map to the ends of the volume.
 
@@ -769,13 +792,15 @@ class QualityLevel:
         height: The height of the hologram in pixels.
         local_steps: The number of local steps; none for the session's number.
         midpoint_steps: The number of steps at the midpoint; none for the session's number.
+        focus_steps: The number of steps of natural focus, in a session with natural focus; none for the session's number.
     """
     method: Method
     width: int
     height: int
     local_steps: int | None
     midpoint_steps: int | None
-    def __init__(self, *, method: Method, width: int, height: int, local_steps: int | None = ..., midpoint_steps: int | None = ...) -> None: ...
+    focus_steps: int | None
+    def __init__(self, *, method: Method, width: int, height: int, local_steps: int | None = ..., midpoint_steps: int | None = ..., focus_steps: int | None = ...) -> None: ...
 
 class RawMemory:
     """The caller's memory for an image. The layers written by hand promise that it stays valid during the call and that
@@ -804,6 +829,7 @@ class SessionOptions:
         dark_threshold: The share of full light, 0 to 1, below which phases are drawn to 0, which reduces coloured speckle in dark areas; none for the encoding's default: 0.4, and 0 with a pre-filter.
         local_steps: The number of correction steps, 0 to 8. Each step draws the displayed image toward the wanted field. None for the encoding's default: 1, and 0 with a pre-filter.
         midpoint_steps: The number of correction steps at the midpoint, 0 to 100. Each step costs four transforms per colour: 3 suit stills; 1 suits video, where each frame continues from the previous one.
+        focus: How what is out of focus looks.
         depth_range: The distances that map to the ends of the volume.
         least_confidence: The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
         threads: The number of threads to compute with, at most 256; none for as many as the device has.
@@ -820,13 +846,14 @@ class SessionOptions:
     dark_threshold: float | None
     local_steps: int | None
     midpoint_steps: int
+    focus: Focus
     depth_range: DepthRange
     least_confidence: float
     threads: int | None
     most_pixels: int
     backend: Backend
     depth_network: DepthNetwork | None
-    def __init__(self, *, target: Target, quality_levels: list[QualityLevel], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend, depth_network: DepthNetwork | None = ...) -> None: ...
+    def __init__(self, *, target: Target, quality_levels: list[QualityLevel], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, focus: Focus, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend, depth_network: DepthNetwork | None = ...) -> None: ...
 
 class Statistics:
     """The statistics of a session at one moment. Each submitted frame is either processed, failed, refused, dropped or

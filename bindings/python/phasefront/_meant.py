@@ -33,6 +33,10 @@ def _brightness(value: Any) -> Any:
     return _named(value, {"smoothed": _generated.Brightness.SMOOTHED, "frame-max": _generated.Brightness.FRAME_MAX})
 
 
+def _focus(value: Any) -> Any:
+    return _named(value, {"coherent": _generated.Focus.COHERENT, "natural": lambda: _generated.Focus.NATURAL(steps=0)})
+
+
 def _depth_range(value: Any) -> Any:
     if isinstance(value, (tuple, list)) and len(value) == 2:
         return _generated.DepthRange.FIXED(near_m=value[0], far_m=value[1])
@@ -65,5 +69,6 @@ def _named(value: Any, kinds: dict[str, Callable[[], Any]]) -> Any:
 MEANT[_generated.Method] = _method
 MEANT[_generated.Encoding] = _encoding
 MEANT[_generated.Brightness] = _brightness
+MEANT[_generated.Focus] = _focus
 MEANT[_generated.DepthRange] = _depth_range
 MEANT[_generated.Quality] = _quality

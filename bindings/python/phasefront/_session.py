@@ -20,6 +20,7 @@ from ._ffi import (
     Display,
     DropReason,
     Encoding,
+    Focus,
     FrameError,
     LogLevel,
     Method,
@@ -136,6 +137,7 @@ class Changes(TypedDict, total=False):
     dark_threshold: float | None
     local_steps: int | None
     midpoint_steps: int
+    focus: Focus | str
     depth_range: DepthRange | tuple[float, float] | str
     least_confidence: float
     threads: int | None

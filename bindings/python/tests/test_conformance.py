@@ -15,6 +15,7 @@ from phasefront import (
     DepthNetwork,
     DepthRange,
     Encoding,
+    Focus,
     Frame,
     Method,
     Network,
@@ -109,6 +110,8 @@ def made_of(case, memory, network):
         changes["brightness"] = Brightness.fixed(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.fixed(near_m=case["range"][0], far_m=case["range"][1])
+    if case["focus_steps"] is not None:
+        changes["focus"] = Focus.natural(steps=case["focus_steps"])
     if case["depth_network"] is not None:
         onnx = (SUITE / case["depth_network"]).read_bytes()
         changes["depth_network"] = DepthNetwork.from_bytes(onnx, ColourScale.UNIT)

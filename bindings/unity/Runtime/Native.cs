@@ -59,6 +59,7 @@ namespace Phasefront
         public uint Height;
         public int LocalSteps;
         public int MidpointSteps;
+        public int FocusSteps;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -159,6 +160,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_dark_threshold(SessionOptions options, float threshold);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_local_steps(SessionOptions options, uint steps);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_midpoint_steps(SessionOptions options, uint steps);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_natural_focus(SessionOptions options, uint steps);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_depth_range(SessionOptions options, float nearM, float farM);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_least_confidence(SessionOptions options, float confidence);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_threads(SessionOptions options, uint threads);

@@ -64,7 +64,7 @@ namespace Phasefront
         /// <summary>
         /// Adds a quality level below the existing ones: a method, a resolution and the steps that correct the
         /// displayed image. A negative number of steps means the session's number. </summary>
-        public void PushQualityLevel(HologramMethod method, HologramNetwork network, int width, int height, int localSteps = -1, int midpointSteps = -1)
+        public void PushQualityLevel(HologramMethod method, HologramNetwork network, int width, int height, int localSteps = -1, int midpointSteps = -1, int focusSteps = -1)
         {
             With(network, native =>
             {
@@ -77,6 +77,7 @@ namespace Phasefront
                     Height = (uint)height,
                     LocalSteps = localSteps,
                     MidpointSteps = midpointSteps,
+                    FocusSteps = focusSteps,
                 };
                 Check(Native.pf_options_push_quality_level(this, ref qualityLevel));
                 return true;
@@ -122,6 +123,11 @@ namespace Phasefront
 
         /// <summary>The number of correction steps at the midpoint, 0 to 100: 3 for stills, 1 for video.</summary>
         public int MidpointSteps { set => Check(Native.pf_options_set_midpoint_steps(this, checked((uint)value))); }
+
+        /// <summary>Makes what is out of focus soft, as in the world. The steps follow the method, 0 to 1000: 30 bring most of
+        /// the gain in stills. Without steps, as live frames need it, the method Auto without a network takes the built-in
+        /// network for natural focus. The default is coherent focus: halos and rings, as a laser shows them.</summary>
+        public void NaturalFocus(int steps = 0) => Check(Native.pf_options_set_natural_focus(this, checked((uint)steps)));
 
         /// <summary>Maps these depths in metres to the ends of the volume.</summary>
         public void DepthRange(float nearM, float farM) => Check(Native.pf_options_set_depth_range(this, nearM, farM));

@@ -168,6 +168,7 @@ internal static class Tests
                 var range = ((IEnumerable)one["range"]).Cast<object>().Select(Convert.ToSingle).ToArray();
                 options.DepthRange(range[0], range[1]);
             }
+            if (one["focus_steps"] != null) options.NaturalFocus((int)one["focus_steps"]);
             if (one["depth_network"] != null)
             {
                 var onnx = File.ReadAllBytes(Path.Combine(suite, (string)one["depth_network"]));

@@ -31,8 +31,7 @@ impl RawNetwork {
     #[wasm_bindgen(js_name = builtIn)]
     pub fn built_in(name: &str) -> Answer<RawNetwork> {
         let core = phasefront::models::network(name, Int8).ok_or_else(|| {
-            let names: Vec<_> = phasefront::models::NETWORKS.iter().map(|model| model.name).collect();
-            let names = names.join(", ");
+            let names = phasefront::models::names().join(", ");
             error(
                 "network",
                 &format!(

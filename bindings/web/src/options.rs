@@ -1,13 +1,13 @@
 //! The options of a session.
 
-use crate::error::{Answer, setting};
+use crate::error::{Answer, of_core, setting};
 use crate::network::RawNetwork;
 use crate::target::RawTarget;
 use phasefront::Size;
 use phasefront::input::DepthRange;
 #[cfg(not(target_feature = "atomics"))]
 use phasefront::session::Backend;
-use phasefront::session::{Quality, QualityLevel, SessionOptions};
+use phasefront::session::{Focus, Quality, QualityLevel, SessionOptions};
 use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
@@ -50,13 +50,15 @@ impl RawMethod {
 }
 
 impl RawMethod {
-    fn core(&self, target: &phasefront::Target) -> Method {
-        match &self.0 {
+    fn core(&self, target: &phasefront::Target, focus: Focus) -> Answer<Method> {
+        let method = match &self.0 {
             Maker::Trained(network) => Method::trained(network.clone()),
             Maker::Sweep => Method::Sweep(Sweep::for_display(&target.display)),
-            Maker::Auto(None) => phasefront::models::default_method(&target.display),
+            Maker::Auto(None) => focus.default_method(&target.display).map_err(of_core)?,
             Maker::Auto(Some(network)) => Method::Auto(Sweep::for_display(&target.display), network.clone()),
-        }
+        };
+        focus.check(&method).map_err(of_core)?;
+        Ok(method)
     }
 }
 
@@ -65,24 +67,29 @@ impl RawMethod {
 #[wasm_bindgen]
 pub struct RawOptions {
     pub(crate) core: SessionOptions,
+    focus: Focus,
+}
+
+/// Returns the focus with `natural_steps` of natural focus, or the coherent one for `None`.
+fn focus(natural_steps: Option<u32>) -> Focus {
+    natural_steps.map_or(Focus::Coherent, |steps| Focus::Natural { steps: steps as usize })
 }
 
 #[wasm_bindgen]
 impl RawOptions {
-    /// Returns the default options for `target`.
-    #[wasm_bindgen(js_name = withDefaults)]
-    pub fn with_defaults(target: &RawTarget) -> RawOptions {
-        RawOptions {
-            core: SessionOptions::for_target(target.core.clone()),
-        }
-    }
-
-    /// Returns the default options for `target` with `method`.
-    #[wasm_bindgen(js_name = withMethod)]
-    pub fn with_method(target: &RawTarget, method: &RawMethod) -> RawOptions {
-        RawOptions {
-            core: SessionOptions::new(target.core.clone(), method.core(&target.core)),
-        }
+    /// Returns the default options for `target` with `method`, and the number of steps of natural focus, or none for
+    /// coherent focus.
+    ///
+    /// # Errors
+    /// Throws an error of kind `setting` if natural focus without steps has no network for the display.
+    #[wasm_bindgen(constructor)]
+    pub fn new(target: &RawTarget, method: &RawMethod, natural_steps: Option<u32>) -> Answer<RawOptions> {
+        let focus = focus(natural_steps);
+        let method = method.core(&target.core, focus)?;
+        Ok(RawOptions {
+            core: SessionOptions::new(target.core.clone(), method),
+            focus,
+        })
     }
 
     /// Sets the encoding: `double-phase`; `anti-alias` with a standard deviation in pixels and a number of taps; or
@@ -137,6 +144,7 @@ impl RawOptions {
         let encoder = &mut self.core.encoder;
         encoder.dark_threshold = dark_threshold.unwrap_or(encoder.dark_threshold);
         *encoder = stepped(encoder, local_steps, midpoint_steps);
+        encoder.focus_steps = self.focus.steps();
     }
 
     /// Sets the depths in metres at the near and the far end of the volume.
@@ -195,6 +203,10 @@ impl RawOptions {
     }
 
     /// Adds a quality level below the existing ones.
+    ///
+    /// # Errors
+    /// Throws an error of kind `setting` for steps of natural focus where the focus is coherent, or if natural focus
+    /// without steps has no network for the display.
     #[wasm_bindgen(js_name = pushQualityLevel)]
     pub fn push_quality_level(
         &mut self,
@@ -203,16 +215,25 @@ impl RawOptions {
         height: u32,
         local_steps: Option<u32>,
         midpoint_steps: Option<u32>,
-    ) {
+        focus_steps: Option<u32>,
+    ) -> Answer<()> {
+        let focus = self
+            .focus
+            .with_steps(focus_steps.map(|steps| steps as usize))
+            .map_err(of_core)?;
         self.core.quality_levels.push(QualityLevel {
-            method: method.core(&self.core.target),
+            method: method.core(&self.core.target, focus)?,
             size: Size {
                 width: width as usize,
                 height: height as usize,
             },
             backend: None,
-            encoder: Some(stepped(&self.core.encoder, local_steps, midpoint_steps)),
+            encoder: Some(EncoderOptions {
+                focus_steps: focus.steps(),
+                ..stepped(&self.core.encoder, local_steps, midpoint_steps)
+            }),
         });
+        Ok(())
     }
 }
 

@@ -50,6 +50,7 @@ async function optionsOf(one, api) {
     method: await methodOf(one.method, api),
     encoding: known ? { kind: one.encoding } : { kind: "deep", prefilter: api.network(await model(one.encoding)) },
     brightness: one.brightness === null ? undefined : { kind: "fixed", scale: one.brightness },
+    focus: one.focus_steps === null ? undefined : { kind: "natural", steps: one.focus_steps },
     depthRange: one.range === null ? undefined : { nearM: one.range[0], farM: one.range[1] },
   };
 }

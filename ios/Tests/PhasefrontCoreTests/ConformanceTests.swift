@@ -15,6 +15,7 @@ final class ConformanceTests: XCTestCase {
         let lut: [UInt8]?
         let calibration, depth_network: String?
         let brightness: Float?
+        let focus_steps: Int?
         let range: [Float]?
         let frames: [Still]
     }
@@ -130,6 +131,7 @@ final class ConformanceTests: XCTestCase {
         options.encoding = try encoding(one.encoding)
         if let scale = one.brightness { options.brightness = .fixed(scale: scale) }
         if let range = one.range { options.depthRange = .fixed(nearM: range[0], farM: range[1]) }
+        if let steps = one.focus_steps { options.focus = .natural(steps: steps) }
         if let file = one.depth_network {
             let onnx = try Data(contentsOf: Self.root.appendingPathComponent("tests/conformance/\(file)"))
             options.depthNetwork = try DepthNetwork.fromBytes(onnx: onnx, colours: .unit)

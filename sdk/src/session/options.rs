@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 use super::engine::GpuOptions;
+use super::focus::Focus;
 use super::quality::{self, Backend, Quality, QualityLevel};
 use phasefront_core::Size;
 use phasefront_core::depth::stream::DepthOptions;
@@ -67,6 +68,18 @@ impl SessionOptions {
         let target = target.into();
         let method = phasefront_models::default_method(&target.display);
         SessionOptions::new(target, method)
+    }
+
+    /// Returns the default options for `target` and `focus`, with the method of [`Focus::default_method`].
+    ///
+    /// # Errors
+    /// Returns an error for natural focus without steps if the bundled network was not trained for the display.
+    pub fn for_focus(target: impl Into<Target>, focus: Focus) -> Result<Self> {
+        let target = target.into();
+        let method = focus.default_method(&target.display)?;
+        let mut options = SessionOptions::new(target, method);
+        options.encoder.focus_steps = focus.steps();
+        Ok(options)
     }
 
     /// Returns the default options for holograms at the modulator's resolution by `method`: AA-DPM, smoothed

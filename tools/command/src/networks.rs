@@ -3,8 +3,8 @@
 use phasefront::Network;
 use phasefront_core::runtime::file;
 use phasefront_io::{Error, Result, output};
+use phasefront_models::PAIR;
 pub use phasefront_models::Precision;
-use phasefront_models::{NETWORKS, PAIR};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,14 +12,7 @@ use std::sync::Arc;
 pub const DEEP: &str = PAIR.name;
 
 /// The names of the networks that are not bundled, in the source tree's folder `models/unbundled`.
-const FILES: [&str; 6] = [
-    "ldi3-15",
-    "natural-8",
-    "rgbd-15-cylinder",
-    "rgbd-15-wide",
-    "rgbd-30",
-    "seeded-8-80",
-];
+const FILES: [&str; 5] = ["ldi3-15", "rgbd-15-cylinder", "rgbd-15-wide", "rgbd-30", "seeded-8-80"];
 
 /// Returns the full name for `name`, which may be short.
 fn full_name(name: &str) -> String {
@@ -32,7 +25,7 @@ fn full_name(name: &str) -> String {
 /// Checks whether `name` is the name of a bundled network and not of a file.
 pub fn is_bundled(name: &str) -> bool {
     let full = full_name(name);
-    NETWORKS.iter().any(|model| model.name == full)
+    phasefront_models::names().contains(&full.as_str())
 }
 
 /// Returns the bundled network called `name` in `precision` (int8 by default), or the network in an ONNX file, which
@@ -59,8 +52,7 @@ pub fn network(name: &str, precision: Option<Precision>) -> Result<Arc<Network>>
 
 /// Makes the error for an unknown network, which lists the known ones.
 fn unknown(path: &Path, name: &str, why: &std::io::Error) -> Error {
-    let bundled: Vec<_> = NETWORKS.iter().map(|model| model.name).chain([DEEP]).collect();
-    let bundled = bundled.join(", ");
+    let bundled = [phasefront_models::names(), vec![DEEP]].concat().join(", ");
     Error::file(
         path,
         if FILES.contains(&name) {
@@ -92,7 +84,7 @@ mod tests {
                 .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
                 .collect()
         };
-        let bundled = NETWORKS.iter().map(|model| model.name).chain([DEEP]);
+        let bundled = phasefront_models::names().into_iter().chain([DEEP]);
         assert_eq!(cards(""), bundled.map(str::to_owned).collect());
         assert_eq!(cards("unbundled"), FILES.map(str::to_owned).into());
     }

@@ -53,6 +53,7 @@ export {
   Session,
   type Brightness,
   type Encoding,
+  type Focus,
   type Method,
   type ProcessAsyncOptions,
   type Quality,

@@ -37,6 +37,14 @@ export type Encoding<N = Network> =
 export type Brightness =
   { readonly kind: "smoothed" } | { readonly kind: "frame-max" } | { readonly kind: "fixed"; readonly scale: number };
 
+/**
+ * How what is out of focus looks: `coherent`, as a laser shows it, with halos and rings; or `natural`, soft, as in the
+ * world. The steps of natural focus follow the method, 0 to 1000, each of two transforms for each plane and colour: 30
+ * bring most of the gain in stills. Without steps, as live frames need it, the method `auto` without a network takes the
+ * built-in network for natural focus.
+ */
+export type Focus = { readonly kind: "coherent" } | { readonly kind: "natural"; readonly steps?: number };
+
 /** Whether the session changes its quality level by itself or keeps a fixed one; 0 is the best. */
 export type Quality = { readonly kind: "adaptive" } | { readonly kind: "fixed"; readonly qualityLevel: number };
 
@@ -49,6 +57,8 @@ export interface QualityLevel<N = Network> {
   readonly localSteps?: number;
   /** The session's value by default. */
   readonly midpointSteps?: number;
+  /** The number of steps of natural focus, in a session with natural focus; the session's value by default. */
+  readonly focusSteps?: number;
 }
 
 /** The options of a session. Omitted options have their defaults. `N` are its networks, `T` is its target. */
@@ -76,6 +86,8 @@ export interface SessionOptions<N = Network, T = Target | Display> {
   readonly localSteps?: number;
   /** The number of correction steps at the midpoint, 0 to 100, each of four transforms per colour; 0 by default. */
   readonly midpointSteps?: number;
+  /** How what is out of focus looks; `coherent` by default. */
+  readonly focus?: Focus;
   /** The depths in metres at the ends of the volume; by default the 1st and 99th percentile of the readings. */
   readonly depthRange?: { readonly nearM: number; readonly farM: number };
   /** The confidence, 0 to 1, below which readings are ignored. */
@@ -147,12 +159,18 @@ function qualityLevel(quality: Quality): number | undefined {
   return quality.kind === "fixed" ? whole("the quality level", quality.qualityLevel) : undefined;
 }
 
+/** Returns the steps of natural focus, or undefined for coherent focus. */
+function naturalSteps(focus?: Focus): number | undefined {
+  if (focus?.kind === "natural") return focus.steps === undefined ? 0 : whole("the steps of natural focus", focus.steps);
+  if (focus === undefined || focus.kind === "coherent") return undefined;
+  const { kind } = focus as { kind: string };
+  throw new PhasefrontError("setting", `there is no focus '${kind}'; there are coherent, natural`);
+}
+
 function rawOptions(options: SessionOptions): RawOptions {
   const target = options.target instanceof Target ? options.target : Target.ofDisplay(options.target);
   return guard(() => {
-    const raw = options.method
-      ? RawOptions.withMethod(target.raw, rawMethod(options.method))
-      : RawOptions.withDefaults(target.raw);
+    const raw = new RawOptions(target.raw, rawMethod(options.method ?? { kind: "auto" }), naturalSteps(options.focus));
     setEncoder(raw, options);
     if (options.depthRange) raw.depthRange(options.depthRange.nearM, options.depthRange.farM);
     if (options.leastConfidence !== undefined) raw.leastConfidence(options.leastConfidence);
@@ -160,9 +178,9 @@ function rawOptions(options: SessionOptions): RawOptions {
     if (options.mostPixels !== undefined) raw.mostPixels(whole("mostPixels", options.mostPixels));
     if (options.qualityLevels) {
       raw.clearQualityLevels();
-      for (const { method, width, height, localSteps, midpointSteps } of options.qualityLevels) {
+      for (const { method, width, height, localSteps, midpointSteps, focusSteps } of options.qualityLevels) {
         const [w, h] = [whole("the width of a quality level", width), whole("the height of a quality level", height)];
-        raw.pushQualityLevel(rawMethod(method), w, h, localSteps, midpointSteps);
+        raw.pushQualityLevel(rawMethod(method), w, h, localSteps, midpointSteps, focusSteps);
       }
     }
     if (options.quality) raw.quality(qualityLevel(options.quality));

@@ -5189,6 +5189,10 @@ public struct QualityLevel {
      * The number of steps at the midpoint; none for the session's number.
      */
     public var midpointSteps: Int?
+    /**
+     * The number of steps of natural focus, in a session with natural focus; none for the session's number.
+     */
+    public var focusSteps: Int?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -5207,12 +5211,16 @@ public struct QualityLevel {
          */localSteps: Int? = nil, 
         /**
          * The number of steps at the midpoint; none for the session's number.
-         */midpointSteps: Int? = nil) {
+         */midpointSteps: Int? = nil, 
+        /**
+         * The number of steps of natural focus, in a session with natural focus; none for the session's number.
+         */focusSteps: Int? = nil) {
         self.method = method
         self.width = width
         self.height = height
         self.localSteps = localSteps
         self.midpointSteps = midpointSteps
+        self.focusSteps = focusSteps
     }
 
     
@@ -5235,7 +5243,8 @@ public struct FfiConverterTypeQualityLevel: FfiConverterRustBuffer {
                 width: FfiConverterTypeInt.read(from: &buf), 
                 height: FfiConverterTypeInt.read(from: &buf), 
                 localSteps: FfiConverterOptionTypeInt.read(from: &buf), 
-                midpointSteps: FfiConverterOptionTypeInt.read(from: &buf)
+                midpointSteps: FfiConverterOptionTypeInt.read(from: &buf), 
+                focusSteps: FfiConverterOptionTypeInt.read(from: &buf)
         )
     }
 
@@ -5245,6 +5254,7 @@ public struct FfiConverterTypeQualityLevel: FfiConverterRustBuffer {
         FfiConverterTypeInt.write(value.height, into: &buf)
         FfiConverterOptionTypeInt.write(value.localSteps, into: &buf)
         FfiConverterOptionTypeInt.write(value.midpointSteps, into: &buf)
+        FfiConverterOptionTypeInt.write(value.focusSteps, into: &buf)
     }
 }
 
@@ -5389,6 +5399,10 @@ public struct SessionOptions {
      */
     public var midpointSteps: Int
     /**
+     * How what is out of focus looks.
+     */
+    public var focus: Focus
+    /**
      * The distances that map to the ends of the volume.
      */
     public var depthRange: DepthRange
@@ -5450,6 +5464,9 @@ public struct SessionOptions {
          * stills; 1 suits video, where each frame continues from the previous one.
          */midpointSteps: Int = 0, 
         /**
+         * How what is out of focus looks.
+         */focus: Focus, 
+        /**
          * The distances that map to the ends of the volume.
          */depthRange: DepthRange, 
         /**
@@ -5478,6 +5495,7 @@ public struct SessionOptions {
         self.darkThreshold = darkThreshold
         self.localSteps = localSteps
         self.midpointSteps = midpointSteps
+        self.focus = focus
         self.depthRange = depthRange
         self.leastConfidence = leastConfidence
         self.threads = threads
@@ -5511,6 +5529,7 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
                 darkThreshold: FfiConverterOptionFloat.read(from: &buf), 
                 localSteps: FfiConverterOptionTypeInt.read(from: &buf), 
                 midpointSteps: FfiConverterTypeInt.read(from: &buf), 
+                focus: FfiConverterTypeFocus.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
                 threads: FfiConverterOptionTypeInt.read(from: &buf), 
@@ -5530,6 +5549,7 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         FfiConverterOptionFloat.write(value.darkThreshold, into: &buf)
         FfiConverterOptionTypeInt.write(value.localSteps, into: &buf)
         FfiConverterTypeInt.write(value.midpointSteps, into: &buf)
+        FfiConverterTypeFocus.write(value.focus, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
         FfiConverterOptionTypeInt.write(value.threads, into: &buf)
@@ -6642,6 +6662,89 @@ public func FfiConverterTypeEncoding_lift(_ buf: RustBuffer) throws -> Encoding 
 #endif
 public func FfiConverterTypeEncoding_lower(_ value: Encoding) -> RustBuffer {
     return FfiConverterTypeEncoding.lower(value)
+}
+
+
+
+/**
+ * How what is out of focus looks.
+ */
+
+public enum Focus: Equatable, Hashable {
+    
+    /**
+     * As a laser shows it, with halos and rings. This is the default.
+     */
+    case coherent
+    /**
+     * Soft, as in the world.
+     */
+    case natural(
+        /**
+         * The number of steps that follow the method, 0 to 1000, each of two transforms for each plane and colour. 30
+         * bring most of the gain in stills. Without steps, as live frames need it, the method `Auto` without a network
+         * takes the built-in network for natural focus.
+         */steps: Int
+    )
+
+
+
+
+
+}
+
+#if compiler(>=6)
+extension Focus: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeFocus: FfiConverterRustBuffer {
+    typealias SwiftType = Focus
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Focus {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+        
+        case 1: return .coherent
+        
+        case 2: return .natural(steps: try FfiConverterTypeInt.read(from: &buf)
+        )
+        
+        default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: Focus, into buf: inout [UInt8]) {
+        switch value {
+        
+        
+        case .coherent:
+            writeInt(&buf, Int32(1))
+        
+        
+        case let .natural(steps):
+            writeInt(&buf, Int32(2))
+            FfiConverterTypeInt.write(steps, into: &buf)
+            
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeFocus_lift(_ buf: RustBuffer) throws -> Focus {
+    return try FfiConverterTypeFocus.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeFocus_lower(_ value: Focus) -> RustBuffer {
+    return FfiConverterTypeFocus.lower(value)
 }
 
 

@@ -7,6 +7,7 @@ use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::output::Packing;
+use phasefront::session::Focus;
 use phasefront::{EncoderOptions, Pipeline, RgbdFrame, Size};
 use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, check_used, sweep_for};
@@ -142,6 +143,12 @@ impl MultiplexCommand {
             ("--precision", self.precision.is_some(), coherent, with),
             ("--no-feedback", self.no_feedback, coherent, with),
         ])?;
+        if self.encoder.focus()? == (Focus::Natural { steps: 0 }) {
+            return Err(Error::Input(
+                "--focus-steps 0 is for one map, by a network; several maps of natural focus take at least 1 joint step"
+                    .into(),
+            ));
+        }
         if !coherent && self.maps > MOST_NATURAL {
             return Err(Error::Input(format!(
                 "--focus natural makes at most {MOST_NATURAL} maps, all at once; --maps is {}",

@@ -4,7 +4,7 @@ use clap::Args;
 use phasefront_command::networks::Precision;
 use phasefront_command::terminal;
 use phasefront_io::{Error, Result};
-use phasefront_models::{NETWORKS, PAIR};
+use phasefront_models::{NATURAL, NETWORKS, PAIR};
 use serde_json::json;
 
 /// List the bundled networks
@@ -20,6 +20,9 @@ impl Networks {
             let (layers, input) = (network.layers(), network.input().to_string());
             rows.push((model.name, layers, input, "any offset".to_owned()));
         }
+        let network = NATURAL.network(Precision::Int8).ok_or_else(missing)?;
+        let natural = "any offset, for natural focus".to_owned();
+        rows.push((NATURAL.name, network.layers(), network.input().to_string(), natural));
         let network = PAIR.networks(Precision::Int8).ok_or_else(missing)?.hologram;
         let offset = "0 mm, with its pre-filter".to_owned();
         rows.push((PAIR.name, network.layers(), network.input().to_string(), offset));

@@ -1,6 +1,7 @@
 //! The flags for the encoder that turns a field into phases.
 
 use clap::{Args, ValueEnum, ValueHint};
+use phasefront::session::Focus;
 use phasefront::{Display, EncoderOptions, Encoding, Network};
 use phasefront_command::flags::{EncoderName, check_used};
 use phasefront_command::networks::{self, Precision};
@@ -30,8 +31,9 @@ pub(crate) struct EncoderFlags {
     /// How what is out of focus looks [default: coherent]
     #[arg(long, value_enum, help_heading = "Method")]
     focus: Option<FocusName>,
-    /// Steps of --focus natural, 1 to 1000, each of two transforms a plane, colour and map [default: 30]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    /// Steps of --focus natural, 0 to 1000, each of two transforms a plane, colour and map; with 0 the network natural-8
+    /// alone computes, as live frames need it [default: 30]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1000))]
     focus_steps: Option<u16>,
 }
 
@@ -40,7 +42,7 @@ pub(crate) struct EncoderFlags {
 pub(crate) enum FocusName {
     /// As a laser shows it, with halos and rings
     Coherent,
-    /// Soft, as in the world: by steps on each frame, for stills
+    /// Soft, as in the world: by steps on each frame, or by a network
     Natural,
 }
 
@@ -98,8 +100,8 @@ impl EncoderFlags {
         self.focus == Some(FocusName::Natural)
     }
 
-    /// Returns the number of steps of natural focus, or 0 for coherent focus.
-    fn focus_steps(&self) -> Result<usize> {
+    /// Returns how what is out of focus looks.
+    pub(crate) fn focus(&self) -> Result<Focus> {
         check_used(&[(
             "--focus-steps",
             self.focus_steps.is_some(),
@@ -107,8 +109,10 @@ impl EncoderFlags {
             "--focus natural",
         )])?;
         Ok(match self.is_natural() {
-            true => self.focus_steps.map_or(FOCUS_STEPS, usize::from),
-            false => 0,
+            true => Focus::Natural {
+                steps: self.focus_steps.map_or(FOCUS_STEPS, usize::from),
+            },
+            false => Focus::Coherent,
         })
     }
 
@@ -140,7 +144,7 @@ impl EncoderFlags {
                 dark_threshold: self.dark_threshold.unwrap_or(default.dark_threshold),
                 local_steps: self.local_steps.unwrap_or(default.local_steps),
                 midpoint_steps: self.midpoint_steps,
-                focus_steps: self.focus_steps()?,
+                focus_steps: self.focus()?.steps(),
                 ..default
             },
             name: name.name(),

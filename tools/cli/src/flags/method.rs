@@ -2,11 +2,12 @@
 
 use crate::flags::encoder::{Encoder, EncoderFlags};
 use clap::ValueEnum;
+use phasefront::session::Focus;
 use phasefront::{Display, Method, Sweep};
 use phasefront_command::flags::{PrecisionName, check_used};
 use phasefront_command::networks;
 use phasefront_io::Result;
-use phasefront_models::default_network;
+use phasefront_models::{NATURAL, default_network};
 
 /// A method for RGB-D images.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -64,12 +65,18 @@ impl CoreMethod {
             ("--precision", precision.is_some(), trained, with),
         ])?;
         let precision = precision.map(PrecisionName::precision);
-        Ok(match self {
+        let focus = encoder.focus()?;
+        let (method, encoder) = match self {
             CoreMethod::Network => {
                 let (network, encoder) = encoder.with_network(network, precision, display)?;
                 (Method::trained(network), encoder)
             }
             CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
+            CoreMethod::Auto if network.is_none() && focus == (Focus::Natural { steps: 0 }) => {
+                focus.default_method(display)?;
+                let network = networks::network(NATURAL.name, precision)?;
+                (Method::trained(network), encoder.read()?)
+            }
             CoreMethod::Auto => {
                 let method = match network.or(default_network(display).map(|_| "8")) {
                     Some(network) => Method::Auto(sweep, networks::network(network, precision)?),
@@ -81,6 +88,8 @@ impl CoreMethod {
                 };
                 (method, encoder.read()?)
             }
-        })
+        };
+        focus.check(&method)?;
+        Ok((method, encoder))
     }
 }

@@ -826,7 +826,10 @@ fn networks_that_cannot_be_used_are_named() {
         (
             "none that is bundled",
             made(&["--network", "9"]),
-            &["bundled network (rgbd-8, rgbd-15, ddpm-8)", "--network FILE.onnx"],
+            &[
+                "bundled network (rgbd-8, rgbd-15, natural-8, ddpm-8)",
+                "--network FILE.onnx",
+            ],
         ),
         (
             "one of the source tree",

@@ -58,6 +58,12 @@ fn natural_focus_is_nearer_to_incoherent_light_and_coherent_is_the_default() {
     assert!(natural != default);
     assert!(made("steps.png", &["--focus", "natural", "--focus-steps", "30"]) == natural);
     assert!(made("few.png", &["--focus", "natural", "--focus-steps", "2"]) != natural);
+    let by_default = |name: &str, more: &[&str]| {
+        folder.succeeds(&[&["hologram"], &IMAGE[..], more, &["-o", name]].concat());
+        fs::read(folder.path(name)).unwrap()
+    };
+    let by_network = by_default("network.png", &["--focus", "natural", "--focus-steps", "0"]);
+    assert!(by_default("named.png", &["--network", "natural-8"]) == by_network && by_network != natural);
 }
 
 #[test]
@@ -99,6 +105,7 @@ fn a_resumed_video_with_natural_focus_has_the_same_frames() {
 fn what_natural_focus_cannot_do_is_one_line() {
     let folder = Folder::new().with_frame();
     ldi::write(&folder.path("ldi"), 5, Size { width: 48, height: 32 }, 1);
+    fs::write(folder.path("fine.toml"), "width = 48\nheight = 32\npitch_um = 3.74").unwrap();
     let hologram = "hologram --rgb rgb.png --depth depth.png -o h.png";
     for (call, word) in [
         (format!("{hologram} --focus-steps 3"), "--focus natural"),
@@ -116,6 +123,18 @@ fn what_natural_focus_cannot_do_is_one_line() {
         (
             "multiplex --rgb rgb.png --depth depth.png --focus natural --maps 25 -o m".into(),
             "at most 24",
+        ),
+        (
+            "multiplex --rgb rgb.png --depth depth.png --focus natural --focus-steps 0 -o m".into(),
+            "joint step",
+        ),
+        (
+            format!("{hologram} --focus natural --focus-steps 0 --method sweep"),
+            "without steps",
+        ),
+        (
+            format!("{hologram} --display fine.toml --focus natural --focus-steps 0"),
+            "trained for the display",
         ),
     ] {
         let said = folder.fails(&call.split(' ').collect::<Vec<_>>(), 1);

@@ -30,9 +30,15 @@ public fun Image.toColourImage(
 /** Returns the meaning of the colours of an image of a camera or a decoder. */
 private fun Image.rgbEncoding(): RgbEncoding {
     if (Build.VERSION.SDK_INT < Build.VERSION_CODES.TIRAMISU) return RgbEncoding.SRGB
-    return when (DataSpace.getStandard(dataSpace)) {
+    // An open image of ARCore says that it is closed: https://github.com/google-ar/arcore-android-sdk/issues/1578
+    val space = try {
+        dataSpace
+    } catch (_: IllegalStateException) {
+        return RgbEncoding.SRGB
+    }
+    return when (DataSpace.getStandard(space)) {
         DataSpace.STANDARD_DCI_P3 -> RgbEncoding.DISPLAY_P3
-        DataSpace.STANDARD_BT2020, DataSpace.STANDARD_BT2020_CONSTANT_LUMINANCE -> when (DataSpace.getTransfer(dataSpace)) {
+        DataSpace.STANDARD_BT2020, DataSpace.STANDARD_BT2020_CONSTANT_LUMINANCE -> when (DataSpace.getTransfer(space)) {
             DataSpace.TRANSFER_HLG -> RgbEncoding.BT2020_HLG
             DataSpace.TRANSFER_ST2084 -> RgbEncoding.BT2020_PQ
             else -> RgbEncoding.BT2020

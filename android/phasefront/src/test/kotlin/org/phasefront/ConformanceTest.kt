@@ -104,6 +104,7 @@ class ConformanceTest {
         brightness = if (case.isNull("brightness")) Brightness.Smoothed else Brightness.Fixed(case.getDouble("brightness").toFloat()),
         depthRange = case.optJSONArray("range")?.let { DepthRange.Fixed(it.getDouble(0).toFloat(), it.getDouble(1).toFloat()) }
             ?: DepthRange.Percentiles,
+        focus = if (case.isNull("focus_steps")) Focus.Coherent else Focus.Natural(case.getInt("focus_steps")),
         depthNetwork = if (case.isNull("depth_network")) null else depthNetwork(case.getString("depth_network")),
     )
 
