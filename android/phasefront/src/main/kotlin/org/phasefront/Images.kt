@@ -54,13 +54,13 @@ private fun Image.rgbEncoding(): RgbEncoding {
  * `BitmapFactory.Options.inPreferredColorSpace`, makes one.
  */
 public fun Bitmap.toColourImage(): ColourImage {
+    if (config != Bitmap.Config.ARGB_8888) {
+        throw PhasefrontException.Frame("frame: the bitmap's configuration is $config; ARGB_8888 is needed")
+    }
     val encoding = when (colorSpace) {
         null, ColorSpace.get(ColorSpace.Named.SRGB) -> RgbEncoding.SRGB
         ColorSpace.get(ColorSpace.Named.DISPLAY_P3) -> RgbEncoding.DISPLAY_P3
         else -> throw PhasefrontException.Frame("frame: the bitmap's colours are ${colorSpace?.name}; sRGB or Display P3 are needed")
-    }
-    if (config != Bitmap.Config.ARGB_8888) {
-        throw PhasefrontException.Frame("frame: the bitmap's configuration is $config; ARGB_8888 is needed")
     }
     val bytes = ByteBuffer.allocateDirect(byteCount).also(::copyPixelsToBuffer)
     bytes.flip()
