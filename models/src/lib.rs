@@ -94,8 +94,8 @@ pub fn names() -> Vec<&'static str> {
     NETWORKS.iter().chain([NATURAL]).map(|model| model.name).collect()
 }
 
-/// Returns the network of [`NETWORKS`] or [`NATURAL`] called `name`, or `None` if it does not exist or `precision` is not
-/// compiled in.
+/// Returns the network of [`NETWORKS`] or [`NATURAL`] called `name`, or `None` if it does not exist or `precision` is
+/// not compiled in.
 pub fn network(name: &str, precision: Precision) -> Option<Arc<Network>> {
     let model = NETWORKS.iter().chain([NATURAL]).find(|model| model.name == name)?;
     model.network(precision)

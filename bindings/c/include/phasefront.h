@@ -727,8 +727,8 @@ enum PfStatus pf_options_set_midpoint_steps(struct PfOptions *options, uint32_t 
 
 // Sets natural focus: what is out of focus is soft, as in the world. `steps` follow the method, 0 to 1000, each of two
 // transforms for each plane and colour; 30 bring most of the gain in stills. Without steps, as live frames need it,
-// PF_METHOD_AUTO without a network takes the built-in network for natural focus. The default is coherent focus: what is
-// out of focus has halos and rings, as a laser shows it.
+// PF_METHOD_AUTO without a network takes the built-in network for natural focus. The default is coherent focus: what
+// is out of focus has halos and rings, as a laser shows it.
 enum PfStatus pf_options_set_natural_focus(struct PfOptions *options, uint32_t steps);
 
 // Sets the distances, in metres, that map to the ends of the volume. The default is the 1st and 99th percentile of the

@@ -294,8 +294,8 @@ pub unsafe extern "C" fn pf_options_set_midpoint_steps(options: *mut PfOptions, 
 
 /// Sets natural focus: what is out of focus is soft, as in the world. `steps` follow the method, 0 to 1000, each of two
 /// transforms for each plane and colour; 30 bring most of the gain in stills. Without steps, as live frames need it,
-/// PF_METHOD_AUTO without a network takes the built-in network for natural focus. The default is coherent focus: what is
-/// out of focus has halos and rings, as a laser shows it.
+/// PF_METHOD_AUTO without a network takes the built-in network for natural focus. The default is coherent focus: what
+/// is out of focus has halos and rings, as a laser shows it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_natural_focus(options: *mut PfOptions, steps: u32) -> PfStatus {
     // SAFETY: the rules of this border.

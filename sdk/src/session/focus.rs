@@ -13,7 +13,8 @@ pub enum Focus {
     /// Soft, as in the world.
     Natural {
         /// The number of steps that follow the method, 0 to 1000, each of two transforms for each plane and colour. 30
-        /// bring most of the gain in stills. Without steps, as live frames need it, a network for natural focus computes.
+        /// bring most of the gain in stills. Without steps, as live frames need it, a network for natural focus
+        /// computes.
         steps: usize,
     },
 }

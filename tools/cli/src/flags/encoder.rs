@@ -31,8 +31,8 @@ pub(crate) struct EncoderFlags {
     /// How what is out of focus looks [default: coherent]
     #[arg(long, value_enum, help_heading = "Method")]
     focus: Option<FocusName>,
-    /// Steps of --focus natural, 0 to 1000, each of two transforms a plane, colour and map; with 0 the network natural-8
-    /// alone computes, as live frames need it [default: 30]
+    /// Steps of --focus natural, 0 to 1000, each of two transforms a plane, colour and map; with 0 the network
+    /// natural-8 alone computes, as live frames need it [default: 30]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1000))]
     focus_steps: Option<u16>,
 }
