@@ -97,11 +97,11 @@ fn encoded(light: f64) -> f64 {
     }
 }
 
-fn srgb_xyz(rgb: [u8; 3]) -> Colour {
+pub(crate) fn srgb_xyz(rgb: [u8; 3]) -> Colour {
     times(&SRGB, rgb.map(|v| decoded(f64::from(v) / 255.0)))
 }
 
-fn lab(xyz: Colour) -> Colour {
+pub(crate) fn lab(xyz: Colour) -> Colour {
     let f = |t: f64| {
         if t > 216.0 / 24389.0 {
             t.cbrt()
@@ -114,7 +114,7 @@ fn lab(xyz: Colour) -> Colour {
 }
 
 /// CIEDE2000 (CIE 142-2001; Sharma, Wu and Dalal, 2005).
-fn ciede2000(a: Colour, b: Colour) -> f64 {
+pub(crate) fn ciede2000(a: Colour, b: Colour) -> f64 {
     let chroma = |c: Colour| c[1].hypot(c[2]);
     let mean = (chroma(a) + chroma(b)) / 2.0;
     let g = 0.5 * (1.0 - (mean.powi(7) / (mean.powi(7) + 25f64.powi(7))).sqrt());

@@ -1,5 +1,6 @@
 //! Tests films as cameras and depth programs write them: of varying frame rate, in high dynamic range, with false
 //! colours for depth, and with a margin between colour and depth. All need ffmpeg: apt-get install ffmpeg.
+use crate::colours::{ciede2000, lab, srgb_xyz};
 use crate::folder::Folder;
 use crate::video::film;
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
@@ -317,6 +318,14 @@ fn films_of_high_dynamic_range_show_what_their_sdr_twins_show() {
             let seen = first_picture(&path);
             let apart = sdr.iter().zip(seen.iter()).map(|(a, b)| a.abs_diff(*b)).max();
             assert!(apart.unwrap() <= 4, "{name}, white of {white}: {apart:?}");
+            let colour = |pixel: &Rgb<u8>| lab(srgb_xyz(pixel.0));
+            let errors = sdr
+                .pixels()
+                .zip(seen.pixels())
+                .map(|(a, b)| ciede2000(colour(a), colour(b)));
+            let most = errors.fold(0.0, f64::max);
+            println!("{name}, white of {white}: CIEDE2000 at most {most:.2}");
+            assert!(most < 2.0, "{name}, white of {white}: {most}");
         }
         // Highlights of a scene keep their order, and its white stays near white.
         hdr_film(&path, transfer, |x, y| match x {
