@@ -259,6 +259,7 @@ fn written_levels_show_the_colours_of_the_picture() {
         ([638, 520, 450], "srgb", SRGB),
         ([633, 532, 457], "srgb", SRGB),
         ([638, 532, 450], "srgb", SRGB),
+        ([660, 532, 473], "srgb", SRGB),
         ([638, 520, 450], "display-p3", DISPLAY_P3),
     ] {
         // Saturated colours of Display P3 leave a laser almost dark, where noise counts most, or lie outside.
