@@ -71,7 +71,7 @@ def test_a_bundled_network_is_a_torch_module(tmp_path):
     [expected] = session.run(None, {session.get_inputs()[0].name: x.numpy()})
     with torch.no_grad():
         np.testing.assert_allclose(network(x).numpy(), expected, atol=1e-5)
-    with pytest.raises(ExportError, match="no network of Phasefront is called rgbd-9; there are .*ldi3-15.*rgbd-8"):
+    with pytest.raises(ExportError, match="no network of Phasefront is called rgbd-9; there are .*rgbd-8.*ldi3-15"):
         from_pretrained("rgbd-9")
     with pytest.raises(ExportError, match="say where"):
         from_pretrained("rgbd-8", tmp_path)

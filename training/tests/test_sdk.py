@@ -62,7 +62,7 @@ def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
         exported = int8_model(model.prefilter, display, model.offset_m)
     write(exported, tmp_path / "prefilter.onnx")
     run = subprocess.run(
-        [COMMAND, "hologram", "--rgb", "rgb.png", "--depth", "depth.png", "--network", "hologram.onnx", "--encoder", "deep",
+        [COMMAND, "hologram", "--rgb", "rgb.png", "--depth", "depth.png", "--rgb-encoding", "amplitude", "--network", "hologram.onnx", "--encoder", "deep",
          "--prefilter", "prefilter.onnx", "--offset-mm", str(OFFSET_MM), "--json", "-o", "out.png"],
         cwd=tmp_path, capture_output=True, text=True,
     )  # fmt: skip
