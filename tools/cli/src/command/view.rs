@@ -307,16 +307,18 @@ impl Parts {
             Some(depth) => Depth::known(depth, |d| (d.clamp(0.0, 1.0) * last).round() as u8),
             None => Depth::from_focus(&self.shown),
         };
-        let stacks = if self.field.is_empty() { 1 } else { 2 };
         let frames = self.shown.len();
+        // Of one size, because the page shows them beside each other.
+        let mut shown = viewer::pack(&[self.shown.concat(), self.field].concat(), budget)?;
+        let field = shown.split_off(frames * self.z_m.len());
         Ok(Scene {
             title: self.title,
             width: self.size.width,
             height: self.size.height,
             z_mm: self.z_m.iter().map(|z| z * 1e3).collect(),
             frames,
-            shown: viewer::pack(&self.shown.concat(), budget / stacks)?,
-            field: viewer::pack(&self.field, budget / stacks)?,
+            shown,
+            field,
             phase: self.phase,
             depth,
             figures: self.figures,
