@@ -95,6 +95,7 @@ test("the page shows on WebGPU what it shows on the CPU", async (t) => {
   assert.match(await page.evaluate("textOf('computed')"), /swiftshader/);
   for (const [canvas, gpu] of images[4].entries()) {
     const far = gpu.reduce((sum, byte, i) => sum + Math.abs(((byte - images[1][canvas][i] + 384) % 256) - 128), 0) / gpu.length;
-    assert.ok(new Set(gpu).size > 50 && far < 0.1, `canvas ${canvas} is ${far} of 255 from the CPU's on average`);
+    // Some bytes of the view differ by one: the CPU has sRGB's curve as a table, the GPU computes a power.
+    assert.ok(new Set(gpu).size > 50 && far < [0.1, 0.5][canvas], `canvas ${canvas} is ${far} of 255 from the CPU's on average`);
   }
 });
