@@ -401,49 +401,46 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
     type Error = PhasefrontError;
 
     fn try_from(options: &SessionOptions) -> Result<Self, PhasefrontError> {
-        let [best, ..] = options.quality_levels.as_slice() else {
-            return Err(PhasefrontError::Setting(
-                "there are no quality levels; give at least one: a method and a resolution".into(),
-            ));
-        };
         let target = options.target.core.clone();
-        let focus = |quality_level: &QualityLevel| options.focus.with_steps(quality_level.focus_steps);
-        let method = |quality_level: &QualityLevel| -> Result<_, PhasefrontError> {
-            let focus = focus(quality_level)?;
-            let method = quality_level.method.core(&target.display, focus)?;
-            focus.check(&method)?;
-            Ok(method)
-        };
-        let mut to = session::SessionOptions::new(target.clone(), method(best)?);
-        to.quality = options.quality.into();
-        to.target_rate_hz = options.target_rate_hz;
-        to.encoder = (&EncoderOptions {
+        let mut encoder = phasefront::EncoderOptions::from(&EncoderOptions {
             encoding: options.encoding.clone(),
             brightness: options.brightness,
             dark_threshold: options.dark_threshold,
             local_steps: options.local_steps,
             midpoint_steps: options.midpoint_steps,
-        })
-            .into();
-        to.encoder.focus_steps = options.focus.steps();
-        to.quality_levels = (options.quality_levels.iter())
+        });
+        encoder.focus_steps = options.focus.steps();
+        let quality_levels = (options.quality_levels.iter())
             .map(|quality_level| {
+                let focus = options.focus.with_steps(quality_level.focus_steps)?;
+                let method = quality_level.method.core(&target.display, focus)?;
+                focus.check(&method)?;
                 Ok(session::QualityLevel {
-                    method: method(quality_level)?,
+                    method,
                     size: Size {
                         width: quality_level.width,
                         height: quality_level.height,
                     },
                     backend: None,
                     encoder: Some(phasefront::EncoderOptions {
-                        local_steps: quality_level.local_steps.unwrap_or(to.encoder.local_steps),
-                        midpoint_steps: quality_level.midpoint_steps.unwrap_or(to.encoder.midpoint_steps),
-                        focus_steps: focus(quality_level)?.steps(),
-                        ..to.encoder.clone()
+                        local_steps: quality_level.local_steps.unwrap_or(encoder.local_steps),
+                        midpoint_steps: quality_level.midpoint_steps.unwrap_or(encoder.midpoint_steps),
+                        focus_steps: focus.steps(),
+                        ..encoder.clone()
                     }),
                 })
             })
-            .collect::<Result<_, PhasefrontError>>()?;
+            .collect::<Result<Vec<_>, PhasefrontError>>()?;
+        let Some(best) = quality_levels.first() else {
+            return Err(PhasefrontError::Setting(
+                "there are no quality levels; give at least one: a method and a resolution".into(),
+            ));
+        };
+        let mut to = session::SessionOptions::new(target, best.method.clone());
+        to.quality = options.quality.into();
+        to.target_rate_hz = options.target_rate_hz;
+        to.encoder = encoder;
+        to.quality_levels = quality_levels;
         to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
         #[cfg(feature = "tract")]

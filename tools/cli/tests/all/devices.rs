@@ -34,6 +34,19 @@ fn levels(path: &Path) -> Vec<u16> {
     }
 }
 
+/// Makes a hologram of the folder's frame, whose values are amplitudes; `--display` and `-o` follow.
+const SWEPT_AMPLITUDES: [&str; 9] = [
+    "hologram",
+    "--rgb",
+    "rgb.png",
+    "--depth",
+    "depth.png",
+    "--method",
+    "sweep",
+    "--rgb-encoding",
+    "amplitude",
+];
+
 #[test]
 fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
     for name in ModulatorSpec::names() {
@@ -89,18 +102,7 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
             format!("{name}.png"),
             format!("{name}-view.png"),
         );
-        let frame = [
-            "hologram",
-            "--rgb",
-            "rgb.png",
-            "--depth",
-            "depth.png",
-            "--method",
-            "sweep",
-            "--rgb-encoding",
-            "amplitude",
-        ];
-        folder.succeeds(&[&frame[..], &["--display", &toml, "-o", &hologram]].concat());
+        folder.succeeds(&[&SWEPT_AMPLITUDES[..], &["--display", &toml, "-o", &hologram]].concat());
         folder.succeeds(&["refocus", &hologram, "--display", &toml, "--z-mm", "0", "-o", &view]);
         views.push(picture::read_rgb(&folder.path(&view)).unwrap());
     }
@@ -183,18 +185,7 @@ fn one_measurement_of_a_panel_serves_three_lasers() {
     let made = |name: &str, line: &str| {
         fs::write(folder.path("d.toml"), format!("width = 160\nheight = 128\n{line}\n")).unwrap();
         let output = format!("{name}.png");
-        let frame = [
-            "hologram",
-            "--rgb",
-            "rgb.png",
-            "--depth",
-            "depth.png",
-            "--method",
-            "sweep",
-            "--rgb-encoding",
-            "amplitude",
-        ];
-        let told = folder.run(&[&frame[..], &["--display", "d.toml", "-o", &output]].concat());
+        let told = folder.run(&[&SWEPT_AMPLITUDES[..], &["--display", "d.toml", "-o", &output]].concat());
         let said = String::from_utf8(told.stderr).unwrap();
         assert!(told.status.success(), "{said}");
         (levels(&folder.path(&output)), said)
