@@ -9,6 +9,10 @@ mod sync {
 mod computing;
 #[path = "../../sdk/src/session/drop_reason.rs"]
 mod drop_reason;
+#[path = "../../sdk/src/session/guarded.rs"]
+mod guarded;
+#[path = "../../sdk/src/session/history.rs"]
+mod history;
 #[path = "../../sdk/src/session/live.rs"]
 mod live;
 #[path = "../../sdk/src/session/process_id.rs"]
@@ -20,6 +24,7 @@ mod statistics;
 
 use live::{Live, Report, Work};
 use phasefront::{Error, Result};
+use phasefront_core::frame::Past;
 use queue::Queue;
 use shuttle::rand::{Rng, thread_rng};
 use shuttle::sync::atomic::{AtomicU64, Ordering};
@@ -36,7 +41,11 @@ impl Work for Fake {
     type Frame = u64;
     type Output = u64;
 
-    fn process(&mut self, frame: &u64, _fresh: bool) -> Result<u64> {
+    fn scale(_: &u64) -> f32 {
+        1.0
+    }
+
+    fn process(&mut self, frame: &u64, _: Option<Past>) -> Result<u64> {
         assert!(!self.broken, "not recovered");
         thread::yield_now();
         match thread_rng().gen_range(0..8) {

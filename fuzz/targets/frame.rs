@@ -9,7 +9,7 @@ use phasefront::input::{
     Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
 };
 use phasefront_core::depth::stream::{DepthOptions, DepthStream};
-use phasefront_core::frame::ColourPlan;
+use phasefront_core::frame::{ColourPlan, Past};
 use phasefront::{Display, EncoderOptions, Encoding, Method, Result, SessionOptions, Sweep, VideoSession};
 use std::num::NonZeroUsize;
 use std::sync::OnceLock;
@@ -160,9 +160,10 @@ fn take_in(frame: &CameraFrame<'_>) -> Result<()> {
     let plan = ColourPlan::new(&frame.colour, frame.orientation, SIZE)?;
     let mut depths = DepthStream::new(DepthOptions::default(), SIZE)?;
     let (mut rgb, mut depth) = ([f32::NAN; 3 * SIZE.pixels()], [f32::NAN; SIZE.pixels()]);
-    for elapsed in [None, Some(Duration::from_millis(33))] {
+    let elapsed = Duration::from_millis(33);
+    for past in [None, Some(Past { scale: 1.0, elapsed })] {
         plan.convert(&frame.colour, &mut rgb, &mut plan.scratch())?;
-        depths.next(frame, elapsed, &rgb, &mut depth)?;
+        depths.next(frame, past, &rgb, &mut depth)?;
         assert!(rgb.iter().chain(&depth).all(|value| (0.0..=1.0).contains(value)));
     }
     Ok(())

@@ -9,6 +9,7 @@
 //! a frame; `engine` chooses between CPU and GPU; `quality` chooses the quality level.
 //! [`phasefront_core::pipeline::Pipeline`] processes a single frame without a camera's formats.
 
+mod answering;
 mod colour_stage;
 mod computing;
 #[cfg(feature = "tract")]
@@ -20,7 +21,9 @@ mod drop_reason;
 mod engine;
 mod event;
 mod focus;
+mod guarded;
 mod handle;
+mod history;
 mod hologram;
 mod live;
 mod live_work;
@@ -36,12 +39,12 @@ mod sync;
 mod threads;
 
 pub use drop_reason::DropReason;
-#[cfg(feature = "gpu")]
-pub use engine::GpuOptions;
 pub use event::Event;
 pub use focus::Focus;
 pub use handle::SessionHandle;
 pub use hologram::Hologram;
+#[cfg(feature = "gpu")]
+pub use options::GpuOptions;
 pub use options::SessionOptions;
 pub use phasefront_core::pipeline::FrameTimes;
 #[cfg(feature = "gpu")]
@@ -49,19 +52,18 @@ pub use phasefront_gpu::DeviceOptions;
 pub use quality::{Backend, Quality, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, Statistics};
 
+use answering::Answering;
 use depth_estimates::DepthEstimates;
 use handle::Frames;
-use live::{Live, guarded, lock};
+use live::Live;
 use live_work::{LiveWork, tell};
 use owned_frame::OwnedFrame;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::runtime::error::{Error, Result};
-use queue::Gate;
 use shared::Shared;
-use stages::Stages;
 use std::fmt::{Debug, Formatter};
 use std::ops::Deref;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use threads::block_on;
 
 /// Makes a hologram of each frame independently. Every method may be called from any thread at any time. A session
@@ -124,7 +126,7 @@ impl ImageSession {
     /// # Errors
     /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
     pub fn new(options: SessionOptions) -> Result<Self> {
-        block_on(Answering::new(options)).map(ImageSession)
+        block_on(Answering::new(options, false)).map(ImageSession)
     }
 
     /// Creates a session as [`Self::new`] does, in a browser, whose GPU answers only while nothing blocks.
@@ -133,7 +135,7 @@ impl ImageSession {
     /// Returns an error in the same cases as [`Self::new`].
     #[cfg(target_arch = "wasm32")]
     pub async fn new_async(options: SessionOptions) -> Result<Self> {
-        Answering::new(options).await.map(ImageSession)
+        Answering::new(options, false).await.map(ImageSession)
     }
 
     /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time. With
@@ -143,7 +145,7 @@ impl ImageSession {
     /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
     #[cfg(target_arch = "wasm32")]
     pub async fn process_async(&self, frame: &CameraFrame<'_>, stay: bool) -> Result<Hologram> {
-        self.0.process_async(frame, false, stay).await
+        self.0.process_async(frame, stay).await
     }
 
     /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
@@ -153,7 +155,7 @@ impl ImageSession {
     /// closed while it computes the frame, if a log or trace handler makes the call while a session computes on its
     /// thread, or if the computation panics. The frames that follow are not affected.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
-        self.0.process(frame, false)
+        self.0.process(frame)
     }
 }
 
@@ -163,7 +165,7 @@ impl VideoSession {
     /// # Errors
     /// Returns an error in the same cases as [`ImageSession::new`].
     pub fn new(options: SessionOptions) -> Result<Self> {
-        block_on(Answering::new(options)).map(VideoSession)
+        block_on(Answering::new(options, true)).map(VideoSession)
     }
 
     /// Creates a session as [`Self::new`] does, in a browser, whose GPU answers only while nothing blocks.
@@ -172,7 +174,7 @@ impl VideoSession {
     /// Returns an error in the same cases as [`Self::new`].
     #[cfg(target_arch = "wasm32")]
     pub async fn new_async(options: SessionOptions) -> Result<Self> {
-        Answering::new(options).await.map(VideoSession)
+        Answering::new(options, true).await.map(VideoSession)
     }
 
     /// Makes the hologram of `frame` as [`Self::process`] does, in a browser, as [`ImageSession::process_async`] does.
@@ -181,7 +183,7 @@ impl VideoSession {
     /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
     #[cfg(target_arch = "wasm32")]
     pub async fn process_async(&self, frame: &CameraFrame<'_>, stay: bool) -> Result<Hologram> {
-        self.0.process_async(frame, true, stay).await
+        self.0.process_async(frame, stay).await
     }
 
     /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
@@ -189,7 +191,7 @@ impl VideoSession {
     /// # Errors
     /// Returns an error in the same cases as [`ImageSession::process`], and if the frame is not later than the last.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
-        self.0.process(frame, true)
+        self.0.process(frame)
     }
 
     /// Resumes a video: updates the state of the session with `frame`, without making its hologram, whose
@@ -204,8 +206,7 @@ impl VideoSession {
                 "a scale of {scale} is no hologram's; it must be positive and finite"
             )));
         }
-        self.0
-            .answer(frame, true, |stages, past| block_on(stages.replay(frame, past, scale)))
+        self.0.replay(frame, scale)
     }
 }
 
@@ -279,109 +280,5 @@ impl Debug for LiveSession {
 impl Drop for LiveSession {
     fn drop(&mut self) {
         self.close();
-    }
-}
-
-/// The common part of image and video sessions: a caller waits for the result of its frame.
-struct Answering {
-    handle: SessionHandle,
-    gate: Arc<Mutex<Gate>>,
-}
-
-impl Answering {
-    async fn new(options: SessionOptions) -> Result<Self> {
-        let estimates = DepthEstimates::for_each_frame(&options);
-        let shared = Shared::new(options, estimates).await?;
-        let gate = Arc::new(Mutex::new(Gate::new(shared.cancel.clone())));
-        let frames = Frames::Answered(gate.clone());
-        let handle = SessionHandle { shared, frames };
-        Ok(Answering { handle, gate })
-    }
-
-    fn process(&self, frame: &CameraFrame<'_>, video: bool) -> Result<Hologram> {
-        self.answer(frame, video, |stages, past| {
-            let made = block_on(self.handle.shared.process(stages, frame, past))?;
-            Ok(made.hologram)
-        })
-    }
-
-    #[cfg(target_arch = "wasm32")]
-    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only levels on a GPU stay there.
-    async fn process_async(&self, frame: &CameraFrame<'_>, video: bool, stay: bool) -> Result<Hologram> {
-        let work = async |stages: &mut Stages| {
-            #[cfg(feature = "gpu")]
-            stages.stay_on_gpu(stay);
-            let fresh = self.admit(frame, video)?;
-            if fresh {
-                stages.forget();
-            }
-            let result = match frame.check() {
-                Ok(()) => self.handle.shared.process(stages, frame, video && !fresh).await,
-                Err(why) => Err(why),
-            };
-            self.count(&result);
-            Ok(result?.hologram)
-        };
-        self.handle.with_stages_async(work).await
-    }
-
-    /// Runs `work` on one frame and tells it whether the frames before count.
-    fn answer<T>(
-        &self,
-        frame: &CameraFrame<'_>,
-        video: bool,
-        work: impl FnOnce(&mut Stages, bool) -> Result<T>,
-    ) -> Result<T> {
-        self.handle.with_stages(|stages| {
-            let fresh = self.admit(frame, video)?;
-            // The stages exist as long as the gate is open.
-            let stages = stages.as_mut().ok_or_else(queue::closed)?;
-            if fresh {
-                stages.forget();
-            }
-            let (result, panicked) = guarded(|| {
-                frame.check()?;
-                work(stages, video && !fresh)
-            });
-            if panicked {
-                stages.recover();
-            }
-            self.count(&result);
-            result
-        })
-    }
-
-    /// Lets a frame in and returns whether it is the first that counts.
-    fn admit(&self, frame: &CameraFrame<'_>, video: bool) -> Result<bool> {
-        let mut gate = lock(&self.gate);
-        gate.admit(frame.timestamp_ns, video)?;
-        if gate.paused {
-            gate.counts.dropped.count(DropReason::Paused);
-            return Err(Error::Session("it is paused; resume it first".into()));
-        }
-        Ok(gate.begin())
-    }
-
-    /// Counts a frame that was let in.
-    fn count<T>(&self, result: &Result<T>) {
-        let Gate { counts, closed, .. } = &mut *lock(&self.gate);
-        match (result, self.handle.shared.cancel.requested(), *closed) {
-            (Ok(_), ..) => counts.processed += 1,
-            (Err(_), false, _) => counts.failed += 1,
-            (Err(_), true, true) => counts.dropped.count(DropReason::Closed),
-            (Err(_), true, false) => counts.dropped.count(DropReason::Reset),
-        }
-    }
-}
-
-impl Debug for Answering {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        self.handle.fmt(f)
-    }
-}
-
-impl Drop for Answering {
-    fn drop(&mut self) {
-        self.handle.close();
     }
 }

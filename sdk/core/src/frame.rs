@@ -7,6 +7,7 @@ mod colour;
 mod convert;
 pub mod encoding;
 mod light;
+mod past;
 mod plane;
 pub mod reference;
 mod resample;
@@ -18,6 +19,7 @@ pub use encoding::RgbEncoding;
 pub use light::{LightConstants, LightPlan, light_to_srgb};
 
 pub use convert::{ColourPlan, ColourScratch, luminance, yuv_constants};
+pub use past::Past;
 pub use plane::{Orientation, Plane, Rotation, View};
 
 pub use resample::{Axis, Crop};

@@ -7,7 +7,7 @@ pub mod sweep;
 use crate::Size;
 use crate::depth::softness;
 use crate::display::Display;
-use crate::frame::RgbdFrame;
+use crate::frame::{Past, RgbdFrame};
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::method::seeded::{SeededPlan, SeededScratch};
 use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
@@ -208,14 +208,14 @@ impl MethodPlan {
     /// # Panics
     /// Panics if `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut MethodScratch) -> Result<()> {
-        self.field_after(false, frame, field, scratch)
+        self.field_after(None, frame, field, scratch)
     }
 
-    /// Works like [`Self::field`] for a frame that `follows` the previous one, as in video. This keeps [`Method::Auto`]
-    /// from switching back and forth between its methods.
+    /// Works like [`Self::field`] for a frame that follows another if there is a `past`, as in video. This keeps
+    /// [`Method::Auto`] from switching back and forth between its methods.
     pub(crate) fn field_after(
         &self,
-        follows: bool,
+        past: Option<Past>,
         frame: &RgbdFrame,
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
@@ -233,7 +233,7 @@ impl MethodPlan {
                     was_soft,
                 },
             ) => {
-                if choose(was_soft, follows, frame) {
+                if choose(was_soft, past, frame) {
                     trained.field(frame, field, of_trained)
                 } else {
                     sweep.field(frame, field, of_sweep)
@@ -244,18 +244,18 @@ impl MethodPlan {
     }
 
     /// Updates the state in `scratch` as [`Self::field_after`] does, without computing the field of `frame`.
-    pub(crate) fn skip(&self, follows: bool, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
+    pub(crate) fn skip(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
         frame.check(self.size, self.colours)?;
         if let Scratch::Auto { was_soft, .. } = &mut scratch.0 {
-            choose(was_soft, follows, frame);
+            choose(was_soft, past, frame);
         }
         Ok(())
     }
 }
 
-/// Returns whether the depth of `frame` is soft, where the previous frame is `was_soft` if this one `follows` it.
-fn choose(was_soft: &mut Option<bool>, follows: bool, frame: &RgbdFrame) -> bool {
-    let is_soft = softness::is_soft(softness::sharp_edges(frame), was_soft.filter(|_| follows));
+/// Returns whether the depth of `frame` is soft, where the previous frame `was_soft` if it counts.
+fn choose(was_soft: &mut Option<bool>, past: Option<Past>, frame: &RgbdFrame) -> bool {
+    let is_soft = softness::is_soft(softness::sharp_edges(frame), was_soft.filter(|_| past.is_some()));
     *was_soft = Some(is_soft);
     is_soft
 }

@@ -8,8 +8,7 @@ use crate::Size;
 use crate::display::levels::LevelsMut;
 use crate::display::target::Target;
 use crate::encode::EncoderOptions;
-use crate::encode::brightness::Past;
-use crate::frame::RgbdFrame;
+use crate::frame::{Past, RgbdFrame};
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::pipeline::display_plan::{DisplayPlan, DisplayScratch, Modulation, remove_mean_phase};
 use crate::runtime::cancel::Cancel;
@@ -140,20 +139,20 @@ impl Pipeline {
         field: &mut [Complex32],
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
-        self.field_after(false, frame, field, scratch)
+        self.field_after(None, frame, field, scratch)
     }
 
-    /// Works like [`Self::field`] for a frame that `follows` the previous one.
+    /// Works like [`Self::field`] for a frame that follows another if there is a `past`.
     fn field_after(
         &self,
-        follows: bool,
+        past: Option<Past>,
         frame: &RgbdFrame,
         field: &mut [Complex32],
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
         let stage = stage!("method");
         let of_method = &mut scratch.method;
-        self.method.field_after(follows, frame, field, of_method)?;
+        self.method.field_after(past, frame, field, of_method)?;
         if !self.display.keeps_phase() {
             remove_mean_phase(field, self.display.colours());
         }
@@ -203,7 +202,19 @@ impl Pipeline {
         let mut field = std::mem::take(&mut scratch.field);
         let Size { width, height } = self.size();
         field.resize(self.colours() * height * width, Complex32::ZERO);
-        let report = self.process_in(&mut field, past, frame, levels, scratch);
+        let made = self.field_after(past, frame, &mut field, scratch);
+        let report = made.map(|(method, propagate)| {
+            let modulation = (self.display).modulate(past, &mut field, levels, &mut scratch.display);
+            FrameReport {
+                scale: modulation.scale,
+                times: FrameTimes {
+                    method,
+                    propagate,
+                    encode: modulation.encode,
+                    ..FrameTimes::default()
+                },
+            }
+        });
         scratch.field = field;
         report
     }
@@ -214,28 +225,7 @@ impl Pipeline {
     /// Returns an error if the frame has another shape.
     #[doc(hidden)]
     pub fn skip(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut PipelineScratch) -> Result<()> {
-        self.method.skip(past.is_some(), frame, &mut scratch.method)
-    }
-
-    fn process_in(
-        &self,
-        field: &mut [Complex32],
-        past: Option<Past>,
-        frame: &RgbdFrame,
-        levels: LevelsMut<'_>,
-        scratch: &mut PipelineScratch,
-    ) -> Result<FrameReport> {
-        let (method, propagate) = self.field_after(past.is_some(), frame, field, scratch)?;
-        let modulation = self.modulate(past, field, levels, scratch);
-        Ok(FrameReport {
-            scale: modulation.scale,
-            times: FrameTimes {
-                method,
-                propagate,
-                encode: modulation.encode,
-                ..FrameTimes::default()
-            },
-        })
+        self.method.skip(past, frame, &mut scratch.method)
     }
 
     /// Returns the levels of `frame`, (C, H, W), in new memory. For many frames, [`Self::process`] is faster.
@@ -312,10 +302,10 @@ mod tests {
             let values = 3 * height * width;
             let untouched = Complex32::new(1.5, -2.5);
             let run = |scratch: &mut PipelineScratch| {
-                let (mut field, mut levels) = (vec![untouched; values], vec![77; values]);
-                let out = LevelsMut::Bytes(&mut levels);
-                pipeline.process_in(&mut field, None, &frame, out, scratch).unwrap();
-                (field, levels)
+                let mut levels = vec![77; values];
+                scratch.field = vec![untouched; values];
+                pipeline.process(&frame, &mut levels, scratch).unwrap();
+                (scratch.field.clone(), levels)
             };
             let whole = run(&mut pipeline.scratch());
             assert!(whole.1.iter().any(|level| *level != 77));

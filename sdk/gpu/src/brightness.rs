@@ -2,7 +2,8 @@
 
 use super::Result;
 use super::device::{Constants, Device, Dispatch};
-use phasefront_core::encode::brightness::{BINS, LEAST, MOST, Past, STEP, looked_at};
+use phasefront_core::encode::brightness::{BINS, LEAST, MOST, STEP, looked_at, share};
+use phasefront_core::frame::Past;
 
 /// The threads of a workgroup, as in the program.
 const THREADS: usize = 256;
@@ -52,7 +53,7 @@ impl Smoother {
 
     /// Sets the previous scale for the next submitted frame.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
-        let words = past.map_or(alone(), |past| [past.scale, past.share, 0.0, 0.0]);
+        let words = past.map_or(alone(), |past| [past.scale, share(past), 0.0, 0.0]);
         device
             .queue
             .write_buffer(&self.past.buffer, 0, bytemuck::cast_slice(&words));
@@ -99,7 +100,7 @@ mod tests {
                     None,
                     Some(Past {
                         scale: 0.5,
-                        share: 0.03,
+                        elapsed: std::time::Duration::from_millis(30),
                     }),
                 ] {
                     smoother.set_past(&device, past);
@@ -111,7 +112,7 @@ mod tests {
                     let square = f32::from_le_bytes(bytes.try_into().unwrap());
                     let expected = Percentile::default().scale(&given, past);
                     // A value on the bound between two bins may be counted in either.
-                    let bin = MOST / BINS as f32 * past.map_or(1.0, |past| past.share);
+                    let bin = MOST / BINS as f32 * past.map_or(1.0, share);
                     let apart = (square.sqrt() - expected).abs();
                     assert!(
                         apart < 1.01 * bin,

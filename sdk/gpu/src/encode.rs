@@ -22,7 +22,8 @@ use filter::Filter;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
-use phasefront_core::encode::brightness::{Brightness, Past};
+use phasefront_core::encode::brightness::Brightness;
+use phasefront_core::frame::Past;
 use shared::Shared;
 
 /// The columns of a workgroup.

@@ -75,7 +75,7 @@ pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};
 pub use method::chain::{ChainOptions, Fusion, GpuNetworkPlan};
 pub use numbers::Float;
-pub use phasefront_core::encode::brightness::Past;
+pub use phasefront_core::frame::Past;
 pub use pipeline::{Deliver, FLIGHTS, GpuLevels, GpuPipeline, GpuReport, Job, Ticket};
 pub use probe::probe_async;
 pub use renderer::{InFlight, Renderer};

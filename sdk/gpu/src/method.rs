@@ -13,6 +13,7 @@ use chain::{ChainOptions, ChainPlan, End};
 use phasefront_core::Size;
 use phasefront_core::depth::softness::is_soft;
 use phasefront_core::display::Display;
+use phasefront_core::frame::Past;
 use phasefront_core::method::network::{InputKind, Network};
 use phasefront_core::method::seeded::seed;
 use phasefront_core::method::sweep::SweepPlan;
@@ -217,12 +218,12 @@ impl MethodPlan {
     pub(super) async fn choose(
         &mut self,
         device: &Device,
-        follows: bool,
+        past: Option<Past>,
         submission: &wgpu::SubmissionIndex,
     ) -> Result<()> {
         if let Plan::Auto(auto) = &mut self.plan {
             let share = auto.softness.sharp_edges(device, submission).await?;
-            auto.is_soft = Some(is_soft(share, auto.is_soft.filter(|_| follows)));
+            auto.is_soft = Some(is_soft(share, auto.is_soft.filter(|_| past.is_some())));
         }
         Ok(())
     }

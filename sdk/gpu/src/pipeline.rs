@@ -12,8 +12,8 @@ use crate::device::peak::Peak;
 use crate::method::chain::ChainOptions;
 use phasefront_core::Size;
 use phasefront_core::display::target::Target;
-use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::{EncoderOptions, Encoding};
+use phasefront_core::frame::Past;
 use phasefront_core::method::Method;
 use phasefront_core::pipeline::FrameTimes;
 use rayon::prelude::*;
@@ -312,7 +312,7 @@ impl GpuPipeline {
         };
         let (mut submission, is_measured) = device.guarded_async(work).await?;
         if is_measured {
-            self.method.choose(&device, past.is_some(), &submission).await?;
+            self.method.choose(&device, past, &submission).await?;
             let work = || Ok(device.queue.submit([self.making(slot, deliver)]));
             submission = device.guarded_async(work).await?;
         }
@@ -339,7 +339,7 @@ impl GpuPipeline {
             Ok(device.queue.submit([self.reading(0)]))
         };
         let submission = device.guarded_async(work).await?;
-        self.method.choose(&device, past.is_some(), &submission).await
+        self.method.choose(&device, past, &submission).await
     }
 
     /// Returns whether the plane sweep alone made the last frame, without a network.

@@ -7,7 +7,7 @@ use super::pipeline::{Deliver, GpuLevels, GpuPipeline, GpuReport, Job, Ticket};
 use super::probe::probe_async;
 use super::watch::watched;
 use super::{GpuError, Result};
-use phasefront_core::encode::brightness::Past;
+use phasefront_core::frame::Past;
 use std::sync::Arc;
 use std::time::Duration;
 

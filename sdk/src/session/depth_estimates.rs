@@ -1,12 +1,12 @@
 //! Depth of frames without depth, by the session's depth network. A live session runs it on its own thread, at the
 //! network's own rate: each frame takes the newest estimate. Other sessions run it for each frame.
 
-use super::SessionOptions;
-use super::live::lock;
-use super::stages::given_up;
+use super::guarded::lock;
+use super::options::SessionOptions;
 use ndarray::Array2;
 use phasefront_core::Size;
 use phasefront_core::depth_network::{DepthEstimator, DepthNetwork};
+use phasefront_core::frame::Past;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::{Error, Result};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -94,7 +94,7 @@ impl DepthEstimates {
     }
 
     /// Returns the relative inverse depth for a frame with the picture `rgb`, (3, H, W), of `size`: that of
-    /// the frame itself if it is `fresh` or each frame has its own, otherwise the newest there is.
+    /// the frame itself if it has no `past` or each frame has its own, otherwise the newest there is.
     ///
     /// # Errors
     /// Returns an error if the network does not estimate the picture, or if `cancel` is requested.
@@ -102,12 +102,12 @@ impl DepthEstimates {
         &mut self,
         rgb: &[f32],
         size: Size,
-        fresh: bool,
+        past: Option<Past>,
         cancel: &Cancel,
     ) -> Result<Arc<Array2<f32>>> {
         match self {
             DepthEstimates::EachFrame(planned) => planned.estimate(rgb, size),
-            DepthEstimates::OwnThread(exchange) => exchange.estimate(rgb, size, fresh, cancel),
+            DepthEstimates::OwnThread(exchange) => exchange.estimate(rgb, size, past, cancel),
         }
     }
 }
@@ -123,13 +123,13 @@ impl Drop for DepthEstimates {
 }
 
 impl Exchange {
-    fn estimate(&self, rgb: &[f32], size: Size, fresh: bool, cancel: &Cancel) -> Result<Arc<Array2<f32>>> {
+    fn estimate(&self, rgb: &[f32], size: Size, past: Option<Past>, cancel: &Cancel) -> Result<Arc<Array2<f32>>> {
         let mut slots = lock(&self.slots);
-        if fresh {
+        if past.is_none() {
             slots.epoch += 1;
             slots.newest = None;
         }
-        if !slots.busy || fresh {
+        if !slots.busy || past.is_none() {
             let waiting = slots.picture.take().map(|picture| picture.rgb);
             let mut copy = waiting.unwrap_or_else(|| std::mem::take(&mut slots.spare));
             copy.clear();
@@ -143,7 +143,7 @@ impl Exchange {
                 // The next frame tries again.
                 Some(Err(_)) => return slots.newest.take().expect("seen above"),
                 None => {
-                    given_up(cancel)?;
+                    cancel.check()?;
                     slots = (self.changed.wait_timeout(slots, PATIENCE))
                         .unwrap_or_else(PoisonError::into_inner)
                         .0;

@@ -1,19 +1,15 @@
 //! Computes the levels of a frame from amplitudes and depth at one quality level, on the CPU or the GPU. Only this
 //! module falls back from the GPU to the CPU.
 
-mod brightness;
 mod frame_input;
 mod on_cpu;
 #[cfg(feature = "gpu")]
 mod on_gpu;
 
-pub(super) use brightness::BrightnessTracker;
 pub(super) use frame_input::FrameInput;
 pub(super) use on_cpu::OnCpu;
-#[cfg(feature = "gpu")]
-pub use on_gpu::GpuOptions;
 
-use super::SessionOptions;
+use super::options::SessionOptions;
 use super::quality::{Backend, QualityLevel};
 use super::statistics::BackendReport;
 #[cfg(feature = "gpu")]
@@ -39,13 +35,20 @@ pub(super) struct GpuState {
     pub(super) kept: Option<Box<phasefront_gpu::GpuLevels>>,
 }
 
-/// The inputs for planning a quality level.
-pub(super) struct LevelContext<'a> {
-    pub(super) options: &'a SessionOptions,
-    pub(super) quality_level: &'a QualityLevel,
-    pub(super) gpu: &'a mut GpuState,
+/// What the plans of all quality levels share.
+pub(super) struct LevelContext {
+    pub(super) options: SessionOptions,
+    /// The index of the quality level that is planned.
+    pub(super) level: usize,
+    pub(super) gpu: GpuState,
     /// Cancels a frame on the CPU.
-    pub(super) cancel: &'a Cancel,
+    pub(super) cancel: Cancel,
+}
+
+impl LevelContext {
+    pub(super) fn quality_level(&self) -> &QualityLevel {
+        &self.options.quality_levels[self.level]
+    }
 }
 
 /// The plan of a quality level.
@@ -63,22 +66,25 @@ enum Processor {
     Gpu(Box<OnGpu>),
 }
 
+impl Processor {
+    fn on_cpu(context: &LevelContext) -> Result<Self> {
+        let cpu = OnCpu::new(&context.options, context.quality_level(), &context.cancel)?;
+        Ok(Processor::Cpu(Box::new(cpu)))
+    }
+}
+
 impl Engine {
     /// Plans a quality level for the requested backend, or for the CPU if the GPU is unusable.
     ///
     /// # Errors
     /// Returns an error if the CPU refuses the quality level too.
-    pub(super) async fn new(context: &mut LevelContext<'_>) -> Result<Self> {
-        let asked = context.quality_level.backend.unwrap_or(context.options.backend);
-        let on_cpu = |context: &LevelContext<'_>| -> Result<Processor> {
-            let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
-            Ok(Processor::Cpu(Box::new(cpu)))
-        };
+    pub(super) async fn new(context: &mut LevelContext) -> Result<Self> {
+        let asked = context.quality_level().backend.unwrap_or(context.options.backend);
         let (processor, refusal) = match asked {
-            Backend::Cpu => (on_cpu(context)?, None),
+            Backend::Cpu => (Processor::on_cpu(context)?, None),
             Backend::Gpu => match Self::on_gpu(context).await? {
                 Ok(processor) => (processor, None),
-                Err(why) => (on_cpu(context)?, Some(why)),
+                Err(why) => (Processor::on_cpu(context)?, Some(why)),
             },
         };
         Ok(Engine {
@@ -90,28 +96,23 @@ impl Engine {
 
     /// Plans the quality level on the GPU, or returns the reason why that is impossible.
     #[cfg(feature = "gpu")]
-    async fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
-        let LevelContext {
-            options,
-            quality_level,
-            gpu,
-            ..
-        } = context;
-        if let Some(why) = &gpu.refusal {
+    async fn on_gpu(context: &mut LevelContext) -> Result<std::result::Result<Processor, String>> {
+        if let Some(why) = &context.gpu.refusal {
             return Ok(Err(why.clone()));
         }
-        match OnGpu::new(options, quality_level, gpu.device.clone()).await {
+        let device = context.gpu.device.clone();
+        match OnGpu::new(&context.options, context.quality_level(), device).await {
             Ok(on_gpu) => {
-                gpu.device = on_gpu.device().cloned();
+                context.gpu.device = on_gpu.device().cloned();
                 Ok(Ok(Processor::Gpu(Box::new(on_gpu))))
             }
             Err(phasefront_gpu::GpuError::Core(why)) => Err(why),
-            Err(why) => Ok(Err(gpu.refuse(&why))),
+            Err(why) => Ok(Err(context.gpu.refuse(&why))),
         }
     }
 
     #[cfg(not(feature = "gpu"))]
-    async fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
+    async fn on_gpu(context: &mut LevelContext) -> Result<std::result::Result<Processor, String>> {
         let GpuState {} = context.gpu;
         Ok(Err("no GPU: this library was built without it (feature gpu)".into()))
     }
@@ -138,12 +139,11 @@ impl Engine {
     ///
     /// # Errors
     /// Returns an error if the frame is invalid. Of a GPU that is lost, the next frame tells.
-    pub(super) async fn replay(&mut self, input: &mut FrameInput<'_>, brightness: &BrightnessTracker) -> Result<()> {
-        let past = brightness.past(input.elapsed);
+    pub(super) async fn replay(&mut self, input: &mut FrameInput<'_>) -> Result<()> {
         match &mut self.processor {
-            Processor::Cpu(cpu) => cpu.skip(past, input.rgbd()),
+            Processor::Cpu(cpu) => cpu.pipeline.skip(input.past, input.rgbd(), &mut cpu.scratch),
             #[cfg(feature = "gpu")]
-            Processor::Gpu(gpu) => match gpu.read(input, past).await {
+            Processor::Gpu(gpu) => match gpu.read(input).await {
                 Err(Failure::Frame(why)) => Err(why),
                 Ok(()) | Err(Failure::Gpu(_)) => Ok(()),
             },
@@ -157,9 +157,8 @@ impl Engine {
     #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only the fallback uses the context.
     pub(super) async fn process(
         &mut self,
-        context: &mut LevelContext<'_>,
+        context: &mut LevelContext,
         input: &mut FrameInput<'_>,
-        brightness: &mut BrightnessTracker,
         levels: LevelsMut<'_>,
     ) -> Result<FrameReport> {
         #[cfg(feature = "gpu")]
@@ -170,7 +169,7 @@ impl Engine {
                     unreachable!("a GPU refuses a display of more than 8 bits");
                 };
                 let before = gpu.openings();
-                let made = gpu.process(input, brightness, bytes, context.gpu.stay).await;
+                let made = gpu.process(input, bytes, context.gpu.stay).await;
                 if gpu.openings() != before {
                     context.gpu.device = gpu.device().cloned();
                     self.report_is_new = true;
@@ -188,10 +187,8 @@ impl Engine {
         };
         match &mut self.processor {
             Processor::Cpu(cpu) => {
-                let past = brightness.past(input.elapsed);
-                let made = cpu.process(past, input.rgbd(), levels)?;
-                brightness.set_scale(made.scale);
-                Ok(made)
+                let past = input.past;
+                cpu.pipeline.process_after(past, input.rgbd(), levels, &mut cpu.scratch)
             }
             #[cfg(feature = "gpu")]
             Processor::Gpu(_) => unreachable!("it answered, or the CPU took over"),
@@ -200,15 +197,14 @@ impl Engine {
 
     /// Lets the CPU take over from a GPU that is unusable.
     #[cfg(feature = "gpu")]
-    fn fall_back(&mut self, context: &mut LevelContext<'_>, why: &phasefront_gpu::GpuError) -> Result<()> {
+    fn fall_back(&mut self, context: &mut LevelContext, why: &phasefront_gpu::GpuError) -> Result<()> {
         if let Processor::Gpu(gpu) = &mut self.processor {
             // Free the GPU's memory first.
             gpu.release();
         }
         context.gpu.device = None;
         self.refusal = Some(context.gpu.refuse(why));
-        let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
-        self.processor = Processor::Cpu(Box::new(cpu));
+        self.processor = Processor::on_cpu(context)?;
         self.report_is_new = true;
         Ok(())
     }

@@ -1,10 +1,11 @@
 //! The controls that all three kinds of session share.
 
 use super::computing::{self, Computing};
-#[cfg(doc)]
-use super::engine::GpuOptions;
-use super::live::{Live, guarded, lock};
+use super::guarded::{guarded, lock};
+use super::live::Live;
 use super::live_work::LiveWork;
+#[cfg(doc)]
+use super::options::GpuOptions;
 use super::quality::{Quality, Thermal};
 use super::queue::{self, Gate, Queue};
 use super::shared::Shared;
@@ -15,7 +16,7 @@ use super::threads::block_on;
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::error::Result;
 use std::fmt::{Debug, Formatter};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Controls a session. Every kind of session dereferences to it. A clone controls the same session from any thread,
 /// including a listener's. It does not keep the session open: a session closes when it is dropped, even if handles
@@ -36,39 +37,42 @@ pub(super) enum Frames {
 }
 
 impl SessionHandle {
-    /// Runs `work` with exclusive access to the stages.
-    pub(super) fn with_stages<T>(&self, work: impl FnOnce(&mut Option<Stages>) -> Result<T>) -> Result<T> {
+    /// Returns exclusive access to the stages.
+    ///
+    /// # Errors
+    /// Returns an error in a forked process, or if this thread computes for a session.
+    pub(super) fn enter(&self) -> Result<Entered<'_>> {
         self.shared.process.check()?;
         computing::check()?;
-        let result = {
-            let _computing = Computing::begin();
-            work(&mut lock(&self.shared.stages))
-        };
-        // A log handler that closed the session in the meantime did not wait.
-        if let Frames::Answered(gate) = &self.frames
-            && lock(gate).closed
-        {
-            self.shared.end();
-        }
-        result
+        let computing = Computing::begin();
+        Ok(Entered {
+            handle: self,
+            held: Some((lock(&self.shared.stages), computing)),
+        })
     }
 
-    /// Runs `work` with exclusive access to the stages. No lock is held while it waits, and the session counts as busy.
+    /// Takes the stages, so that no lock is held while the caller waits and the session counts as busy.
     #[cfg(target_arch = "wasm32")]
-    pub(super) async fn with_stages_async<T>(&self, work: impl AsyncFnOnce(&mut Stages) -> Result<T>) -> Result<T> {
-        let Some(mut stages) = lock(&self.shared.stages).take() else {
-            return Err(Error::Session(
-                "it is closed, or it computes another frame; wait for that one first".into(),
-            ));
-        };
-        let result = work(&mut stages).await;
+    pub(super) fn take_stages(&self) -> Result<Stages> {
+        let stages = lock(&self.shared.stages).take();
+        stages
+            .ok_or_else(|| Error::Session("it is closed, or it computes another frame; wait for that one first".into()))
+    }
+
+    /// Gives back what [`Self::take_stages`] took.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) fn give_back(&self, stages: Stages) {
         *lock(&self.shared.stages) = Some(stages);
+        self.end_if_closed();
+    }
+
+    /// Ends a session that was closed while it computed.
+    fn end_if_closed(&self) {
         if let Frames::Answered(gate) = &self.frames
             && lock(gate).closed
         {
             self.shared.end();
         }
-        result
     }
 
     /// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as the others.
@@ -77,14 +81,13 @@ impl SessionHandle {
     /// Returns an error if the session is closed, if a log handler makes the call while a session computes, or if the
     /// computation panics.
     pub fn warm_up(&self) -> Result<()> {
-        self.with_stages(|stages| {
-            let stages = stages.as_mut().ok_or_else(queue::closed)?;
-            let (result, panicked) = guarded(|| block_on(stages.warm_up()));
-            if panicked {
-                stages.recover();
-            }
-            result
-        })
+        let mut entered = self.enter()?;
+        let stages = entered.stages()?;
+        let (result, panicked) = guarded(|| block_on(stages.warm_up()));
+        if panicked {
+            stages.recover();
+        }
+        result
     }
 
     /// Forgets all previous frames: drops the frames that wait or are in flight, and treats the next frame, with any
@@ -157,8 +160,7 @@ impl SessionHandle {
     #[cfg(feature = "gpu")]
     #[doc(hidden)]
     pub fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
-        let gpu = self.with_stages(|stages| Ok(stages.as_ref().and_then(Stages::gpu)));
-        gpu.ok().flatten()
+        self.enter().ok()?.stages().ok()?.gpu()
     }
 
     /// Returns the statistics so far. Never waits for a frame.
@@ -168,6 +170,30 @@ impl SessionHandle {
             Frames::Live(live) => live.look(|queue| queue.gate.counts),
         };
         lock(&self.shared.recent).statistics(counts)
+    }
+}
+
+/// Exclusive access to the stages of a session, on a thread that counts as computing.
+pub(super) struct Entered<'a> {
+    handle: &'a SessionHandle,
+    /// `None` only while it is dropped.
+    held: Option<(MutexGuard<'a, Option<Stages>>, Computing)>,
+}
+
+impl Entered<'_> {
+    /// # Errors
+    /// Returns an error if the session is closed.
+    pub(super) fn stages(&mut self) -> Result<&mut Stages> {
+        let held = self.held.as_mut().and_then(|(stages, _)| (**stages).as_mut());
+        held.ok_or_else(queue::closed)
+    }
+}
+
+impl Drop for Entered<'_> {
+    fn drop(&mut self) {
+        self.held = None;
+        // A log handler that closed the session in the meantime did not wait.
+        self.handle.end_if_closed();
     }
 }
 

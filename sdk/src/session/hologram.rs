@@ -1,7 +1,7 @@
 //! The result of a session: a hologram whose planes are read in place and whose memory returns to the session.
 
 use super::computing::{self, Computing};
-use super::live::lock;
+use super::guarded::lock;
 use super::process_id::ProcessId;
 use super::threads::Threads;
 use num_complex::Complex32;

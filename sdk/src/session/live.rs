@@ -3,9 +3,11 @@
 
 use super::computing;
 use super::drop_reason::DropReason;
+use super::guarded::{guarded, lock};
 use super::process_id::ProcessId;
 use super::queue::{Queue, Ticket};
-use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};
+use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, thread_local};
+use phasefront_core::frame::Past;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::caught::caught;
 use phasefront_core::runtime::error::{Error, Result};
@@ -19,8 +21,11 @@ pub(super) trait Work: Send + 'static {
     /// The result of a frame.
     type Output;
 
-    /// Processes `frame`; `fresh` means that it has no past.
-    fn process(&mut self, frame: &Self::Frame, fresh: bool) -> Result<Self::Output>;
+    /// Processes `frame`, which follows another if there is a `past`.
+    fn process(&mut self, frame: &Self::Frame, past: Option<Past>) -> Result<Self::Output>;
+
+    /// Returns the scale of a result.
+    fn scale(output: &Self::Output) -> f32;
 
     /// Restores a consistent state after a panic.
     fn recover(&mut self);
@@ -70,19 +75,6 @@ impl<F> Shared<F> {
 /// The maximum number of frames kept for their memory: with one camera, one is being copied, one waits and one is in
 /// flight. A burst from many threads may briefly use more.
 const KEPT: usize = 3;
-
-/// Locks `mutex` even after a panic: the data behind these locks is consistent between any two statements.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Runs `process` and converts a panic to an error. Also returns whether it panicked.
-pub(super) fn guarded<O>(process: impl FnOnce() -> Result<O>) -> (Result<O>, bool) {
-    match caught(process) {
-        Ok(result) => (result, false),
-        Err(message) => (Err(Error::Internal(message)), true),
-    }
-}
 
 thread_local! {
     /// Whether this is the thread of a live session, which calls its listener.
@@ -244,12 +236,13 @@ fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut
             Next::Drop(timestamp_ns, reason) => tell(Report::Dropped { timestamp_ns, reason }),
             Next::Frame(taken) => {
                 let timestamp_ns = taken.timestamp_ns;
-                let (result, panicked) = guarded(|| work.process(&taken.frame, taken.fresh));
+                let (result, panicked) = guarded(|| work.process(&taken.frame, taken.past));
                 if panicked {
                     let _ = caught(|| work.recover());
+                    lock(&shared.queue).gate.history.forget();
                 }
                 shared.keep(Some(taken.frame));
-                if lock(&shared.queue).finish(result.is_err()) {
+                if lock(&shared.queue).finish(result.as_ref().ok().map(W::scale)) {
                     tell(match result {
                         Ok(output) => Report::Done { timestamp_ns, output },
                         Err(error) => Report::Failed { timestamp_ns, error },
@@ -279,7 +272,11 @@ mod tests {
         type Frame = Vec<u64>;
         type Output = u64;
 
-        fn process(&mut self, frame: &Vec<u64>, _fresh: bool) -> Result<u64> {
+        fn scale(_: &u64) -> f32 {
+            1.0
+        }
+
+        fn process(&mut self, frame: &Vec<u64>, _: Option<Past>) -> Result<u64> {
             assert!(!self.broken, "not recovered");
             for _ in 0..self.random.random_range(0..4) {
                 std::thread::yield_now();

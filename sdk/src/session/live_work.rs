@@ -2,13 +2,15 @@
 
 use super::computing::Computing;
 use super::event::Event;
-use super::live::{Report, Work, lock};
+use super::guarded::lock;
+use super::live::{Report, Work};
 use super::owned_frame::OwnedFrame;
 use super::quality::QualityChange;
 use super::queue;
 use super::shared::Shared;
 use super::stages::FrameResult;
 use super::threads::block_on;
+use phasefront_core::frame::Past;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 use std::sync::Arc;
@@ -20,14 +22,15 @@ impl Work for LiveWork {
     type Frame = OwnedFrame;
     type Output = FrameResult;
 
-    fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<FrameResult> {
+    fn process(&mut self, frame: &OwnedFrame, past: Option<Past>) -> Result<FrameResult> {
         let _computing = Computing::begin();
         let mut stages = lock(&self.0.stages);
         let stages = stages.as_mut().ok_or_else(queue::closed)?;
-        if fresh {
-            stages.forget();
-        }
-        block_on(self.0.process(stages, &frame.frame()?, !fresh))
+        block_on(self.0.process(stages, &frame.frame()?, past))
+    }
+
+    fn scale(result: &FrameResult) -> f32 {
+        result.hologram.scale
     }
 
     fn recover(&mut self) {

@@ -1,8 +1,9 @@
 //! Depth networks without the feature `tract`, which runs them: there are none.
 
-use super::SessionOptions;
+use super::options::SessionOptions;
 use ndarray::Array2;
 use phasefront_core::Size;
+use phasefront_core::frame::Past;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 use std::sync::Arc;
@@ -18,7 +19,7 @@ impl DepthEstimates {
         Ok(None)
     }
 
-    pub(super) fn estimate(&mut self, _: &[f32], _: Size, _: bool, _: &Cancel) -> Result<Arc<Array2<f32>>> {
+    pub(super) fn estimate(&mut self, _: &[f32], _: Size, _: Option<Past>, _: &Cancel) -> Result<Arc<Array2<f32>>> {
         match *self {}
     }
 }

@@ -1,7 +1,5 @@
 //! The options of a session.
 
-#[cfg(feature = "gpu")]
-use super::engine::GpuOptions;
 use super::focus::Focus;
 use super::quality::{self, Backend, Quality, QualityLevel};
 use phasefront_core::Size;
@@ -12,9 +10,22 @@ use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::method::Method;
 use phasefront_core::runtime::error::{Error, Result};
+#[cfg(feature = "gpu")]
+use phasefront_gpu::{ChainOptions, DeviceOptions};
 use std::num::NonZeroUsize;
 #[cfg(feature = "tract")]
 use std::sync::Arc;
+
+/// The options of a session for its GPU.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Default)]
+pub struct GpuOptions {
+    /// The choice of the device, and programs that an earlier run compiled for it.
+    pub device: DeviceOptions,
+    /// The options for networks. By default f32 networks run in 16 bits if the GPU supports it.
+    #[doc(hidden)]
+    pub chain: ChainOptions,
+}
 
 /// The options of a session. [`SessionOptions::new`] sets the defaults.
 #[derive(Debug, Clone)]
@@ -56,7 +67,7 @@ impl SessionOptions {
     pub const MOST_THREADS: usize = 256;
 
     /// The maximum number of quality levels. Each is planned once when the session is created.
-    pub const MOST_QUALITY_LEVELS: usize = 16;
+    pub const MOST_QUALITY_LEVELS: usize = QualityLevel::MOST;
 
     /// The default of [`Self::most_pixels`]: 8192×4096, which includes 8K UHD.
     pub const MOST_PIXELS: usize = 1 << 25;

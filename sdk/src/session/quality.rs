@@ -1,6 +1,5 @@
 //! Quality levels and the rules for changing between them.
 
-use super::SessionOptions;
 use phasefront_core::Size;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::method::Method;
@@ -23,9 +22,12 @@ pub struct QualityLevel {
 }
 
 impl QualityLevel {
-    /// Returns the encoder of this quality level in a session with `options`.
-    pub(super) fn encoder<'a>(&'a self, options: &'a SessionOptions) -> &'a EncoderOptions {
-        self.encoder.as_ref().unwrap_or(&options.encoder)
+    /// The maximum number of quality levels. Each is planned once when the session is created.
+    pub(super) const MOST: usize = 16;
+
+    /// Returns the encoder of this quality level in a session whose encoder is `default`.
+    pub(super) fn encoder<'a>(&'a self, default: &'a EncoderOptions) -> &'a EncoderOptions {
+        self.encoder.as_ref().unwrap_or(default)
     }
 }
 
@@ -250,11 +252,11 @@ pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator
             "there are no quality levels; at least one is needed".into(),
         ));
     }
-    if quality_levels.len() > SessionOptions::MOST_QUALITY_LEVELS {
+    if quality_levels.len() > QualityLevel::MOST {
         return Err(Error::Setting(format!(
             "{} quality levels are too many; 1 to {} are right",
             quality_levels.len(),
-            SessionOptions::MOST_QUALITY_LEVELS
+            QualityLevel::MOST
         )));
     }
     quality.check(quality_levels.len())?;

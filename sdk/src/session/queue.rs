@@ -2,7 +2,9 @@
 //! state machine without threads. [`super::live`] runs it, and its tests run random orders of events.
 
 use super::drop_reason::DropReason;
+use super::history::History;
 use super::statistics::Counts;
+use phasefront_core::frame::Past;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::{Error, Result};
 use std::collections::VecDeque;
@@ -13,28 +15,29 @@ pub(super) struct Gate {
     pub(super) counts: Counts,
     pub(super) closed: bool,
     pub(super) paused: bool,
-    /// Whether the next frame has no past.
-    pub(super) fresh: bool,
+    /// Whether frames form a sequence, so that their timestamps must increase.
+    in_order: bool,
+    pub(super) history: History,
     last_ns: Option<u64>,
     /// Cancels the frame that is being computed.
     cancel: Cancel,
 }
 
 impl Gate {
-    pub(super) fn new(cancel: Cancel) -> Self {
+    pub(super) fn new(in_order: bool, cancel: Cancel) -> Self {
         Gate {
-            fresh: true,
+            in_order,
             cancel,
             ..Gate::default()
         }
     }
 
-    /// Counts a frame. Refuses it if the session is closed or, with `in_order`, if the frame is late.
-    pub(super) fn admit(&mut self, timestamp_ns: u64, in_order: bool) -> Result<()> {
+    /// Counts a frame. Refuses it if the session is closed or the frame is late in a sequence.
+    pub(super) fn admit(&mut self, timestamp_ns: u64) -> Result<()> {
         self.counts.submitted += 1;
         let refusal = match self.last_ns {
             _ if self.closed => Some(closed()),
-            Some(last_ns) if in_order && timestamp_ns <= last_ns => Some(Error::Timestamp {
+            Some(last_ns) if self.in_order && timestamp_ns <= last_ns => Some(Error::Timestamp {
                 given_ns: timestamp_ns,
                 last_ns,
             }),
@@ -48,16 +51,16 @@ impl Gate {
         Ok(())
     }
 
-    /// Begins a frame; returns whether it has no past.
-    pub(super) fn begin(&mut self) -> bool {
+    /// Begins a frame; returns its past, if it has one.
+    pub(super) fn begin(&mut self, timestamp_ns: u64) -> Option<Past> {
         self.cancel.clear();
-        std::mem::take(&mut self.fresh)
+        self.history.past(timestamp_ns).filter(|_| self.in_order)
     }
 
     /// Forgets the past and cancels the frame that is being computed.
     pub(super) fn reset(&mut self) {
         self.last_ns = None;
-        self.fresh = true;
+        self.history.forget();
         self.cancel.request();
     }
 
@@ -89,8 +92,7 @@ struct Waiting<F> {
 /// A frame to process.
 pub(super) struct Taken<F> {
     pub(super) timestamp_ns: u64,
-    /// Whether it has no past.
-    pub(super) fresh: bool,
+    pub(super) past: Option<Past>,
     pub(super) frame: F,
 }
 
@@ -117,7 +119,7 @@ impl<F> Queue<F> {
     /// Creates an open queue that admits at most one frame per `period_ns`.
     pub(super) fn new(period_ns: Option<u64>, cancel: Cancel) -> Self {
         Queue {
-            gate: Gate::new(cancel),
+            gate: Gate::new(true, cancel),
             waiting: None,
             in_flight: None,
             taken_ns: None,
@@ -134,7 +136,7 @@ impl<F> Queue<F> {
     /// # Errors
     /// Returns an error if the session is closed or the frame is not later than the last.
     pub(super) fn admit(&mut self, timestamp_ns: u64) -> Result<std::result::Result<Ticket, DropReason>> {
-        self.gate.admit(timestamp_ns, true)?;
+        self.gate.admit(timestamp_ns)?;
         if self.gate.paused {
             return Ok(Err(self.drop(timestamp_ns, DropReason::Paused)));
         }
@@ -203,25 +205,26 @@ impl<F> Queue<F> {
         self.taken_ns = Some(waiting.timestamp_ns);
         Some(Taken {
             timestamp_ns: waiting.timestamp_ns,
-            fresh: self.gate.begin(),
+            past: self.gate.begin(waiting.timestamp_ns),
             frame: waiting.frame,
         })
     }
 
-    /// Ends the frame in flight. Returns whether to report its result (or its error if it `failed`); otherwise its drop
-    /// is reported.
-    pub(super) fn finish(&mut self, failed: bool) -> bool {
+    /// Ends the frame in flight, whose hologram has `scale`; `None` if it failed. Returns whether to report its result or
+    /// its error; otherwise its drop is reported.
+    pub(super) fn finish(&mut self, scale: Option<f32>) -> bool {
         let Some((timestamp_ns, epoch)) = self.in_flight.take() else {
             return false;
         };
-        match () {
+        match scale {
             _ if self.gate.closed => self.drop(timestamp_ns, DropReason::Closed),
             _ if epoch != self.epoch => self.drop(timestamp_ns, DropReason::Reset),
-            _ if failed => {
+            None => {
                 self.gate.counts.failed += 1;
                 return true;
             }
-            _ => {
+            Some(scale) => {
+                self.gate.history.add(timestamp_ns, scale);
                 self.gate.counts.processed += 1;
                 return true;
             }
@@ -285,6 +288,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::collections::BTreeMap;
+    use std::time::Duration;
 
     /// A queue under random events, with the invariants that must hold at each moment.
     struct Run {
@@ -303,6 +307,8 @@ mod tests {
         processed: u64,
         failed: u64,
         last_taken: u64,
+        /// The epoch and the timestamp of the last hologram.
+        made: Option<(u64, u64)>,
     }
 
     impl Run {
@@ -323,6 +329,7 @@ mod tests {
                 processed: 0,
                 failed: 0,
                 last_taken: 0,
+                made: None,
             }
         }
 
@@ -392,26 +399,29 @@ mod tests {
                 assert!(!self.queue.gate.paused && !self.queue.gate.closed);
                 assert!(taken.timestamp_ns > self.last_taken, "in order");
                 self.last_taken = taken.timestamp_ns;
-                assert!(!taken.fresh || self.processed_of(self.epoch) == 0);
+                // The past is the last hologram since a reset.
+                let before = self.made.filter(|(epoch, _)| *epoch == self.epoch);
+                let elapsed = before.map(|(_, made)| Duration::from_nanos(taken.timestamp_ns - made));
+                assert_eq!(taken.past.map(|past| past.elapsed), elapsed);
                 self.flying = Some((self.epoch, taken.timestamp_ns));
             }
-        }
-
-        fn processed_of(&self, epoch: u64) -> usize {
-            let done = |(key, reason): &(&(u64, u64), &Option<DropReason>)| key.0 == epoch && reason.is_none();
-            self.told.iter().filter(done).count()
         }
 
         fn finish(&mut self) {
             if let Some((epoch, timestamp)) = self.flying.take() {
                 let failed = self.random.random_bool(0.2);
-                let told = self.queue.finish(failed);
+                let told = self.queue.finish((!failed).then_some(1.0));
                 // A result from before a reset or close is never reported.
                 assert_eq!(told, epoch == self.epoch && !self.queue.gate.closed);
                 if told {
                     let before = self.told.insert((epoch, timestamp), None);
                     assert!(before.is_none());
-                    if failed { self.failed += 1 } else { self.processed += 1 }
+                    if failed {
+                        self.failed += 1;
+                    } else {
+                        self.processed += 1;
+                        self.made = Some((epoch, timestamp));
+                    }
                 }
             }
         }

@@ -2,13 +2,14 @@
 
 use super::computing::{self, Computing};
 use super::depth_estimates::DepthEstimates;
-use super::live::lock;
+use super::guarded::lock;
 use super::options::SessionOptions;
 use super::process_id::ProcessId;
 use super::quality::{Quality, Thermal};
 use super::stages::{FrameResult, Stages};
 use super::statistics::Recent;
 use phasefront_core::depth::camera::CameraFrame;
+use phasefront_core::frame::Past;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::clock::Instant;
 use phasefront_core::runtime::error::Result;
@@ -59,7 +60,7 @@ impl Shared {
         &self,
         stages: &mut Stages,
         frame: &CameraFrame<'_>,
-        past: bool,
+        past: Option<Past>,
     ) -> Result<FrameResult> {
         let Control { quality, thermal, .. } = *lock(&self.control);
         let made = stages.process(frame, past, thermal, quality).await?;

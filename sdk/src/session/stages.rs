@@ -1,15 +1,12 @@
 //! All stages of a session's frames, and the state from one frame to the next. This module does not decide which frame
 //! is next.
 
-use super::SessionOptions;
 use super::colour_stage::ColourStage;
 use super::depth_estimates::DepthEstimates;
-use super::engine::BrightnessTracker;
-use super::engine::FrameInput;
-use super::engine::OnCpu;
-use super::engine::{Engine, GpuState, LevelContext};
+use super::engine::{Engine, FrameInput, GpuState, LevelContext, OnCpu};
+use super::guarded::guarded;
 use super::hologram::{Hologram, Pool, Pooled, Viewer};
-use super::live::guarded;
+use super::options::SessionOptions;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::BackendReport;
 use super::threads::{Threads, block_on};
@@ -17,17 +14,14 @@ use phasefront_core::Size;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::{DepthReport, DepthStream};
 use phasefront_core::display::levels::LevelsMut;
-use phasefront_core::frame::RgbdFrame;
+use phasefront_core::frame::{Past, RgbdFrame};
 use phasefront_core::pipeline::FrameTimes;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::clock::Instant;
-use phasefront_core::runtime::error::{Error, Result};
+use phasefront_core::runtime::error::Result;
 use phasefront_core::runtime::stage::stage;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The longest gap between frames after which the past still counts.
-const LONGEST_GAP: Duration = Duration::from_secs(1);
 
 /// The plans and memory of one quality level.
 struct LevelPlan {
@@ -43,7 +37,7 @@ impl LevelPlan {
     fn take_in(
         &mut self,
         frame: &CameraFrame<'_>,
-        elapsed: Option<Duration>,
+        past: Option<Past>,
         estimates: Option<&mut DepthEstimates>,
         cancel: &Cancel,
         times: &mut FrameTimes,
@@ -58,10 +52,10 @@ impl LevelPlan {
         let report = match estimates {
             Some(estimates) if frame.depth.is_none() => {
                 let picture = self.colour.picture(amplitude);
-                let estimate = estimates.estimate(picture, size, elapsed.is_none(), cancel)?;
-                self.depth.read_estimate(&estimate, elapsed, rgb)?
+                let estimate = estimates.estimate(picture, size, past, cancel)?;
+                self.depth.read_estimate(&estimate, past, rgb)?
             }
-            _ => self.depth.read(frame, elapsed, rgb)?,
+            _ => self.depth.read(frame, past, rgb)?,
         };
         if !self.engine.takes_readings() {
             self.depth.decide(rgb, depth);
@@ -71,17 +65,13 @@ impl LevelPlan {
     }
 
     /// Returns the engine and its input: `camera`, which was taken in.
-    fn input<'a>(
-        &'a mut self,
-        camera: &'a CameraFrame<'_>,
-        elapsed: Option<Duration>,
-    ) -> (&'a mut Engine, FrameInput<'a>) {
+    fn input<'a>(&'a mut self, camera: &'a CameraFrame<'_>, past: Option<Past>) -> (&'a mut Engine, FrameInput<'a>) {
         let undecided = self.engine.takes_readings().then_some(&mut self.depth);
         let input = FrameInput {
             camera: Some(camera),
             frame: &mut self.frame,
             undecided,
-            elapsed,
+            past,
         };
         (&mut self.engine, input)
     }
@@ -117,22 +107,18 @@ impl LevelPlan {
 
 /// The stages of a session.
 pub(super) struct Stages {
-    options: SessionOptions,
+    context: LevelContext,
     /// The session's threads, shared with the viewer so that views need no other threads.
     pool: Arc<Threads>,
     level_control: LevelControl,
-    gpu: GpuState,
     /// The depth of frames without depth, if there is a network for it.
     estimates: Option<DepthEstimates>,
     /// The plan; `None` after a panic, so that it is created again.
     plan: Option<LevelPlan>,
-    brightness: BrightnessTracker,
     viewer: Arc<Viewer>,
     levels: Pool<u8>,
     words: Pool<u16>,
     depths: Pool<u16>,
-    last_ns: Option<u64>,
-    cancel: Cancel,
 }
 
 /// The result of a frame.
@@ -160,18 +146,19 @@ impl Stages {
         }
         let mut stages = Stages {
             level_control: LevelControl::new(options.quality_levels.len(), start),
-            gpu: GpuState::default(),
             estimates,
             plan: None,
-            brightness: BrightnessTracker::default(),
             viewer: Arc::new(Viewer::new(options.target.clone(), pool.clone())),
             levels: Pool::default(),
             words: Pool::default(),
             depths: Pool::default(),
-            last_ns: None,
-            cancel,
             pool,
-            options,
+            context: LevelContext {
+                options,
+                level: start,
+                gpu: GpuState::default(),
+                cancel,
+            },
         };
         stages.plan = Some(stages.plan_level().await?);
         Ok(stages)
@@ -180,41 +167,29 @@ impl Stages {
     async fn plan_level(&mut self) -> Result<LevelPlan> {
         let _stage = stage!("plan");
         let Stages {
-            options,
+            context,
             pool,
-            level_control,
-            gpu,
             estimates,
-            cancel,
             ..
         } = self;
-        let quality_level = &options.quality_levels[level_control.quality_level()];
-        let size = quality_level.size;
+        context.level = self.level_control.quality_level();
+        let options = &context.options;
+        let display = &options.target.display;
+        let size = context.quality_level().size;
         let depth = DepthStream::new(options.depth, size)?;
-        let colours = options.target.display.colours();
-        let mut context = LevelContext {
-            options,
-            quality_level,
-            gpu,
-            cancel,
-        };
+        let colour = ColourStage::new(display, size, estimates.is_some());
+        let frame = RgbdFrame::black(display.colours(), size);
         Ok(LevelPlan {
-            engine: pool.run(async || Engine::new(&mut context).await).await?,
-            frame: RgbdFrame::black(colours, size),
+            engine: pool.run(async || Engine::new(context).await).await?,
+            frame,
             depth,
-            colour: ColourStage::new(&options.target.display, size, estimates.is_some()),
+            colour,
         })
     }
 
     /// Discards unfinished work after a panic.
     pub(super) fn recover(&mut self) {
-        self.forget();
         self.plan = None;
-    }
-
-    /// Forgets previous frames: the next frame has no past, even if frames in between fail.
-    pub(super) fn forget(&mut self) {
-        self.last_ns = None;
     }
 
     pub(super) fn quality_level(&self) -> usize {
@@ -230,48 +205,33 @@ impl Stages {
     /// Sets whether the levels of the next frame stay on the GPU, if it computes them.
     #[cfg(all(feature = "gpu", target_arch = "wasm32"))]
     pub(super) fn stay_on_gpu(&mut self, stay: bool) {
-        self.gpu.stay = stay;
+        self.context.gpu.stay = stay;
     }
 
     #[cfg(feature = "gpu")]
     pub(super) fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
-        self.gpu.device()
+        self.context.gpu.device()
     }
 
     /// Runs a black frame through all stages that do not need a camera's frame.
     pub(super) async fn warm_up(&mut self) -> Result<()> {
         let mut plan = self.take_plan().await?;
         let Stages {
-            pool,
-            levels,
-            options,
-            gpu,
-            level_control,
-            cancel,
-            ..
+            context, pool, levels, ..
         } = self;
-        cancel.clear();
-        let quality_level = &options.quality_levels[level_control.quality_level()];
-        let mut levels = levels.take(options.target.display.colours() * quality_level.size.pixels());
-        let mut brightness = BrightnessTracker::default();
-        plan.frame.planes_mut().0.fill(0.0);
+        context.cancel.clear();
+        let (amplitude, _) = plan.frame.planes_mut();
+        amplitude.fill(0.0);
+        let mut levels = levels.take(amplitude.len());
         let work = async || {
-            let mut context = LevelContext {
-                options,
-                quality_level,
-                gpu,
-                cancel,
-            };
             let mut input = FrameInput {
                 camera: None,
                 frame: &mut plan.frame,
                 undecided: None,
-                elapsed: None,
+                past: None,
             };
             let levels = LevelsMut::Bytes(&mut levels.values);
-            (plan.engine)
-                .process(&mut context, &mut input, &mut brightness, levels)
-                .await
+            plan.engine.process(context, &mut input, levels).await
         };
         let result = pool.run(work).await;
         self.plan = Some(plan);
@@ -285,25 +245,21 @@ impl Stages {
         }
     }
 
-    /// Makes the hologram of `frame`; `past` says whether the frames before it count.
+    /// Makes the hologram of `frame`, which follows another if there is a `past`.
     pub(super) async fn process(
         &mut self,
         frame: &CameraFrame<'_>,
-        past: bool,
+        past: Option<Past>,
         thermal: Thermal,
         quality: Quality,
     ) -> Result<FrameResult> {
         let start = Instant::now();
-        let elapsed = self.elapsed(frame, past);
         let mut plan = self.take_plan().await?;
-        let made = self.run(&mut plan, frame, elapsed).await;
+        let made = self.run(&mut plan, frame, past).await;
         self.plan = Some(plan);
         let hologram = made?;
-        self.last_ns = Some(frame.timestamp_ns);
-        let period = self
-            .options
-            .target_rate_hz
-            .map(|rate| Duration::from_secs_f64(1.0 / rate));
+        let rate_hz = self.context.options.target_rate_hz;
+        let period = rate_hz.map(|rate| Duration::from_secs_f64(1.0 / rate));
         let change = self.level_control.observe(start.elapsed(), period, thermal, quality);
         let change = match change {
             Some(change) => Some(self.step(change).await),
@@ -336,89 +292,58 @@ impl Stages {
         }
     }
 
-    /// Updates the state as [`Self::process`] does, for a `frame` whose hologram is known to have `scale`, without
-    /// making the hologram.
-    pub(super) async fn replay(&mut self, frame: &CameraFrame<'_>, past: bool, scale: f32) -> Result<()> {
-        let elapsed = self.elapsed(frame, past);
+    /// Updates the state as [`Self::process`] does, without making the hologram of `frame`.
+    pub(super) async fn replay(&mut self, frame: &CameraFrame<'_>, past: Option<Past>) -> Result<()> {
         let mut plan = self.take_plan().await?;
         let Stages {
+            context,
             pool,
-            brightness,
             estimates,
-            cancel,
             ..
         } = self;
         let mut times = FrameTimes::default();
         let work = async || {
-            plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
-            let (engine, mut input) = plan.input(frame, elapsed);
-            engine.replay(&mut input, brightness).await
+            plan.take_in(frame, past, estimates.as_mut(), &context.cancel, &mut times)?;
+            let (engine, mut input) = plan.input(frame, past);
+            engine.replay(&mut input).await
         };
         let replayed = pool.run(work).await;
         self.plan = Some(plan);
         replayed?;
-        given_up(&self.cancel)?;
-        self.brightness.set_scale(scale);
-        self.last_ns = Some(frame.timestamp_ns);
-        Ok(())
+        self.context.cancel.check()
     }
 
-    /// Returns the time since the previous frame, if the past counts.
-    fn elapsed(&self, frame: &CameraFrame<'_>, past: bool) -> Option<Duration> {
-        (self.last_ns.filter(|_| past))
-            .and_then(|last| frame.timestamp_ns.checked_sub(last))
-            .map(Duration::from_nanos)
-            .filter(|gap| *gap <= LONGEST_GAP)
-    }
-
-    async fn run(
-        &mut self,
-        plan: &mut LevelPlan,
-        frame: &CameraFrame<'_>,
-        elapsed: Option<Duration>,
-    ) -> Result<Hologram> {
+    async fn run(&mut self, plan: &mut LevelPlan, frame: &CameraFrame<'_>, past: Option<Past>) -> Result<Hologram> {
         let Stages {
+            context,
             pool,
-            brightness,
             levels,
             words,
             depths,
-            options,
-            level_control,
-            gpu,
             estimates,
-            cancel,
             ..
         } = self;
-        let quality_level = &options.quality_levels[level_control.quality_level()];
-        let size = quality_level.size;
-        let display = &options.target.display;
-        let values = display.colours() * size.height * size.width;
+        let size = plan.frame.size();
+        let bits = context.options.target.display.bits();
+        let values = plan.frame.planes_mut().0.len();
         let mut levels = levels.take(values);
-        let mut words = (display.bits() > 8).then(|| words.take(values));
+        let mut words = (bits > 8).then(|| words.take(values));
         let mut times = FrameTimes::default();
         let work = async || -> Result<_> {
             let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
-            let report = plan.take_in(frame, elapsed, estimates.as_mut(), cancel, &mut times)?;
-            given_up(cancel)?;
+            let report = plan.take_in(frame, past, estimates.as_mut(), &context.cancel, &mut times)?;
+            context.cancel.check()?;
             let depth_map = plan.depth_map(depths);
-            let mut context = LevelContext {
-                options,
-                quality_level,
-                gpu,
-                cancel,
-            };
-            let (engine, mut input) = plan.input(frame, elapsed);
+            let (engine, mut input) = plan.input(frame, past);
             let made = match &mut words {
                 None => LevelsMut::Bytes(&mut levels.values),
                 Some(words) => LevelsMut::Words(&mut words.values),
             };
-            let encoded = engine.process(&mut context, &mut input, brightness, made).await?;
-            given_up(cancel)?;
+            let encoded = engine.process(context, &mut input, made).await?;
+            context.cancel.check()?;
             if let Some(words) = &words {
-                let below = display.bits() - 8;
                 for (level, word) in levels.values.iter_mut().zip(&words.values) {
-                    *level = (*word >> below) as u8;
+                    *level = (*word >> (bits - 8)) as u8;
                 }
             }
             Ok((report, depth_map, encoded))
@@ -439,24 +364,12 @@ impl Stages {
             },
             range_m: report.range_m,
             valid_depth: report.valid,
-            quality_level: level_control.quality_level(),
+            quality_level: self.level_control.quality_level(),
             encoding: frame.colour.encoding(),
             viewer: self.viewer.clone(),
             #[cfg(feature = "gpu")]
-            on_gpu: self.gpu.kept.take(),
+            on_gpu: self.context.gpu.kept.take(),
         })
-    }
-}
-
-/// # Errors
-/// Returns an error if `cancel` is requested.
-pub(super) fn given_up(cancel: &Cancel) -> Result<()> {
-    if cancel.requested() {
-        Err(Error::Session(
-            "the frame was given up: the session was reset or closed while it was computed".into(),
-        ))
-    } else {
-        Ok(())
     }
 }
 
@@ -481,7 +394,7 @@ mod tests {
         let mut stages = block_on(Stages::new(options, None, Cancel::default())).unwrap();
         // The second quality level was valid at the start and becomes invalid.
         let worse = Sweep { planes: 0, ..sweep };
-        stages.options.quality_levels[1] = QualityLevel {
+        stages.context.options.quality_levels[1] = QualityLevel {
             method: Method::Sweep(worse),
             ..best
         };
@@ -492,7 +405,7 @@ mod tests {
         let depth = DepthImage::new(DepthFormat::NormalizedU8, Size { width: 16, height: 12 }, plane).unwrap();
         let mut process = |time| {
             let frame = CameraFrame::new(time, colour, depth);
-            block_on(stages.process(&frame, false, Thermal::Nominal, Quality::Fixed(1)))
+            block_on(stages.process(&frame, None, Thermal::Nominal, Quality::Fixed(1)))
         };
         let change = process(1).unwrap().change.unwrap();
         assert_eq!((change.from, change.to, change.reason), (0, 0, QualityReason::Refused));

@@ -1,8 +1,8 @@
 //! The threads on which a session computes.
 
-use super::SessionOptions;
 use super::computing::Computing;
-use super::live::lock;
+use super::guarded::lock;
+use super::options::SessionOptions;
 use super::process_id::ProcessId;
 use phasefront_core::runtime::error::{Error, Result};
 pub(super) use pollster::block_on;

@@ -8,7 +8,7 @@ use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::smoothing::Smoother;
 use crate::Size;
-use crate::frame::{Crop, Orientation, Plane};
+use crate::frame::{Crop, Orientation, Past, Plane};
 use crate::runtime::error::{Error, Result};
 use ndarray::Array2;
 use std::time::Duration;
@@ -128,11 +128,11 @@ impl DepthStream {
     pub fn next(
         &mut self,
         frame: &CameraFrame<'_>,
-        elapsed: Option<Duration>,
+        past: Option<Past>,
         rgb: &[f32],
         depth: &mut [f32],
     ) -> Result<DepthReport> {
-        let report = self.read(frame, elapsed, rgb)?;
+        let report = self.read(frame, past, rgb)?;
         self.decide(rgb, depth);
         Ok(report)
     }
@@ -159,15 +159,15 @@ impl DepthStream {
 
     /// Reads the depth of `frame` and conditions its readings along the edges of `rgb`.
     ///
-    /// `rgb`, (3, H, W), is the part [`Crop::cover`] of the frame's colour. `elapsed` is the time since the previous
-    /// frame, or `None` if there is no previous frame to smooth with. Later frames of the same layout do not allocate.
+    /// `rgb`, (3, H, W), is the part [`Crop::cover`] of the frame's colour. Without a `past` there is no previous
+    /// frame to smooth with. Later frames of the same layout do not allocate.
     ///
     /// # Errors
     /// Returns an error if the frame has no depth or no usable reading.
     ///
     /// # Panics
     /// Panics if `rgb` does not have 3·H·W values.
-    pub fn read(&mut self, frame: &CameraFrame<'_>, elapsed: Option<Duration>, rgb: &[f32]) -> Result<DepthReport> {
+    pub fn read(&mut self, frame: &CameraFrame<'_>, past: Option<Past>, rgb: &[f32]) -> Result<DepthReport> {
         let Some(image) = &frame.depth else {
             return Err(Error::Frame(
                 "it has no depth; give it depth, or the session a depth network".into(),
@@ -183,7 +183,7 @@ impl DepthStream {
                 Alignment::Cameras(cameras) => Some(cameras),
             },
         };
-        self.process(image, layout, elapsed, rgb)
+        self.process(image, layout, past, rgb)
     }
 
     /// Reads `estimate`, (h, w), the relative inverse depth that a network estimated for `rgb`, as [`Self::read`] reads
@@ -194,12 +194,7 @@ impl DepthStream {
     ///
     /// # Panics
     /// Panics in the cases of [`Self::read`].
-    pub fn read_estimate(
-        &mut self,
-        estimate: &Array2<f32>,
-        elapsed: Option<Duration>,
-        rgb: &[f32],
-    ) -> Result<DepthReport> {
+    pub fn read_estimate(&mut self, estimate: &Array2<f32>, past: Option<Past>, rgb: &[f32]) -> Result<DepthReport> {
         let (height, width) = estimate.dim();
         let bytes: Vec<u8> = estimate.iter().flat_map(|v| v.to_le_bytes()).collect();
         let image = DepthImage::new(
@@ -214,17 +209,17 @@ impl DepthStream {
             colour: self.out,
             cameras: None,
         };
-        self.process(&image, layout, elapsed, rgb)
+        self.process(&image, layout, past, rgb)
     }
 
     fn process(
         &mut self,
         image: &DepthImage<'_>,
         layout: Layout,
-        elapsed: Option<Duration>,
+        past: Option<Past>,
         rgb: &[f32],
     ) -> Result<DepthReport> {
-        if elapsed.is_none()
+        if past.is_none()
             || self
                 .plan
                 .as_ref()
@@ -243,7 +238,7 @@ impl DepthStream {
                 layout.sensor.width, layout.sensor.height, self.options.least_confidence
             )));
         }
-        let elapsed = elapsed.unwrap_or_default();
+        let elapsed = past.map_or(Duration::ZERO, |past| past.elapsed);
         let width = plan.upright().width;
         let metric = layout.format.is_metric();
         if metric {

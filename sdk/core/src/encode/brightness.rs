@@ -1,8 +1,10 @@
 //! The amplitude that maps to full light, and the brightness of a field without its brightest points. A session
 //! controls how the scale changes from frame to frame.
 
+use crate::frame::Past;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
+use std::time::Duration;
 
 /// The rule that chooses the scale of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -42,13 +44,12 @@ impl Brightness {
     }
 }
 
-/// The starting point of a smoothed scale.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Past {
-    /// The scale of the previous frame.
-    pub scale: f32,
-    /// The share, 0 to 1, by which the scale moves from the previous one toward the frame's own percentile.
-    pub share: f32,
+/// The time in which a smoothed scale covers 63 % of the distance to its target.
+const TIME_CONSTANT: Duration = Duration::from_secs(1);
+
+/// Returns the share, 0 to 1, by which a smoothed scale moves from that of the `past` toward the frame's own percentile.
+pub fn share(past: Past) -> f32 {
+    1.0 - (-past.elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp()
 }
 
 /// The share of amplitudes that are clipped.
@@ -100,6 +101,58 @@ impl Percentile {
         }))
         .unwrap_or(0);
         let now = ((last + 1) as f32 * (MOST / BINS as f32)).max(LEAST);
-        past.map_or(now, |past| past.scale + past.share * (now - past.scale))
+        past.map_or(now, |past| past.scale + share(past) * (now - past.scale))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field(level: f32, spikes: usize) -> Vec<Complex32> {
+        (0..34_000)
+            .map(|i| {
+                if i / STEP < spikes && i % STEP == 0 {
+                    Complex32::new(0.0, -3.0)
+                } else {
+                    Complex32::from_polar(level * (i % 100) as f32 / 99.0, i as f32)
+                }
+            })
+            .collect()
+    }
+
+    fn scale(field: &[Complex32], past: Option<Past>) -> f32 {
+        let scale = Brightness::Smoothed.scale(field, past, &mut Percentile::default());
+        scale.unwrap_or(f32::NAN)
+    }
+
+    #[test]
+    fn a_few_bright_pixels_do_not_count() {
+        for (spikes, expected) in [(0, 0.8), (2, 0.8), (3, 3.0)] {
+            let scale = scale(&field(0.8, spikes), None);
+            assert!((scale - expected).abs() < 0.01, "{spikes}: {scale}");
+        }
+        assert!((scale(&field(9.0, 0), None) - MOST).abs() < 0.01);
+        assert!((scale(&field(0.0, 0), None) - LEAST).abs() < 0.01);
+    }
+
+    #[test]
+    fn the_scale_moves_slowly_in_time_and_not_at_all_where_fixed() {
+        let after = |scale, ms| {
+            Some(Past {
+                scale,
+                elapsed: Duration::from_millis(ms),
+            })
+        };
+        let start = scale(&field(0.5, 0), None);
+        let next = scale(&field(1.0, 0), after(start, 33));
+        assert!(next > start && next < start * 1.05);
+        let later = scale(&field(1.0, 0), after(next, 10_000));
+        assert!((later - 1.0).abs() < 0.01);
+        let fixed = Brightness::Fixed(0.7).scale(&field(1.0, 0), None, &mut Percentile::default());
+        assert_eq!(fixed, Some(0.7));
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert!(Brightness::Fixed(bad).check().is_err());
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Cancellation of a frame during its computation. Long loops check for it once per row, tile or plane. The results of
 //! a cancelled frame are incomplete and must be discarded.
 
+use crate::runtime::error::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -22,5 +23,16 @@ impl Cancel {
     /// Returns whether cancellation was requested.
     pub fn requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// # Errors
+    /// Returns an error if cancellation was requested.
+    pub fn check(&self) -> Result<()> {
+        if self.requested() {
+            return Err(Error::Session(
+                "the frame was given up: the session was reset or closed while it was computed".into(),
+            ));
+        }
+        Ok(())
     }
 }

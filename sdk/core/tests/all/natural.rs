@@ -238,9 +238,9 @@ fn steps_bring_the_light_to_that_of_the_world_and_go_on_in_video() {
         for _ in 0..frames {
             let out = LevelsMut::Bytes(&mut levels);
             let report = pipeline.process_after(past, &frame, out, &mut scratch).unwrap();
-            past = Some(phasefront_core::encode::brightness::Past {
+            past = Some(phasefront_core::frame::Past {
                 scale: report.scale,
-                share: 0.0,
+                elapsed: std::time::Duration::ZERO,
             });
         }
         error(&levels, past.unwrap().scale, &frame, &display)

@@ -5,7 +5,8 @@ use super::shared::Shared;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
 use crate::device::{Device, Dispatch};
-use phasefront_core::encode::brightness::{Brightness, Past};
+use phasefront_core::encode::brightness::Brightness;
+use phasefront_core::frame::Past;
 
 /// Encodes one field into several output buffers by double phase.
 pub(super) struct DoublePhase {

@@ -7,8 +7,8 @@ use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
 use crate::device::{Device, Dispatch};
 use phasefront_core::Size;
-use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::local::LocalFilter;
+use phasefront_core::frame::Past;
 
 /// The side of the square of pixels that a workgroup corrects.
 const SIDE: usize = 16;

@@ -8,8 +8,8 @@ use crate::device::{Constants, Device, Dispatch};
 use crate::fft::{Convolution, Planes};
 use num_complex::Complex32;
 use phasefront_core::Size;
-use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::midpoint::{GAIN, MidpointSteps, STILL, WAVE};
+use phasefront_core::frame::Past;
 
 /// The midpoint steps of one field into several output buffers.
 pub(super) struct Midpoint {
@@ -148,7 +148,8 @@ mod tests {
     use phasefront_core::display::response::Response;
     use phasefront_core::display::target::Target;
     use phasefront_core::encode::EncoderOptions;
-    use phasefront_core::encode::brightness::{Brightness, Past};
+    use phasefront_core::encode::brightness::Brightness;
+    use phasefront_core::frame::Past;
     use phasefront_core::optics::zernike::Aberration;
     use phasefront_core::pipeline::display_plan::DisplayPlan;
 
@@ -199,7 +200,10 @@ mod tests {
                 .unwrap();
             let twin = DisplayPlan::new(size, &target, &options).unwrap();
             let mut scratch = twin.scratch();
-            let past = Past { scale: 1.2, share: 1.0 };
+            let past = Past {
+                scale: 1.2,
+                elapsed: std::time::Duration::from_secs(1),
+            };
             // A single frame, and a frame that follows another and is partly static.
             for past in [None, Some(past)] {
                 if past.is_some() {

@@ -2,8 +2,8 @@
 
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::DepthStream;
+use phasefront_core::frame::Past;
 use phasefront_core::frame::RgbdFrame;
-use std::time::Duration;
 
 /// A frame that is ready to become a hologram.
 pub(in crate::session) struct FrameInput<'a> {
@@ -14,8 +14,8 @@ pub(in crate::session) struct FrameInput<'a> {
     pub(in crate::session) frame: &'a mut RgbdFrame,
     /// The stream that read the depth, if the depth of pixels is undecided: a GPU decides it.
     pub(in crate::session) undecided: Option<&'a mut DepthStream>,
-    /// The time since the previous frame; `None` if the past does not count.
-    pub(in crate::session) elapsed: Option<Duration>,
+    /// The past, if the frame follows another.
+    pub(in crate::session) past: Option<Past>,
 }
 
 impl FrameInput<'_> {

@@ -1,19 +1,16 @@
 //! Computes a quality level on the CPU, from amplitudes and depth to levels.
 
-use crate::session::SessionOptions;
+use crate::session::options::SessionOptions;
 use crate::session::quality::QualityLevel;
 use crate::session::statistics::BackendReport;
-use phasefront_core::display::levels::LevelsMut;
-use phasefront_core::encode::brightness::Past;
-use phasefront_core::frame::RgbdFrame;
-use phasefront_core::pipeline::{FrameReport, Pipeline, PipelineScratch};
+use phasefront_core::pipeline::{Pipeline, PipelineScratch};
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 
 /// The plan and memory of a quality level on the CPU.
 pub(in crate::session) struct OnCpu {
-    pipeline: Pipeline,
-    scratch: PipelineScratch,
+    pub(super) pipeline: Pipeline,
+    pub(super) scratch: PipelineScratch,
 }
 
 impl OnCpu {
@@ -38,7 +35,12 @@ impl OnCpu {
 
     fn plan(options: &SessionOptions, quality_level: &QualityLevel) -> Result<Pipeline> {
         let QualityLevel { size, method, .. } = quality_level;
-        Pipeline::new(*size, method.clone(), &options.target, quality_level.encoder(options))
+        Pipeline::new(
+            *size,
+            method.clone(),
+            &options.target,
+            quality_level.encoder(&options.encoder),
+        )
     }
 
     pub(in crate::session) fn report(&self) -> BackendReport {
@@ -55,20 +57,5 @@ impl OnCpu {
             name: name.unwrap_or_default().into(),
             why: why.join("; "),
         }
-    }
-
-    /// Computes the levels of `frame`, which follows another frame if there is a `past`.
-    pub(in crate::session) fn process(
-        &mut self,
-        past: Option<Past>,
-        frame: &RgbdFrame,
-        levels: LevelsMut<'_>,
-    ) -> Result<FrameReport> {
-        self.pipeline.process_after(past, frame, levels, &mut self.scratch)
-    }
-
-    /// Updates the state as [`Self::process`] does, without computing the levels of `frame`.
-    pub(in crate::session) fn skip(&mut self, past: Option<Past>, frame: &RgbdFrame) -> Result<()> {
-        self.pipeline.skip(past, frame, &mut self.scratch)
     }
 }

@@ -1,31 +1,19 @@
 //! Computes a quality level on the GPU, from the camera's colour and conditioned readings of depth to levels.
 
-use crate::session::SessionOptions;
-use crate::session::engine::brightness::BrightnessTracker;
 use crate::session::engine::frame_input::FrameInput;
+use crate::session::options::SessionOptions;
 use crate::session::quality::QualityLevel;
 use crate::session::statistics::BackendReport;
 use phasefront_core::display::Display;
-use phasefront_core::encode::brightness::Past;
 use phasefront_core::frame::LightConstants;
 use phasefront_core::pipeline::{FrameReport, FrameTimes};
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
 use phasefront_gpu::{
-    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Frame, GpuError, GpuLevels,
-    GpuReport, InFlight, Job, Renderer,
+    Colour, ColourData, Deliver, Depth, DepthData, Device, Frame, GpuError, GpuLevels, GpuReport, InFlight, Job,
+    Renderer,
 };
 use std::sync::Arc;
-
-/// The options of a session for its GPU.
-#[derive(Debug, Clone, Default)]
-pub struct GpuOptions {
-    /// The choice of the device, and programs that an earlier run compiled for it.
-    pub device: DeviceOptions,
-    /// The options for networks. By default f32 networks run in 16 bits if the GPU supports it.
-    #[doc(hidden)]
-    pub chain: ChainOptions,
-}
 
 /// The reason why a frame produced no result.
 #[derive(Debug)]
@@ -63,7 +51,7 @@ impl OnGpu {
         }
         let size = quality_level.size;
         let job = Job {
-            encoder: quality_level.encoder(options).clone(),
+            encoder: quality_level.encoder(&options.encoder).clone(),
             chain: options.gpu.chain,
             ..Job::new(size, quality_level.method.clone(), options.target.clone())
         };
@@ -107,39 +95,31 @@ impl OnGpu {
     pub(in crate::session) async fn process(
         &mut self,
         input: &FrameInput<'_>,
-        brightness: &mut BrightnessTracker,
         levels: &mut [u8],
         stay: bool,
     ) -> Result<(FrameReport, Option<GpuLevels>), Failure> {
         let stage = stage!("gpu");
         let deliver = if stay { Deliver::Shown } else { Deliver::Levels };
-        let frame = self.submit(input, brightness, deliver).await?;
+        let frame = self.submit(input, deliver).await?;
         let made = match deliver {
             Deliver::Levels => self.0.collect(frame, levels).await.map(|report| (report, None)),
             Deliver::Shown => self.0.keep(frame).await.map(|(report, kept)| (report, Some(kept))),
         };
         let (report, kept) = made.map_err(Failure::of_flight)?;
-        brightness.set_scale(report.scale);
         Ok((frame_report(report, stage), kept))
     }
 
-    async fn submit(
-        &mut self,
-        input: &FrameInput<'_>,
-        brightness: &BrightnessTracker,
-        deliver: Deliver,
-    ) -> Result<InFlight, Failure> {
+    async fn submit(&mut self, input: &FrameInput<'_>, deliver: Deliver) -> Result<InFlight, Failure> {
         let (colour, depth, frame) = self.frame(input);
         self.0.expect(colour, depth).await?;
-        let past = brightness.past(input.elapsed);
-        Ok(self.0.submit(past, &frame, deliver).await?)
+        Ok(self.0.submit(input.past, &frame, deliver).await?)
     }
 
     /// Reads a frame without computing its levels, so that the next one has its past.
-    pub(in crate::session) async fn read(&mut self, input: &FrameInput<'_>, past: Option<Past>) -> Result<(), Failure> {
+    pub(in crate::session) async fn read(&mut self, input: &FrameInput<'_>) -> Result<(), Failure> {
         let (colour, depth, frame) = self.frame(input);
         self.0.expect(colour, depth).await?;
-        Ok(self.0.read(past, &frame).await?)
+        Ok(self.0.read(input.past, &frame).await?)
     }
 
     /// Returns the formats of a frame, and the frame. The camera's colour is read directly.
@@ -206,6 +186,7 @@ mod tests {
     use super::*;
     use crate::session::threads::block_on;
     use ndarray::{Array2, Array3};
+    use phasefront_core::frame::Past;
     use phasefront_core::frame::RgbdFrame;
     use phasefront_core::method::Method;
     use phasefront_core::method::network::Network;
@@ -222,18 +203,18 @@ mod tests {
         let mut gpu = opened(block_on(OnGpu::new(&options, &options.quality_levels[0], None)));
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
         let mut frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
-        let mut brightness = BrightnessTracker::default();
         let mut first = vec![0; 3 * 21 * 34];
         let mut input = FrameInput {
             camera: None,
             frame: &mut frame,
             undecided: None,
-            elapsed: None,
+            past: None,
         };
-        let made = block_on(gpu.process(&input, &mut brightness, &mut first, false));
+        let made = block_on(gpu.process(&input, &mut first, false));
         let scale = made.unwrap().0.scale;
-        input.elapsed = Some(Duration::from_millis(33));
-        let flying = block_on(gpu.submit(&input, &brightness, Deliver::Levels)).unwrap();
+        let elapsed = Duration::from_millis(33);
+        input.past = Some(Past { scale, elapsed });
+        let flying = block_on(gpu.submit(&input, Deliver::Levels)).unwrap();
         let before = gpu.openings();
         gpu.device().unwrap().wgpu().0.destroy();
         let mut levels = vec![0; first.len()];
@@ -244,7 +225,7 @@ mod tests {
             lost.err()
         );
         assert_eq!(gpu.report().name, "no GPU at this moment");
-        let made = block_on(gpu.process(&input, &mut brightness, &mut levels, false));
+        let made = block_on(gpu.process(&input, &mut levels, false));
         // The scene is the same, so its scale and levels are too.
         assert!((made.unwrap().0.scale - scale).abs() < 1e-6);
         assert_eq!(levels, first);
