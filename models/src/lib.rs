@@ -157,11 +157,10 @@ pub fn default_method(display: &Display) -> Method {
     }
 }
 
-/// Returns the method of natural focus for `display`: [`NATURAL`] in int8, or `None` if it was not trained for that
+/// Returns the network of natural focus for `display` ([`NATURAL`] in int8), or `None` if it was not trained for that
 /// display.
-pub fn natural_method(display: &Display) -> Option<Method> {
-    let network = NATURAL.network(Precision::Int8)?;
-    network.check_display(display).is_ok().then(|| Method::trained(network))
+pub fn natural_network(display: &Display) -> Option<Arc<Network>> {
+    (NATURAL.network(Precision::Int8)).filter(|network| network.check_display(display).is_ok())
 }
 
 #[cfg(test)]
@@ -196,7 +195,7 @@ mod tests {
             let display = Display::from_toml(display).unwrap();
             assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
             assert_eq!(default_network(&display).is_some(), trained);
-            assert_eq!(natural_method(&display).is_some(), trained);
+            assert_eq!(natural_network(&display).is_some(), trained);
             let method = default_method(&display);
             assert_eq!(matches!(method, Method::Auto(..)), trained, "{method:?}");
             assert_eq!(matches!(method, Method::Sweep(_)), !trained, "{method:?}");

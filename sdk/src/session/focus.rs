@@ -55,16 +55,21 @@ impl Focus {
         }
     }
 
-    /// Returns the default method for `display`: that of [`phasefront_models::default_method`], and for natural focus
-    /// without steps that of [`phasefront_models::natural_method`].
+    /// Returns the default method for `display`: for natural focus the bundled network that was trained for it, with
+    /// steps or without, and else that of [`phasefront_models::default_method`].
     ///
     /// # Errors
     /// Returns an error for natural focus without steps if the bundled network was not trained for `display`.
     #[cfg(feature = "models")]
     pub fn default_method(self, display: &Display) -> Result<Method> {
-        match self {
-            Focus::Natural { steps: 0 } => phasefront_models::natural_method(display).ok_or_else(no_network),
-            _ => Ok(phasefront_models::default_method(display)),
+        let natural = match self {
+            Focus::Coherent => None,
+            Focus::Natural { .. } => phasefront_models::natural_network(display),
+        };
+        match (natural, self) {
+            (Some(network), _) => Ok(Method::trained(network)),
+            (None, Focus::Natural { steps: 0 }) => Err(no_network()),
+            (None, _) => Ok(phasefront_models::default_method(display)),
         }
     }
 

@@ -39,9 +39,9 @@ const SPACING_PX: f64 = 3.0;
 /// The least and the largest number of planes P, spread evenly over [`SPAN`] of the volume.
 const PLANES: [f64; 2] = [3.0, 15.0];
 /// How much more a pixel counts in focus than far out of focus.
-pub const IN_FOCUS: f64 = 6.0;
+pub const IN_FOCUS: f64 = 1.5;
 /// The blur, in pixels, over which that falls to 1/e.
-pub const FOCUS_PX: f64 = 1.5;
+pub const FOCUS_PX: f64 = 3.0;
 /// μ, the share of the last step that a step continues.
 pub const MOMENTUM: f32 = 0.8;
 /// γ of one map. Several maps share the light, and half of it is stable.

@@ -2,7 +2,6 @@
 
 use crate::flags::encoder::{Encoder, EncoderFlags};
 use clap::ValueEnum;
-use phasefront::session::Focus;
 use phasefront::{Display, Method, Sweep};
 use phasefront_command::flags::{PrecisionName, check_used};
 use phasefront_command::networks;
@@ -72,8 +71,7 @@ impl CoreMethod {
                 (Method::trained(network), encoder)
             }
             CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
-            CoreMethod::Auto if network.is_none() && focus == (Focus::Natural { steps: 0 }) => {
-                focus.default_method(display)?;
+            CoreMethod::Auto if network.is_none() && matches!(focus.default_method(display)?, Method::Seeded(_)) => {
                 let network = networks::network(NATURAL.name, precision)?;
                 (Method::trained(network), encoder.read()?)
             }
