@@ -39,7 +39,7 @@ const SPACING_PX: f64 = 3.0;
 /// The least and the largest number of planes P, spread evenly over [`SPAN`] of the volume.
 const PLANES: [f64; 2] = [3.0, 15.0];
 /// How much more a pixel counts in focus than far out of focus.
-pub const IN_FOCUS: f64 = 1.5;
+pub const IN_FOCUS: f64 = 2.0;
 /// The blur, in pixels, over which that falls to 1/e.
 pub const FOCUS_PX: f64 = 3.0;
 /// μ, the share of the last step that a step continues.
