@@ -15,6 +15,7 @@ public let kCVPixelFormatType_DisparityFloat32: OSType = 0x6664_6973
 public let kCVPixelFormatType_DisparityFloat16: OSType = 0x6864_6973
 public let kCVImageBufferYCbCrMatrixKey: CFString = "CVImageBufferYCbCrMatrix"
 public let kCVImageBufferYCbCrMatrix_ITU_R_709_2: CFString = "ITU_R_709_2"
+public let kCVImageBufferYCbCrMatrix_ITU_R_2020: CFString = "ITU_R_2020"
 public let kCVImageBufferColorPrimariesKey: CFString = "CVImageBufferColorPrimaries"
 public let kCVImageBufferColorPrimaries_P3_D65: CFString = "P3_D65"
 public let kCVImageBufferColorPrimaries_ITU_R_2020: CFString = "ITU_R_2020"

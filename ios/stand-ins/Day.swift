@@ -58,6 +58,14 @@ private func colours() async throws {
         let found = try withColourImage(buffer) { $0.encoding }
         if found != right { fail("\(primaries ?? "none"), \(transfer ?? "none"): \(found)") }
     }
+    for (name, right) in [(nil, .bt601), ("ITU_R_601_4", .bt601), ("ITU_R_709_2", .bt709), ("ITU_R_2020", .bt2020)]
+        as [(String?, YuvMatrix)]
+    {
+        let buffer = CVBuffer(kCVPixelFormatType_420YpCbCr8BiPlanarFullRange, width: 64, height: 48)
+        buffer.attachments[kCVImageBufferYCbCrMatrixKey] = name
+        let found = try withColourImage(buffer) { $0.matrix }
+        if found != right { fail("matrix \(name ?? "none"): \(found)") }
+    }
 }
 
 private func fail(_ why: String) -> Never {

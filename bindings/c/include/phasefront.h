@@ -107,6 +107,8 @@ typedef enum PfYuvMatrix {
   PF_YUV_MATRIX_BT601 = 0,
   // ITU-R BT.709, for high definition.
   PF_YUV_MATRIX_BT709 = 1,
+  // ITU-R BT.2020 with non-constant luminance, for films of high dynamic range.
+  PF_YUV_MATRIX_BT2020 = 2,
 } PfYuvMatrix;
 
 // The meaning of a picture's red, green and blue.

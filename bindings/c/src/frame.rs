@@ -39,9 +39,11 @@ pub enum PfYuvMatrix {
     Bt601 = 0,
     /// ITU-R BT.709, for high definition.
     Bt709 = 1,
+    /// ITU-R BT.2020 with non-constant luminance, for films of high dynamic range.
+    Bt2020 = 2,
 }
 
-const YUV_MATRICES: [YuvMatrix; 2] = [YuvMatrix::Bt601, YuvMatrix::Bt709];
+const YUV_MATRICES: [YuvMatrix; 3] = [YuvMatrix::Bt601, YuvMatrix::Bt709, YuvMatrix::Bt2020];
 
 /// The meaning of a picture's red, green and blue.
 #[repr(C)]
@@ -432,7 +434,7 @@ mod tests {
             &RGB_ENCODINGS.each_ref().map(|e| e as _),
         );
         same(
-            &[&PfYuvMatrix::Bt601, &PfYuvMatrix::Bt709],
+            &[&PfYuvMatrix::Bt601, &PfYuvMatrix::Bt709, &PfYuvMatrix::Bt2020],
             &YUV_MATRICES.each_ref().map(|m| m as _),
         );
         same(

@@ -24,9 +24,11 @@ class YuvMatrix(enum.Enum):
     Values:
         BT601: ITU-R BT.601, for standard definition, JPEG and most Android cameras.
         BT709: ITU-R BT.709, for high definition.
+        BT2020: ITU-R BT.2020 with non-constant luminance, for films of high dynamic range.
     """
     BT601 = 0
     BT709 = 1
+    BT2020 = 2
 
 class RgbEncoding(enum.Enum):
     """The meaning of a picture's red, green and blue.

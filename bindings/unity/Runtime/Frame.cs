@@ -26,6 +26,8 @@ namespace Phasefront
         Bt601 = 0,
         /// <summary>High definition.</summary>
         Bt709 = 1,
+        /// <summary>Films of high dynamic range, with non-constant luminance.</summary>
+        Bt2020 = 2,
     }
 
     /// <summary>The meaning of a picture's red, green and blue.</summary>

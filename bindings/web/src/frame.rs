@@ -59,21 +59,26 @@ fn unknown(what: &str, name: &str, known: &str) -> JsValue {
 
 #[wasm_bindgen]
 impl RawFrame {
-    /// Creates a frame with a colour image of `format`, whose planes are added afterwards. `bt709` and `video_range`
-    /// define the encoding of luma and chroma.
+    /// Creates a frame with a colour image of `format`, whose planes are added afterwards. `matrix` (by
+    /// WebCodecs' names) and `video_range` define the encoding of luma and chroma.
     ///
     /// # Errors
-    /// Throws an error of kind `frame` if the format is unknown.
+    /// Throws an error of kind `frame` if the format or the matrix is unknown.
     #[wasm_bindgen(constructor)]
     pub fn new(
         timestamp_ns: u64,
         format: &str,
         width: u32,
         height: u32,
-        bt709: bool,
+        matrix: &str,
         video_range: bool,
     ) -> Answer<RawFrame> {
-        let matrix = if bt709 { YuvMatrix::Bt709 } else { YuvMatrix::Bt601 };
+        let matrix = match matrix {
+            "smpte170m" | "bt470bg" => YuvMatrix::Bt601,
+            "bt709" => YuvMatrix::Bt709,
+            "bt2020-ncl" => YuvMatrix::Bt2020,
+            other => return Err(unknown("matrix", other, "smpte170m, bt470bg, bt709, bt2020-ncl")),
+        };
         let yuv = YuvEncoding { matrix, video_range };
         let colour_format = match format {
             "RGBA" | "RGBX" => ColourFormat::Rgba,

@@ -25,6 +25,11 @@ const PLANES = {
     [0.5, 0.5],
     [0.5, 0.5],
   ],
+  I422: [
+    [1, 1],
+    [0.5, 1],
+    [0.5, 1],
+  ],
 };
 
 /** Returns a video frame and its planes. Alpha is full. */
@@ -67,6 +72,7 @@ export async function run() {
   const spaces = [
     { matrix: "smpte170m", fullRange: false },
     { matrix: "bt709", fullRange: true },
+    { matrix: "bt2020-ncl", fullRange: false },
   ];
   const yuv = ["NV12", "I420"].flatMap((format) => spaces.map((colorSpace) => [format, colorSpace]));
   const seen = new Set();
@@ -82,7 +88,7 @@ export async function run() {
     video.close();
   }
   // The formats without alpha have the pixels of the others.
-  if (seen.size !== 6) throw new Error(`${seen.size} different pictures`);
+  if (seen.size !== 8) throw new Error(`${seen.size} different pictures`);
 
   // A video frame says what its colours mean.
   for (const [encoding, primaries, transfer] of [
@@ -134,7 +140,7 @@ export async function run() {
   remote.close();
 
   // What the module does not know, the browser converts.
-  const other = picture("I420", { colorSpace: { matrix: "bt2020-ncl", primaries: "bt2020", transfer: "bt709" } }).video;
+  const other = picture("I422", { colorSpace: { matrix: "bt2020-ncl", primaries: "bt2020", transfer: "bt709" } }).video;
   const [converted] = await levels(new Frame(other, DEPTH));
   if (converted.length !== 3 * WIDTH * HEIGHT) throw new Error("not converted");
 

@@ -23,8 +23,7 @@
             throw PhasefrontError.frame(
                 message: "frame: colour is \(fourCharacters(other)); BGRA, RGBA, 420f or 420v are needed")
         }
-        let matrix = CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String
-        let encoding = encoding(of: buffer)
+        let (matrix, encoding) = (matrix(of: buffer), encoding(of: buffer))
         return try withLocked(buffer) {
             let planes =
                 switch format {
@@ -35,8 +34,7 @@
                 ColourImage(
                     format: format, width: CVPixelBufferGetWidth(buffer), height: CVPixelBufferGetHeight(buffer),
                     planes: planes,
-                    matrix: matrix == kCVImageBufferYCbCrMatrix_ITU_R_709_2 as String ? .bt709 : .bt601,
-                    videoRange: isVideoRange, encoding: encoding))
+                    matrix: matrix, videoRange: isVideoRange, encoding: encoding))
         }
     }
 
@@ -76,6 +74,15 @@
         /// The time in nanoseconds, for ``CameraFrame/timestampNs``.
         public var phasefrontTimestampNs: Int64 {
             CMTimeConvertScale(self, timescale: 1_000_000_000, method: .roundTowardZero).value
+        }
+    }
+
+    /// Returns the matrix of a buffer's luma and chroma by its attachments.
+    private func matrix(of buffer: CVPixelBuffer) -> YuvMatrix {
+        switch CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String {
+        case kCVImageBufferYCbCrMatrix_ITU_R_709_2 as String: .bt709
+        case kCVImageBufferYCbCrMatrix_ITU_R_2020 as String: .bt2020
+        default: .bt601
         }
     }
 

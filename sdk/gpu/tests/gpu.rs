@@ -457,7 +457,7 @@ impl Sensor {
         };
         let (half_h, half_w) = (h.div_ceil(2), w.div_ceil(2));
         let video = YuvEncoding {
-            matrix: YuvMatrix::Bt709,
+            matrix: YuvMatrix::Bt2020,
             video_range: true,
         };
         let full = YuvEncoding::default();

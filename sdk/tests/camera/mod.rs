@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Returns every colour format.
 pub(crate) fn colour_formats() -> Vec<ColourFormat> {
     let mut formats = vec![ColourFormat::Rgba, ColourFormat::Bgra, ColourFormat::Rgb];
-    for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
+    for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709, YuvMatrix::Bt2020] {
         for video_range in [false, true] {
             let encoding = YuvEncoding { matrix, video_range };
             formats.extend([ColourFormat::Nv12(encoding), ColourFormat::Yuv420(encoding)]);

@@ -50,7 +50,8 @@ export interface PlanarColour {
   /** The planes in the order of the format. */
   readonly planes: readonly Plane[];
   /**
-   * The matrix that converts luma and chroma to colour, `smpte170m` by default (that of BT.601, as `bt470bg`), or `bt709`;
+   * The matrix that converts luma and chroma to colour, `smpte170m` by default (that of BT.601, as `bt470bg`),
+   * `bt709` or `bt2020-ncl`;
    * whether luma ranges from 0 to 255, as by default, or from 16 to 235; and the primaries and the transfer of red, green
    * and blue, sRGB's by default.
    */

@@ -14,8 +14,8 @@ import { RawFrame } from "./raw/phasefront_web.js";
 
 /** The bytes of a pixel in each plane. */
 const COLOUR_BYTES = { RGBA: [4], RGBX: [4], BGRA: [4], BGRX: [4], RGB: [3], NV12: [1, 2], I420: [1, 1, 1] } as const;
-/** The matrices of luma and chroma, and whether each is that of BT.709. */
-const MATRICES: Record<string, boolean> = { bt709: true, smpte170m: false, bt470bg: false };
+/** The matrices of luma and chroma that the module knows. */
+const MATRICES: readonly string[] = ["smpte170m", "bt470bg", "bt709", "bt2020-ncl"];
 const CONFIDENCE_BYTES = 1;
 
 function depthBytes(format: DepthFormat): number {
@@ -86,7 +86,7 @@ async function ofVideoFrame(frame: VideoFrame): Promise<PackedColour | PlanarCol
   const { width, height } = frame.visibleRect;
   const [matrix, fullRange] = [frame.colorSpace.matrix ?? "bt709", frame.colorSpace.fullRange ?? false];
   const packed = frame.format !== null && /^(RGB|BGR)/.test(frame.format);
-  const known = frame.format !== null && frame.format in COLOUR_BYTES && (packed || matrix in MATRICES);
+  const known = frame.format !== null && frame.format in COLOUR_BYTES && (packed || MATRICES.includes(matrix));
   const convert = known ? {} : ({ format: "RGBA", colorSpace: "srgb" } as const);
   const data = new Uint8Array(frame.allocationSize(convert));
   const layout = await frame.copyTo(data, convert).catch((error: Error) => {
@@ -109,14 +109,8 @@ function rawFrameOf(colour: PackedColour | PlanarColour, depth: DepthImage, opti
   const [width, height] = size("colour", colour);
   const space = colour.colorSpace;
   const { matrix, fullRange } = ("planes" in colour && colour.colorSpace) || {};
-  const bt709 = MATRICES[matrix ?? "smpte170m"];
-  if (bt709 === undefined)
-    throw new PhasefrontError(
-      "frame",
-      `frame: there is no matrix '${matrix}'; there are ${Object.keys(MATRICES).join(", ")}`,
-    );
   const ns = nanoseconds(options.timestamp ?? 0);
-  const raw = guard(() => new RawFrame(ns, format, width, height, bt709, fullRange === false));
+  const raw = guard(() => new RawFrame(ns, format, width, height, matrix ?? "smpte170m", fullRange === false));
   try {
     planes.forEach((plane, index) => {
       const across = index === 0 ? width : Math.ceil(width / 2);

@@ -8054,6 +8054,10 @@ public enum YuvMatrix: Equatable, Hashable {
      * ITU-R BT.709, for high definition.
      */
     case bt709
+    /**
+     * ITU-R BT.2020 with non-constant luminance, for films of high dynamic range.
+     */
+    case bt2020
 
 
 
@@ -8079,6 +8083,8 @@ public struct FfiConverterTypeYuvMatrix: FfiConverterRustBuffer {
         
         case 2: return .bt709
         
+        case 3: return .bt2020
+        
         default: throw UniffiInternalError.unexpectedEnumCase
         }
     }
@@ -8093,6 +8099,10 @@ public struct FfiConverterTypeYuvMatrix: FfiConverterRustBuffer {
         
         case .bt709:
             writeInt(&buf, Int32(2))
+        
+        
+        case .bt2020:
+            writeInt(&buf, Int32(3))
         
         }
     }

@@ -19,6 +19,8 @@ pub enum YuvMatrix {
     Bt601,
     /// ITU-R BT.709, for high definition.
     Bt709,
+    /// ITU-R BT.2020 with non-constant luminance, for films of high dynamic range.
+    Bt2020,
 }
 
 /// The encoding of luma and chroma.

@@ -320,6 +320,7 @@ pub fn yuv_constants(encoding: YuvEncoding) -> ([f32; 4], [f32; 4]) {
     let (kr, kb) = match encoding.matrix {
         YuvMatrix::Bt601 => (0.299f32, 0.114f32),
         YuvMatrix::Bt709 => (0.2126, 0.0722),
+        YuvMatrix::Bt2020 => (0.2627, 0.0593),
     };
     let kg = 1.0 - kr - kb;
     let levels = if encoding.video_range {

@@ -88,12 +88,13 @@ fn turn(orientation: Orientation, x: f64, y: f64) -> (f64, f64) {
     (if orientation.mirrored { 1.0 - x } else { x }, y)
 }
 
-/// Converts ITU-R BT.601 or BT.709 to colour by solving Y = Kr·R + Kg·G + Kb·B, U = (B − Y)/(2 − 2Kb), V = (R − Y)/(2 −
+/// Converts luma and chroma to colour by solving Y = Kr·R + Kg·G + Kb·B, U = (B − Y)/(2 − 2Kb), V = (R − Y)/(2 −
 /// 2Kr).
 fn rgb_of_yuv([y, u, v]: [f64; 3], encoding: YuvEncoding) -> [f64; 3] {
     let (kr, kb) = match encoding.matrix {
         YuvMatrix::Bt601 => (0.299, 0.114),
         YuvMatrix::Bt709 => (0.2126, 0.0722),
+        YuvMatrix::Bt2020 => (0.2627, 0.0593),
     };
     let (y, u, v) = if encoding.video_range {
         ((y - 16.0) / 219.0, (u - 128.0) / 224.0, (v - 128.0) / 224.0)

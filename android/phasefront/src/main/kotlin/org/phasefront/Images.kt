@@ -10,15 +10,15 @@ import android.os.Build
 import java.nio.ByteBuffer
 
 /**
- * Returns a camera image without a copy. Its format is YUV_420_888, as from Camera2 and ARCore. Its [encoding] is by
- * default what its `dataSpace` says, which is known since Android 13, else sRGB. Keep the [Image] open while the frame is
- * used.
+ * Returns a camera image without a copy. Its format is YUV_420_888, as from Camera2 and ARCore. Its [matrix],
+ * [videoRange] and [encoding] are by default what its `dataSpace` says, which is known since Android 13, else those of
+ * JPEG: BT.601, full range and sRGB. Keep the [Image] open while the frame is used.
  *
  * @throws PhasefrontException.Frame for any other format. The message names it.
  */
 public fun Image.toColourImage(
-    matrix: YuvMatrix = YuvMatrix.BT601,
-    videoRange: Boolean = false,
+    matrix: YuvMatrix = yuvMatrix(),
+    videoRange: Boolean = isVideoRange(),
     encoding: RgbEncoding = rgbEncoding(),
 ): ColourImage {
     if (format != ImageFormat.YUV_420_888) {
@@ -27,15 +27,27 @@ public fun Image.toColourImage(
     return ColourImage(ColourFormat.YUV420, width, height, planes.map { it.toPlane() }, matrix, videoRange, encoding)
 }
 
-/** Returns the meaning of the colours of an image of a camera or a decoder. */
-private fun Image.rgbEncoding(): RgbEncoding {
-    if (Build.VERSION.SDK_INT < Build.VERSION_CODES.TIRAMISU) return RgbEncoding.SRGB
-    // An open image of ARCore says that it is closed: https://github.com/google-ar/arcore-android-sdk/issues/1578
-    val space = try {
+/** Returns the `dataSpace` of an image of a camera or a decoder, or `null` where it is not known. */
+private fun Image.knownDataSpace(): Int? {
+    if (Build.VERSION.SDK_INT < Build.VERSION_CODES.TIRAMISU) return null
+    return try {
         dataSpace
     } catch (_: IllegalStateException) {
-        return RgbEncoding.SRGB
+        null // An open image of ARCore says that it is closed: https://github.com/google-ar/arcore-android-sdk/issues/1578
     }
+}
+
+private fun Image.yuvMatrix(): YuvMatrix = when (knownDataSpace()?.let(DataSpace::getStandard)) {
+    DataSpace.STANDARD_BT709 -> YuvMatrix.BT709
+    DataSpace.STANDARD_BT2020 -> YuvMatrix.BT2020
+    else -> YuvMatrix.BT601
+}
+
+private fun Image.isVideoRange(): Boolean = knownDataSpace()?.let(DataSpace::getRange) == DataSpace.RANGE_LIMITED
+
+/** Returns the meaning of the colours of an image of a camera or a decoder. */
+private fun Image.rgbEncoding(): RgbEncoding {
+    val space = knownDataSpace() ?: return RgbEncoding.SRGB
     return when (DataSpace.getStandard(space)) {
         DataSpace.STANDARD_DCI_P3 -> RgbEncoding.DISPLAY_P3
         DataSpace.STANDARD_BT2020, DataSpace.STANDARD_BT2020_CONSTANT_LUMINANCE -> when (DataSpace.getTransfer(space)) {

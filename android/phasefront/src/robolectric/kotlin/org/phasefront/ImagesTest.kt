@@ -116,6 +116,18 @@ class ImagesTest {
         )) {
             assertEquals(encoding, colour().also { it.space = space }.toColourImage().encoding, "$space")
         }
+        for ((standard, matrix) in listOf(
+            DataSpace.STANDARD_BT601_625 to YuvMatrix.BT601,
+            DataSpace.STANDARD_BT709 to YuvMatrix.BT709,
+            DataSpace.STANDARD_BT2020 to YuvMatrix.BT2020,
+        )) {
+            for ((of, isVideo) in listOf(DataSpace.RANGE_FULL to false, range to true)) {
+                val space = DataSpace.pack(standard, DataSpace.TRANSFER_SMPTE_170M, of)
+                val image = colour().also { it.space = space }.toColourImage()
+                assertEquals(matrix to isVideo, image.matrix to image.videoRange, "$space")
+            }
+        }
+        assertEquals(YuvMatrix.BT601 to false, colour().toColourImage().run { matrix to videoRange })
         assertEquals(RgbEncoding.AMPLITUDE, colour().toColourImage(encoding = RgbEncoding.AMPLITUDE).encoding)
     }
 
