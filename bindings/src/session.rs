@@ -5,9 +5,8 @@ use crate::frame::{FrameInfo, FrameMemory};
 use crate::hologram::RawHologram;
 use crate::options::{Quality, RunningMode, SessionOptions};
 use crate::statistics::Statistics;
-use phasefront::session::{self, Event, SessionHandle, Thermal};
+use phasefront::session::{self, AnsweringSession, Event, SessionHandle, Thermal};
 use phasefront::{ImageSession, LiveSession, VideoSession};
-use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -97,7 +96,9 @@ pub trait SessionListener: Send + Sync {
 /// A session. All its methods can be called from any thread at any time.
 #[derive(uniffi::Object)]
 pub struct RawSession {
-    core: Core,
+    /// Controls the session in any running mode.
+    handle: SessionHandle,
+    entrance: Entrance,
     closed: AtomicBool,
     listener_failures: Arc<AtomicU64>,
 }
@@ -118,9 +119,9 @@ impl RawSession {
         guard(|| {
             let listener_failures = Arc::new(AtomicU64::new(0));
             let options = session::SessionOptions::try_from(&options)?;
-            let core = match (mode, listener) {
-                (RunningMode::Image, None) => Core::Image(ImageSession::new(options)?),
-                (RunningMode::Video, None) => Core::Video(VideoSession::new(options)?),
+            let entrance = match (mode, listener) {
+                (RunningMode::Image, None) => Entrance::Process(ImageSession::new(options)?.into()),
+                (RunningMode::Video, None) => Entrance::Process(VideoSession::new(options)?.into()),
                 (RunningMode::Live, Some(listener)) => {
                     let failures = listener_failures.clone();
                     let session = LiveSession::new(options, move |event| {
@@ -129,7 +130,7 @@ impl RawSession {
                             log::warn!("{error}");
                         }
                     })?;
-                    Core::Live(session)
+                    Entrance::Submit(session)
                 }
                 (RunningMode::Live, None) => {
                     return Err(PhasefrontError::Session(
@@ -142,10 +143,15 @@ impl RawSession {
                     ));
                 }
             };
-            let backend = core.statistics().backend;
+            let handle = match &entrance {
+                Entrance::Process(session) => session.handle().clone(),
+                Entrance::Submit(session) => session.handle().clone(),
+            };
+            let backend = handle.statistics().backend;
             log::info!("a session in mode {mode:?} on {}: {}", backend.name, backend.why);
             Ok(Arc::new(RawSession {
-                core,
+                handle,
+                entrance,
                 closed: AtomicBool::new(false),
                 listener_failures,
             }))
@@ -173,16 +179,13 @@ impl RawSession {
                 depth,
                 confidence,
             })?;
-            let hologram = match self.session()? {
-                Core::Image(session) => session.process(&frame),
-                Core::Video(session) => session.process(&frame),
-                Core::Live(_) => {
-                    return Err(PhasefrontError::Session(
-                        "session: it is live, so frames are submitted; process is for image and video sessions".into(),
-                    ));
-                }
+            self.check_open()?;
+            let Entrance::Process(session) = &self.entrance else {
+                return Err(PhasefrontError::Session(
+                    "session: it is live, so frames are submitted; process is for image and video sessions".into(),
+                ));
             };
-            Ok(RawHologram::new(hologram?))
+            Ok(RawHologram::new(session.process(&frame)?))
         })
     }
 
@@ -207,7 +210,8 @@ impl RawSession {
                 depth,
                 confidence,
             })?;
-            let Core::Live(session) = self.session()? else {
+            self.check_open()?;
+            let Entrance::Submit(session) = &self.entrance else {
                 return Err(PhasefrontError::Session(
                     "session: it is not live; process frames, or make a live session".into(),
                 ));
@@ -218,13 +222,13 @@ impl RawSession {
 
     /// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as later ones.
     pub fn warm_up(&self) -> Result<(), PhasefrontError> {
-        guard(|| Ok(self.session()?.warm_up()?))
+        guard(|| Ok(self.controls()?.warm_up()?))
     }
 
     /// Forgets all previous frames, including one that is being processed. The next frame may have any timestamp.
     pub fn reset(&self) -> Result<(), PhasefrontError> {
         guard(|| {
-            self.session()?.reset();
+            self.controls()?.reset();
             Ok(())
         })
     }
@@ -232,7 +236,7 @@ impl RawSession {
     /// Accepts no frames until [`Self::resume`].
     pub fn pause(&self) -> Result<(), PhasefrontError> {
         guard(|| {
-            self.session()?.pause();
+            self.controls()?.pause();
             Ok(())
         })
     }
@@ -240,7 +244,7 @@ impl RawSession {
     /// Accepts frames again.
     pub fn resume(&self) -> Result<(), PhasefrontError> {
         guard(|| {
-            self.session()?.resume();
+            self.controls()?.resume();
             Ok(())
         })
     }
@@ -248,7 +252,7 @@ impl RawSession {
     /// Sets the thermal state of the device.
     pub fn set_thermal(&self, thermal: Thermal) -> Result<(), PhasefrontError> {
         guard(|| {
-            self.session()?.set_thermal(thermal);
+            self.controls()?.set_thermal(thermal);
             Ok(())
         })
     }
@@ -258,13 +262,13 @@ impl RawSession {
     /// # Errors
     /// Returns an error if the session does not have the quality level.
     pub fn set_quality(&self, quality: Quality) -> Result<(), PhasefrontError> {
-        guard(|| Ok(self.session()?.set_quality(quality.into())?))
+        guard(|| Ok(self.controls()?.set_quality(quality.into())?))
     }
 
     /// Returns the statistics of the session, also after it was closed. Never waits for a frame.
     pub fn statistics(&self) -> Statistics {
         let failures = self.listener_failures.load(Ordering::Relaxed);
-        Statistics::new(self.core.statistics(), failures)
+        Statistics::new(self.handle.statistics(), failures)
     }
 
     /// Closes the session: it accepts no more frames and frees its memory. When this returns, the listener has received
@@ -272,36 +276,30 @@ impl RawSession {
     /// listener while a session computes, does not wait for that. Closing twice does nothing.
     pub fn shut_down(&self) {
         self.closed.store(true, Ordering::Relaxed);
-        self.core.close();
+        self.handle.close();
     }
 }
 
 impl RawSession {
-    fn session(&self) -> Result<&Core, PhasefrontError> {
+    fn controls(&self) -> Result<&SessionHandle, PhasefrontError> {
+        self.check_open()?;
+        Ok(&self.handle)
+    }
+
+    fn check_open(&self) -> Result<(), PhasefrontError> {
         if self.closed.load(Ordering::Relaxed) {
             return Err(PhasefrontError::Session("session: it is closed; make a new one".into()));
         }
-        Ok(&self.core)
+        Ok(())
     }
 }
 
-/// A session of any running mode. The languages have one type for all three.
-enum Core {
-    Image(ImageSession),
-    Video(VideoSession),
-    Live(LiveSession),
-}
-
-impl Deref for Core {
-    type Target = SessionHandle;
-
-    fn deref(&self) -> &SessionHandle {
-        match self {
-            Core::Image(session) => session,
-            Core::Video(session) => session,
-            Core::Live(session) => session,
-        }
-    }
+/// The call by which frames enter a session.
+enum Entrance {
+    /// In an image or a video session.
+    Process(AnsweringSession),
+    /// In a live session.
+    Submit(LiveSession),
 }
 
 /// Reports `event` to `listener`.

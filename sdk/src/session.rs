@@ -2,8 +2,8 @@
 //!
 //! An [`ImageSession`] processes each frame independently. A [`VideoSession`] also returns a hologram for each frame,
 //! and smooths depth and brightness over time. A [`LiveSession`] takes frames without waiting: it processes one frame
-//! while the newest waits, and reports every result and every drop to its listener. [`SessionHandle`] has the functions
-//! that all three share.
+//! while the newest waits, and reports every result and every drop to its listener. All three have the controls of a
+//! [`SessionHandle`], a clone of which controls a session from anywhere.
 //!
 //! The state machine in `queue` decides which frame is next, without threads; `live` is its thread; `stages` processes
 //! a frame; `engine` chooses between CPU and GPU; `quality` chooses the quality level.
@@ -38,6 +38,7 @@ mod statistics;
 mod sync;
 mod threads;
 
+pub use answering::AnsweringSession;
 pub use drop_reason::DropReason;
 pub use event::Event;
 pub use focus::Focus;
@@ -52,9 +53,8 @@ pub use phasefront_gpu::DeviceOptions;
 pub use quality::{Backend, Quality, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, Statistics};
 
-use answering::Answering;
 use depth_estimates::DepthEstimates;
-use handle::Frames;
+use handle::{Frames, controls};
 use live::Live;
 use live_work::{LiveWork, tell};
 use owned_frame::OwnedFrame;
@@ -62,7 +62,6 @@ use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::runtime::error::{Error, Result};
 use shared::Shared;
 use std::fmt::{Debug, Formatter};
-use std::ops::Deref;
 use std::sync::Arc;
 use threads::block_on;
 
@@ -80,12 +79,12 @@ use threads::block_on;
 /// }
 /// ```
 #[derive(Debug)]
-pub struct ImageSession(Answering);
+pub struct ImageSession(AnsweringSession);
 
 /// Makes a hologram of each frame of a video and smooths depth and brightness over time. Timestamps must increase. The
 /// rules of [`ImageSession`] for threads and processes apply.
 #[derive(Debug)]
-pub struct VideoSession(Answering);
+pub struct VideoSession(AnsweringSession);
 
 /// Takes a camera's frames without waiting, and reports the outcome of each to its listener. Timestamps must increase.
 /// The rules of [`ImageSession`] for threads and processes apply.
@@ -126,7 +125,7 @@ impl ImageSession {
     /// # Errors
     /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
     pub fn new(options: SessionOptions) -> Result<Self> {
-        block_on(Answering::new(options, false)).map(ImageSession)
+        block_on(AnsweringSession::new(options, false)).map(ImageSession)
     }
 
     /// Creates a session as [`Self::new`] does, in a browser, whose GPU answers only while nothing blocks.
@@ -135,7 +134,7 @@ impl ImageSession {
     /// Returns an error in the same cases as [`Self::new`].
     #[cfg(target_arch = "wasm32")]
     pub async fn new_async(options: SessionOptions) -> Result<Self> {
-        Answering::new(options, false).await.map(ImageSession)
+        AnsweringSession::new(options, false).await.map(ImageSession)
     }
 
     /// Makes the hologram of `frame` as [`Self::process`] does, in a browser. One frame is computed at a time. With
@@ -165,7 +164,7 @@ impl VideoSession {
     /// # Errors
     /// Returns an error in the same cases as [`ImageSession::new`].
     pub fn new(options: SessionOptions) -> Result<Self> {
-        block_on(Answering::new(options, true)).map(VideoSession)
+        block_on(AnsweringSession::new(options, true)).map(VideoSession)
     }
 
     /// Creates a session as [`Self::new`] does, in a browser, whose GPU answers only while nothing blocks.
@@ -174,7 +173,7 @@ impl VideoSession {
     /// Returns an error in the same cases as [`Self::new`].
     #[cfg(target_arch = "wasm32")]
     pub async fn new_async(options: SessionOptions) -> Result<Self> {
-        Answering::new(options, true).await.map(VideoSession)
+        AnsweringSession::new(options, true).await.map(VideoSession)
     }
 
     /// Makes the hologram of `frame` as [`Self::process`] does, in a browser, as [`ImageSession::process_async`] does.
@@ -241,33 +240,26 @@ impl LiveSession {
     /// Returns an error if colour and depth do not match, if the frame is late, or if the session is closed or forked.
     /// The frames that follow are not affected.
     pub fn submit(&self, frame: &CameraFrame<'_>) -> Result<Option<DropReason>> {
-        self.shared.process.check()?;
+        self.handle.shared.process.check()?;
         frame.check()?;
         (self.live).submit(frame.timestamp_ns, |spare| OwnedFrame::copy(frame, spare))
     }
 }
 
-impl Deref for ImageSession {
-    type Target = SessionHandle;
+controls!(ImageSession, 0);
+controls!(VideoSession, 0);
+controls!(LiveSession);
+controls!(AnsweringSession);
 
-    fn deref(&self) -> &SessionHandle {
-        &self.0.handle
+impl From<ImageSession> for AnsweringSession {
+    fn from(session: ImageSession) -> Self {
+        session.0
     }
 }
 
-impl Deref for VideoSession {
-    type Target = SessionHandle;
-
-    fn deref(&self) -> &SessionHandle {
-        &self.0.handle
-    }
-}
-
-impl Deref for LiveSession {
-    type Target = SessionHandle;
-
-    fn deref(&self) -> &SessionHandle {
-        &self.handle
+impl From<VideoSession> for AnsweringSession {
+    fn from(session: VideoSession) -> Self {
+        session.0
     }
 }
 

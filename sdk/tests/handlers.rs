@@ -167,7 +167,7 @@ fn closing_a_live_stream() {
         let slot = Arc::new(OnceLock::<Mutex<Option<SessionHandle>>>::new());
         let closing = slot.clone();
         let session = LiveSession::new(two_levels(), move |event| drop(sender.send(event))).unwrap();
-        slot.get_or_init(|| Mutex::new(Some(SessionHandle::clone(&session))));
+        slot.get_or_init(|| Mutex::new(Some(session.handle().clone())));
         handle("method", move || {
             let session = closing.get().unwrap().lock().unwrap().take();
             if let Some(session) = session {

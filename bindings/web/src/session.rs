@@ -5,36 +5,18 @@ use crate::frame::RawFrame;
 use crate::hologram::{RawHologram, times};
 use crate::options::{RawOptions, quality};
 use js_sys::Object;
-use phasefront::session::SessionHandle;
+use phasefront::session::AnsweringSession;
 use phasefront::{ImageSession, VideoSession};
-use std::ops::Deref;
 use wasm_bindgen::prelude::*;
 
-/// A session.
+/// A session of either running mode. JavaScript has one type for both.
 #[wasm_bindgen]
 pub struct RawSession {
-    core: Core,
+    core: AnsweringSession,
 }
 
 fn no_mode(name: &str) -> JsValue {
     setting(&format!("there is no mode '{name}'; there are image and video"))
-}
-
-/// A session of either running mode. JavaScript has one type for both.
-enum Core {
-    Image(ImageSession),
-    Video(VideoSession),
-}
-
-impl Deref for Core {
-    type Target = SessionHandle;
-
-    fn deref(&self) -> &SessionHandle {
-        match self {
-            Core::Image(session) => session,
-            Core::Video(session) => session,
-        }
-    }
 }
 
 #[wasm_bindgen]
@@ -48,8 +30,8 @@ impl RawSession {
     pub fn new(options: &RawOptions, mode: &str) -> Answer<RawSession> {
         let options = options.core.clone();
         let core = match mode {
-            "image" => ImageSession::new(options).map(Core::Image),
-            "video" => VideoSession::new(options).map(Core::Video),
+            "image" => ImageSession::new(options).map(AnsweringSession::from),
+            "video" => VideoSession::new(options).map(AnsweringSession::from),
             other => return Err(no_mode(other)),
         };
         let core = core.map_err(of_core)?;
@@ -63,8 +45,8 @@ impl RawSession {
     pub async fn open(options: &RawOptions, mode: &str) -> Answer<RawSession> {
         let options = options.core.clone();
         let core = match mode {
-            "image" => ImageSession::new_async(options).await.map(Core::Image),
-            "video" => VideoSession::new_async(options).await.map(Core::Video),
+            "image" => ImageSession::new_async(options).await.map(AnsweringSession::from),
+            "video" => VideoSession::new_async(options).await.map(AnsweringSession::from),
             other => return Err(no_mode(other)),
         };
         let core = core.map_err(of_core)?;
@@ -79,11 +61,7 @@ impl RawSession {
     #[wasm_bindgen(js_name = processAsync)]
     pub async fn process_async(&self, frame: &RawFrame, stay: bool) -> Answer<RawHologram> {
         let frame = frame.frame()?;
-        let made = match &self.core {
-            Core::Image(session) => session.process_async(&frame, stay).await,
-            Core::Video(session) => session.process_async(&frame, stay).await,
-        };
-        let core = made.map_err(of_core)?;
+        let core = self.core.process_async(&frame, stay).await.map_err(of_core)?;
         Ok(RawHologram { core })
     }
 
@@ -93,18 +71,14 @@ impl RawSession {
     /// Throws an error in the cases of [`ImageSession::process`], and for a late frame in a video session.
     pub fn process(&self, frame: &RawFrame) -> Answer<RawHologram> {
         let frame = frame.frame()?;
-        let made = match &self.core {
-            Core::Image(session) => session.process(&frame),
-            Core::Video(session) => session.process(&frame),
-        };
-        let core = made.map_err(of_core)?;
+        let core = self.core.process(&frame).map_err(of_core)?;
         Ok(RawHologram { core })
     }
 
     /// Runs an empty frame through the stages.
     ///
     /// # Errors
-    /// Throws an error in the cases of [`SessionHandle::warm_up`].
+    /// Throws an error in the cases of [`AnsweringSession::warm_up`].
     #[wasm_bindgen(js_name = warmUp)]
     pub fn warm_up(&self) -> Answer<()> {
         self.core.warm_up().map_err(of_core)

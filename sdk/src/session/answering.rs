@@ -1,4 +1,4 @@
-//! The common part of image and video sessions: a caller waits for the result of its frame.
+//! Image and video sessions: a caller waits for the result of its frame.
 
 use super::depth_estimates::DepthEstimates;
 use super::drop_reason::DropReason;
@@ -15,13 +15,26 @@ use phasefront_core::runtime::error::{Error, Result};
 use std::fmt::{Debug, Formatter};
 use std::sync::{Arc, Mutex};
 
-/// A session whose callers wait for the results of their frames.
-pub(super) struct Answering {
+/// An image or a video session, for code that learns only at run time which of the two it needs:
+///
+/// ```
+/// use phasefront::session::AnsweringSession;
+/// use phasefront::{ImageSession, SessionOptions, VideoSession};
+///
+/// fn open(options: SessionOptions, is_video: bool) -> phasefront::Result<AnsweringSession> {
+///     if is_video {
+///         VideoSession::new(options).map(AnsweringSession::from)
+///     } else {
+///         ImageSession::new(options).map(AnsweringSession::from)
+///     }
+/// }
+/// ```
+pub struct AnsweringSession {
     pub(super) handle: SessionHandle,
     gate: Arc<Mutex<Gate>>,
 }
 
-impl Answering {
+impl AnsweringSession {
     /// Creates a session, whose frames follow one another if they come `in_order`.
     pub(super) async fn new(options: SessionOptions, in_order: bool) -> Result<Self> {
         let estimates = DepthEstimates::for_each_frame(&options);
@@ -29,11 +42,15 @@ impl Answering {
         let gate = Arc::new(Mutex::new(Gate::new(in_order, shared.cancel.clone())));
         let frames = Frames::Answered(gate.clone());
         let handle = SessionHandle { shared, frames };
-        Ok(Answering { handle, gate })
+        Ok(AnsweringSession { handle, gate })
     }
 
-    /// Makes the hologram of `frame`.
-    pub(super) fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
+    /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
+    ///
+    /// # Errors
+    /// Returns an error in the cases of [`ImageSession::process`](super::ImageSession::process) or
+    /// [`VideoSession::process`](super::VideoSession::process).
+    pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
         let mut entered = self.handle.enter()?;
         let past = self.admit(frame)?;
         // The stages exist as long as the gate is open.
@@ -65,10 +82,14 @@ impl Answering {
         replayed
     }
 
-    /// Makes the hologram of `frame` in a browser, whose GPU answers only while nothing blocks.
+    /// Makes the hologram of `frame` in a browser, whose GPU answers only while nothing blocks. One frame is computed
+    /// at a time. With `stay`, its levels stay on the GPU, if there is one: see [`Hologram::on_gpu`].
+    ///
+    /// # Errors
+    /// Returns an error in the same cases as [`Self::process`], and while the session computes another frame.
     #[cfg(target_arch = "wasm32")]
     #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only levels on a GPU stay there.
-    pub(super) async fn process_async(&self, frame: &CameraFrame<'_>, stay: bool) -> Result<Hologram> {
+    pub async fn process_async(&self, frame: &CameraFrame<'_>, stay: bool) -> Result<Hologram> {
         let mut stages = self.handle.take_stages()?;
         #[cfg(feature = "gpu")]
         stages.stay_on_gpu(stay);
@@ -121,13 +142,13 @@ impl Answering {
     }
 }
 
-impl Debug for Answering {
+impl Debug for AnsweringSession {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         self.handle.fmt(f)
     }
 }
 
-impl Drop for Answering {
+impl Drop for AnsweringSession {
     fn drop(&mut self) {
         self.handle.close();
     }

@@ -18,9 +18,8 @@ use phasefront_core::runtime::error::Result;
 use std::fmt::{Debug, Formatter};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// Controls a session. Every kind of session dereferences to it. A clone controls the same session from any thread,
-/// including a listener's. It does not keep the session open: a session closes when it is dropped, even if handles
-/// remain.
+/// Controls a session of any kind from any thread, including a listener's: a clone of `handle()` of the session. It
+/// does not keep the session open: a session closes when it is dropped, even if handles remain.
 #[derive(Clone)]
 pub struct SessionHandle {
     pub(super) shared: Arc<Shared>,
@@ -172,6 +171,74 @@ impl SessionHandle {
         lock(&self.shared.recent).statistics(counts)
     }
 }
+
+/// Gives a kind of session the controls of its handle, which is a field of the session or of its field 0.
+macro_rules! controls {
+    ($session:ident $(, $field:tt)?) => {
+        impl $session {
+            /// Returns the handle of this session. Its clones control the session from other threads and from
+            /// listeners.
+            pub fn handle(&self) -> &SessionHandle {
+                &self$(.$field)?.handle
+            }
+
+            /// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as the
+            /// others.
+            ///
+            /// # Errors
+            /// Returns an error in the cases of [`SessionHandle::warm_up`].
+            pub fn warm_up(&self) -> Result<()> {
+                self.handle().warm_up()
+            }
+
+            /// Forgets all previous frames, as [`SessionHandle::reset`] does.
+            pub fn reset(&self) {
+                self.handle().reset();
+            }
+
+            /// Stops taking frames until [`Self::resume`], as [`SessionHandle::pause`] does.
+            pub fn pause(&self) {
+                self.handle().pause();
+            }
+
+            /// Resumes taking frames.
+            pub fn resume(&self) {
+                self.handle().resume();
+            }
+
+            /// Stops taking frames and frees the memory, as [`SessionHandle::close`] does.
+            pub fn close(&self) {
+                self.handle().close();
+            }
+
+            /// Sets the thermal state of the device, which an adaptive session follows from the next frame on.
+            pub fn set_thermal(&self, thermal: Thermal) {
+                self.handle().set_thermal(thermal);
+            }
+
+            /// Allows or forbids changes of the quality level from the next frame on.
+            ///
+            /// # Errors
+            /// Returns an error if the session does not have the quality level.
+            pub fn set_quality(&self, quality: Quality) -> Result<()> {
+                self.handle().set_quality(quality)
+            }
+
+            /// Returns the GPU that computes the frames, as [`SessionHandle::gpu`] does.
+            #[cfg(feature = "gpu")]
+            #[doc(hidden)]
+            pub fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
+                self.handle().gpu()
+            }
+
+            /// Returns the statistics so far. Never waits for a frame.
+            pub fn statistics(&self) -> Statistics {
+                self.handle().statistics()
+            }
+        }
+    };
+}
+pub(super) use controls;
 
 /// Exclusive access to the stages of a session, on a thread that counts as computing.
 pub(super) struct Entered<'a> {

@@ -210,8 +210,8 @@ impl<F> Queue<F> {
         })
     }
 
-    /// Ends the frame in flight, whose hologram has `scale`; `None` if it failed. Returns whether to report its result or
-    /// its error; otherwise its drop is reported.
+    /// Ends the frame in flight, whose hologram has `scale`; `None` if it failed. Returns whether to report its result
+    /// or its error; otherwise its drop is reported.
     pub(super) fn finish(&mut self, scale: Option<f32>) -> bool {
         let Some((timestamp_ns, epoch)) = self.in_flight.take() else {
             return false;

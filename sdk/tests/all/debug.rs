@@ -6,8 +6,8 @@ use phasefront::input::{
 };
 use phasefront::output::{BitPlanes, Cells, Layout, Levels, ModulatorSpec, Output, Packing, Placement};
 use phasefront::session::{
-    Backend, BackendReport, DropReason, Drops, Event, FrameTimes, GpuOptions, Quality, QualityLevel, QualityReason,
-    SessionHandle, Statistics, Thermal,
+    AnsweringSession, Backend, BackendReport, DropReason, Drops, Event, FrameTimes, GpuOptions, Quality, QualityLevel,
+    QualityReason, SessionHandle, Statistics, Thermal,
 };
 use phasefront::target::{Aberration, Illumination, Response};
 use phasefront::{
@@ -56,6 +56,7 @@ fn every_public_type_implements_debug() {
         Placement
     );
     let session = count!(
+        AnsweringSession,
         Backend,
         BackendReport,
         DropReason,
@@ -89,5 +90,5 @@ fn every_public_type_implements_debug() {
         Sweep,
         VideoSession,
     );
-    assert_eq!(input + output + session + target + root, 58);
+    assert_eq!(input + output + session + target + root, 59);
 }

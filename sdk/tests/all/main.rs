@@ -23,3 +23,4 @@ mod field;
 mod gpu_session;
 mod one_colour;
 mod session;
+mod session_layers;

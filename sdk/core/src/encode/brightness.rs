@@ -47,7 +47,8 @@ impl Brightness {
 /// The time in which a smoothed scale covers 63 % of the distance to its target.
 const TIME_CONSTANT: Duration = Duration::from_secs(1);
 
-/// Returns the share, 0 to 1, by which a smoothed scale moves from that of the `past` toward the frame's own percentile.
+/// Returns the share, 0 to 1, by which a smoothed scale moves from that of the `past` toward the frame's own
+/// percentile.
 pub fn share(past: Past) -> f32 {
     1.0 - (-past.elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp()
 }

@@ -295,7 +295,7 @@ impl Video {
         let steps = options.encoder.midpoint_steps + options.encoder.focus_steps;
         let backend = options.backend;
         let session = VideoSession::new(options)?;
-        warm_up(&session, backend)?;
+        warm_up(session.handle(), backend)?;
         let mut resuming = sink.resumes();
         let mut frame = 0;
         while let Some(read) = source.next()? {
@@ -355,7 +355,7 @@ impl Video {
         };
         let backend = options.backend;
         let session = LiveSession::new(options, listener)?;
-        warm_up(&session, backend)?;
+        warm_up(session.handle(), backend)?;
         let (submitted, written) = std::thread::scope(|scope| {
             let writer = scope.spawn(move || {
                 let mut result = Ok(());

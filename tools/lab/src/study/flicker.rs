@@ -7,14 +7,12 @@ use crate::sensor::{FAR_M, Images, NEAR_M, Reading, Sensor, colour_bytes};
 use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthRange, Plane, RgbEncoding};
 use phasefront::output::Layout;
-use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
+use phasefront::session::AnsweringSession;
+use phasefront::{Brightness, Display, EncoderOptions, ImageSession, Method, SessionOptions, VideoSession};
 use phasefront_exact::truth::{visible_depth, visible_rgb};
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
-
-/// A function that makes a hologram of a frame, in a session of either kind.
-type Process = dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>;
 
 /// The size of the depth sensor, which is ARKit's.
 const SENSOR: Size = Size {
@@ -178,14 +176,14 @@ pub fn study(
     let Size { width, height } = standing.size;
     (settings.iter())
         .map(|setting| {
-            let process = setting.session(display, method, standing.range)?;
+            let session = setting.session(display, method, standing.range)?;
             let mut seen: Vec<Vec<f32>> = Vec::with_capacity(frames);
             for (frame, images) in standing.readings.iter().enumerate() {
                 let colour = Plane::new(&standing.rgb, 3 * width, 3);
                 let colour = ColourImage::new(ColourFormat::Rgb, standing.size, &[colour])?;
                 let colour = colour.with_encoding(RgbEncoding::Amplitude);
                 let timestamp = (1 + frame as u64) * 1_000_000_000 / RATE_HZ;
-                let hologram = process(&CameraFrame::new(timestamp, colour, images.depth()?))?;
+                let hologram = session.process(&CameraFrame::new(timestamp, colour, images.depth()?))?;
                 let (height, width) = (height / 2, width / 2);
                 let mut rgba = vec![0; 4 * height * width];
                 hologram.write_preview(0.0, Size { width, height }, Layout::Rgba, &mut rgba, 4 * width)?;
@@ -203,7 +201,7 @@ pub fn study(
 
 impl Setting {
     /// Opens a session with this setting.
-    fn session(&self, display: &Display, method: &Method, range: DepthRange) -> Result<Box<Process>> {
+    fn session(&self, display: &Display, method: &Method, range: DepthRange) -> Result<AnsweringSession> {
         let mut options = SessionOptions::new(display, method.clone());
         options.depth.range = range;
         options.encoder = EncoderOptions {
@@ -217,11 +215,9 @@ impl Setting {
             ..options.encoder
         };
         Ok(if self.video {
-            let session = VideoSession::new(options)?;
-            Box::new(move |frame| session.process(frame))
+            VideoSession::new(options)?.into()
         } else {
-            let session = ImageSession::new(options)?;
-            Box::new(move |frame| session.process(frame))
+            ImageSession::new(options)?.into()
         })
     }
 }
