@@ -66,11 +66,9 @@ impl Curve {
             Curve::Srgb => wide!(for value in row.iter_mut() {
                 *value = srgb_light(*value);
             }),
-            Curve::Other(table) => {
-                for value in row {
-                    *value = table.at(*value);
-                }
-            }
+            Curve::Other(table) => wide!(for value in row.iter_mut() {
+                *value = table.at(*value);
+            }),
         }
     }
 }
@@ -316,23 +314,32 @@ impl LightPlan {
             return;
         };
         let [from, rate] = highlights.knee;
-        for ((r, g), b) in red.iter_mut().zip(green).zip(blue) {
-            let gain = match &highlights.gain {
-                Some(table) => {
-                    let [wr, wg, wb] = highlights.luminance;
+        match &highlights.gain {
+            Some(table) => {
+                let [wr, wg, wb] = highlights.luminance;
+                wide!(for ((r, g), b) in red.iter_mut().zip(&mut *green).zip(&mut *blue) {
                     let luminance = wr * *r + wg * *g + wb * *b;
-                    table.at(luminance.sqrt().sqrt().min(1.0))
-                }
-                None => 1.0,
-            };
-            // One factor for all three keeps their hue.
-            let most = gain * r.max(*g).max(*b);
-            let excess = (most - from).max(0.0);
-            let kept = most.min(from) + excess / (1.0 + rate * excess);
-            let factor = gain * (kept.min(1.0) / most.max(f32::MIN_POSITIVE));
-            (*r, *g, *b) = (factor * *r, factor * *g, factor * *b);
+                    let gain = table.at(luminance.sqrt().sqrt().min(1.0));
+                    (*r, *g, *b) = below_full([*r, *g, *b], gain, from, rate).into();
+                });
+            }
+            None => wide!(for ((r, g), b) in red.iter_mut().zip(&mut *green).zip(&mut *blue) {
+                (*r, *g, *b) = below_full([*r, *g, *b], 1.0, from, rate).into();
+            }),
         }
     }
+}
+
+/// Returns a colour of high dynamic range, multiplied by `gain`, below full light: one factor for all three keeps their
+/// hue. The knee begins at `from`.
+#[inline(always)]
+fn below_full(colour: [f32; 3], gain: f32, from: f32, rate: f32) -> [f32; 3] {
+    let [r, g, b] = colour;
+    let most = gain * r.max(g).max(b);
+    let excess = (most - from).max(0.0);
+    let kept = most.min(from) + excess / (1.0 + rate * excess);
+    let factor = gain * (kept.min(1.0) / most.max(f32::MIN_POSITIVE));
+    colour.map(|light| factor * light)
 }
 
 /// Converts linear colours to amplitudes of three lasers in place.
