@@ -79,11 +79,10 @@
 
     /// Returns the matrix of a buffer's luma and chroma by its attachments.
     private func matrix(of buffer: CVPixelBuffer) -> YuvMatrix {
-        switch CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String {
-        case kCVImageBufferYCbCrMatrix_ITU_R_709_2 as String: .bt709
-        case kCVImageBufferYCbCrMatrix_ITU_R_2020 as String: .bt2020
-        default: .bt601
-        }
+        let matrix = CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String
+        if matrix == kCVImageBufferYCbCrMatrix_ITU_R_709_2 as String { return .bt709 }
+        if matrix == kCVImageBufferYCbCrMatrix_ITU_R_2020 as String { return .bt2020 }
+        return .bt601
     }
 
     /// Returns the meaning of a buffer's colours by its attachments.

@@ -8,7 +8,7 @@ use camera::{Scene, colour_formats, depth, frame, options};
 use on_gpu::on_gpu;
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
 use phasefront::output::Layout;
-use phasefront::session::{Backend, DropReason, Event, Quality};
+use phasefront::session::{Backend, DropReason, Event, Focus, Quality};
 use phasefront::target::Response;
 use phasefront::{
     Brightness, Display, Error, ImageSession, LiveSession, Method, Network, SessionOptions, Sweep, VideoSession,
@@ -418,6 +418,11 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.quality_levels[0].method.clone());
     (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
     cases.push((one, "one laser"));
+    for (steps, word) in [(0, "colours in turn"), (2, "steps of natural focus")] {
+        let mut natural = SessionOptions::for_focus(gpu.target.clone(), Focus::Natural { steps }).unwrap();
+        (natural.backend, natural.gpu) = (gpu.backend, gpu.gpu.clone());
+        cases.push((natural, word));
+    }
     // One line is too long for any workgroup's memory.
     let mut long = gpu.clone();
     let text = "width = 9000\nheight = 4\noffset_mm = 2";
