@@ -71,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // An app sends `hologram.levels()` to its modulator here.
             println!(
                 "{} ms: {:.0?}",
-                hologram.timestamp_ns() / 1_000_000,
+                hologram.timestamp_ns().unwrap_or_default() / 1_000_000,
                 hologram.times().total()
             );
             hologram_png::save(&hologram, Path::new(last))?;

@@ -165,14 +165,14 @@ impl RawHologram {
         let Size { width, height } = self.core.size();
         let (near_m, far_m) = self.core.range_m().unzip();
         HologramInfo {
-            timestamp_ns: self.core.timestamp_ns() as i64,
+            timestamp_ns: self.core.timestamp_ns().unwrap_or(0) as i64,
             width,
             height,
             colours: self.core.colours(),
             scale: self.core.scale(),
             near_m,
             far_m,
-            valid_depth: self.core.valid_depth(),
+            valid_depth: self.core.valid_depth().unwrap_or(0.0),
             quality_level: self.core.quality_level(),
             times: self.core.times().into(),
             encoding: self.core.encoding(),

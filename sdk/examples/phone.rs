@@ -5,6 +5,13 @@
 use ndarray::{Array2, Array3};
 use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Size, Target};
 
+/// The size of a frame in pixels, for C.
+#[repr(C)]
+pub struct FrameSize {
+    width: usize,
+    height: usize,
+}
+
 /// Makes `levels`, (3, H, W), of a frame of `size`, by the network of an ONNX file; 0 if that went well.
 ///
 /// # Safety
@@ -13,11 +20,15 @@ use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Si
 pub unsafe extern "C" fn phasefront_levels(
     onnx: *const u8,
     length: usize,
-    size: Size,
+    size: FrameSize,
     rgb: *const f32,
     depth: *const f32,
     levels: *mut u8,
 ) -> i32 {
+    let size = Size {
+        width: size.width,
+        height: size.height,
+    };
     let area = size.pixels();
     // SAFETY: the caller's promise.
     let (onnx, rgb, depth, levels) = unsafe {

@@ -86,7 +86,7 @@ fn of(name: &str, options: &SessionOptions) {
             time += 33_000_000;
             let frame = CameraFrame::new(time, scene.colour(), depth);
             live.submit(&frame).unwrap();
-            assert_eq!(made.recv(), Ok(time));
+            assert_eq!(made.recv(), Ok(Some(time)));
         });
     }
 }

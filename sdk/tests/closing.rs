@@ -50,7 +50,7 @@ fn a_closed_session_gives_its_memory_back_before_it_is_dropped() {
         for t in 1..30 {
             session.submit(&frame(t)).unwrap();
         }
-        while !matches!(events.recv().unwrap(), Event::Processed(hologram) if hologram.timestamp_ns() == 29) {}
+        while !matches!(events.recv().unwrap(), Event::Processed(hologram) if hologram.timestamp_ns() == Some(29)) {}
         session
     };
     // Allocate the parts that are created only once.

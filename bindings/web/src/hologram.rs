@@ -41,7 +41,7 @@ impl RawHologram {
         let Size { width, height } = self.core.size();
         let range = self.core.range_m().map(|(near, far)| [near, far].map(JsValue::from));
         object([
-            ("timestamp", (self.core.timestamp_ns() as f64 / 1e3).into()),
+            ("timestamp", (self.core.timestamp_ns().unwrap_or(0) as f64 / 1e3).into()),
             ("width", width.into()),
             ("height", height.into()),
             ("colours", self.core.colours().into()),
@@ -50,7 +50,7 @@ impl RawHologram {
                 "rangeM",
                 range.map_or(JsValue::NULL, |range| Array::from_iter(range).into()),
             ),
-            ("validDepth", self.core.valid_depth().into()),
+            ("validDepth", self.core.valid_depth().unwrap_or(0.0).into()),
             ("qualityLevel", self.core.quality_level().into()),
             ("times", times(self.core.times()).into()),
         ])

@@ -3,7 +3,6 @@
 /// The width and the height of a picture, a plane or a modulator, in pixels.
 ///
 /// Every signature takes and returns sizes in this form; arrays keep their shape, (H, W).
-#[repr(C)] // C functions may take it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Size {
     /// The number of pixels along x.

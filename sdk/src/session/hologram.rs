@@ -101,7 +101,7 @@ impl Viewer {
 /// The hologram of one frame: modulator levels and their metadata. It is cheap to keep and to send to another thread.
 /// Its memory returns to the session when it is dropped, even after the session's end.
 pub struct Hologram {
-    pub(super) timestamp_ns: u64,
+    pub(super) timestamp_ns: Option<u64>,
     pub(super) size: Size,
     pub(super) levels: Pooled<u8>,
     /// The levels of a display with more than 8 bits.
@@ -113,7 +113,7 @@ pub struct Hologram {
     pub(super) scale: f32,
     pub(super) times: FrameTimes,
     pub(super) range_m: Option<(f32, f32)>,
-    pub(super) valid_depth: f32,
+    pub(super) valid_depth: Option<f32>,
     pub(super) quality_level: usize,
     /// The encoding of the picture's colours, in which views show them.
     pub(super) encoding: RgbEncoding,
@@ -184,7 +184,7 @@ impl Hologram {
                 }
             }
             Ok(Hologram {
-                timestamp_ns: 0,
+                timestamp_ns: None,
                 size,
                 levels,
                 words,
@@ -197,7 +197,7 @@ impl Hologram {
                     ..FrameTimes::default()
                 },
                 range_m: None,
-                valid_depth: 0.0,
+                valid_depth: None,
                 quality_level: 0,
                 encoding: RgbEncoding::default(),
                 viewer: Arc::new(Viewer::new(target.clone(), pool.clone())),
@@ -238,7 +238,7 @@ impl Hologram {
         let mut own = Pool::default().take(levels.len());
         own.values.copy_from_slice(levels);
         Ok(Hologram {
-            timestamp_ns: 0,
+            timestamp_ns: None,
             size,
             levels: own,
             words: None,
@@ -247,7 +247,7 @@ impl Hologram {
             scale,
             times: FrameTimes::default(),
             range_m: None,
-            valid_depth: 0.0,
+            valid_depth: None,
             quality_level: 0,
             encoding: RgbEncoding::default(),
             viewer: Arc::new(Viewer::new(target.clone(), Threads::shared()?)),
@@ -256,8 +256,8 @@ impl Hologram {
         })
     }
 
-    /// Returns the timestamp of the frame; 0 for a hologram that no session made.
-    pub fn timestamp_ns(&self) -> u64 {
+    /// Returns the timestamp of the frame; `None` for a hologram that no session made.
+    pub fn timestamp_ns(&self) -> Option<u64> {
         self.timestamp_ns
     }
 
@@ -321,8 +321,9 @@ impl Hologram {
         self.range_m
     }
 
-    /// Returns the share of the depth sensor's pixels that had a usable reading.
-    pub fn valid_depth(&self) -> f32 {
+    /// Returns the share of the depth sensor's pixels that had a usable reading; `None` for a hologram that no session
+    /// made.
+    pub fn valid_depth(&self) -> Option<f32> {
         self.valid_depth
     }
 

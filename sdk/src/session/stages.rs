@@ -350,7 +350,7 @@ impl Stages {
         };
         let (report, (depth, depth_size), encoded) = pool.run(work).await?;
         Ok(Hologram {
-            timestamp_ns: frame.timestamp_ns,
+            timestamp_ns: Some(frame.timestamp_ns),
             size,
             levels,
             words,
@@ -363,7 +363,7 @@ impl Stages {
                 ..encoded.times
             },
             range_m: report.range_m,
-            valid_depth: report.valid,
+            valid_depth: Some(report.valid),
             quality_level: self.level_control.quality_level(),
             encoding: frame.colour.encoding(),
             viewer: self.viewer.clone(),

@@ -36,7 +36,7 @@ fn a_network_in_the_session_equals_its_depth_handed_in() {
     let session = ImageSession::new(with_network(Size { width: W, height: H })).unwrap();
     let scene = Scene::new(Size { width: W, height: H }, 10);
     let estimated = session.process(&CameraFrame::without_depth(1, scene.colour())).unwrap();
-    assert_eq!((estimated.range_m(), estimated.valid_depth()), (None, 1.0));
+    assert_eq!((estimated.range_m(), estimated.valid_depth()), (None, Some(1.0)));
     let bytes = relative(&scene);
     let handed = CameraFrame::new(
         2,

@@ -42,6 +42,7 @@ fn a_field_is_propagated_and_encoded() {
             (Size { width: W, height: H }, colours)
         );
         assert_eq!(hologram.z_at(0.5, 0.5), 0.0);
+        assert_eq!((hologram.timestamp_ns(), hologram.valid_depth()), (None, None));
     }
 }
 

@@ -73,8 +73,7 @@ impl Cameras {
     ///
     /// # Panics
     /// Panics if a length is not h·w.
-    #[doc(hidden)]
-    pub fn reproject(
+    pub(crate) fn reproject(
         &self,
         Size { width, height }: Size,
         colour_size: Size,

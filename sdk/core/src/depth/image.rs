@@ -55,8 +55,7 @@ impl DepthFormat {
     }
 
     /// Returns whether readings have no scale.
-    #[doc(hidden)]
-    pub fn is_relative(self) -> bool {
+    pub(crate) fn is_relative(self) -> bool {
         matches!(self, DepthFormat::RelativeF32 | DepthFormat::RelativeF16)
     }
 

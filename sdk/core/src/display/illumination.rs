@@ -117,8 +117,7 @@ impl Illumination {
     }
 
     /// Divides row `row` of a stack of planes with `height` rows, like [`Self::divide`].
-    #[doc(hidden)]
-    pub fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: Size) {
+    pub(crate) fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: Size) {
         wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }
 

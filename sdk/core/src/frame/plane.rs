@@ -110,8 +110,7 @@ impl Orientation {
     }
 
     /// Returns whether the upright image runs opposite to the sensor along x and along y.
-    #[doc(hidden)]
-    pub fn flips(self) -> (bool, bool) {
+    pub(crate) fn flips(self) -> (bool, bool) {
         let (x, y) = match self.rotation {
             Rotation::Upright => (false, false),
             Rotation::Clockwise90 => (true, false),
@@ -122,8 +121,7 @@ impl Orientation {
     }
 
     /// Returns the sensor pixel (x, y) at upright pixel (`x`, `y`), for a sensor's image of that size.
-    #[doc(hidden)]
-    pub fn sensor_pixel(self, x: usize, y: usize, size: Size) -> (usize, usize) {
+    pub(crate) fn sensor_pixel(self, x: usize, y: usize, size: Size) -> (usize, usize) {
         let Size { width, height } = size;
         let upright_width = self.upright_size(size).width;
         let x = if self.mirrored { upright_width - 1 - x } else { x };

@@ -214,8 +214,7 @@ impl Network {
     ///
     /// # Errors
     /// Returns [`Error::Network`] if a laser has a larger λ·V/p² than the longest trained wavelength.
-    #[doc(hidden)]
-    pub fn depth_scales_in_turn(&self, display: &Display) -> Result<Vec<f32>> {
+    pub(crate) fn depth_scales_in_turn(&self, display: &Display) -> Result<Vec<f32>> {
         let scales = self.display.serve_in_turn(display)?;
         Ok(scales.into_iter().map(|scale| scale.min(1.0) as f32).collect())
     }
@@ -259,7 +258,7 @@ impl Network {
 
     /// Plans like [`Self::plan`] for the depths and colours of `display`. For one laser, the network reads its
     /// amplitude as red, green and blue, and only the output of [`Self::colour`] is kept. A network that takes the
-    /// colours in turn runs on one of them, whose depth the caller stretches ([`Self::depth_scales_in_turn`]).
+    /// colours in turn runs on one of them, whose depth the caller stretches (`depth_scales_in_turn`).
     ///
     /// # Errors
     /// Returns the same errors as [`Self::plan`] and [`Self::depth_scale`].
@@ -363,8 +362,7 @@ impl Network {
     ///
     /// # Errors
     /// Returns the same errors as [`Self::filter_plan`] and [`Self::depth_scale`].
-    #[doc(hidden)]
-    pub fn filter_plan_for(&self, size: Size, display: &Display) -> Result<FilterPlan> {
+    pub(crate) fn filter_plan_for(&self, size: Size, display: &Display) -> Result<FilterPlan> {
         Ok(FilterPlan {
             colour: self.colour(display)?,
             ..self.filter_plan(size)?

@@ -242,12 +242,6 @@ impl PerPixel {
         self.window
     }
 
-    /// Returns the first row and the first column of the modulator that stacks cover.
-    #[doc(hidden)]
-    pub fn corner(&self) -> (usize, usize) {
-        self.corner
-    }
-
     /// Returns the number of pixels between nodes.
     #[doc(hidden)]
     pub fn spacing(&self) -> usize {
@@ -565,7 +559,7 @@ mod tests {
     fn a_centred_table_is_the_middle_of_the_whole() {
         let whole = table(Size { width: 65, height: 33 }, 16, 32, true);
         let part = whole.centred(Size { width: 41, height: 20 }).unwrap();
-        assert_eq!((part.size(), part.corner()), (Size { width: 41, height: 20 }, (6, 12)));
+        assert_eq!((part.size(), part.corner), (Size { width: 41, height: 20 }, (6, 12)));
         let phases = phases(41, 1);
         let mut levels = vec![0; 41];
         for row in [0, 19, 20, 45, 59] {
@@ -576,7 +570,7 @@ mod tests {
                 assert_eq!(*level, part.level(phases[x], row * 41 + x));
             }
         }
-        assert_eq!(part.centred(Size { width: 41, height: 2 }).unwrap().corner(), (15, 12));
+        assert_eq!(part.centred(Size { width: 41, height: 2 }).unwrap().corner, (15, 12));
         assert!(part.centred(Size { width: 3, height: 21 }).is_err());
     }
 
