@@ -4,5 +4,5 @@
 pub mod album;
 pub mod fit;
 mod gradient;
-mod register;
+pub(crate) mod register;
 pub mod scenes;

@@ -8,6 +8,7 @@
 //!   [`optics::pupil`].
 //! * [`white`] says what a meter's readings of three lasers mean.
 //! * [`learned`] fits a model of what is left to photographs of holograms.
+//! * [`diagnosis`] says why a photograph of a hologram looks wrong.
 //! * [`rehearse`] does all of it on a simulated display.
 //!
 //! [`phasefront_io::display::calibration`] reads and writes the calibration files. [`curves::report`] and
@@ -16,6 +17,7 @@
 pub mod camera;
 mod cholesky;
 pub mod curves;
+pub mod diagnosis;
 pub mod learned;
 pub mod optics;
 pub mod rehearse;

@@ -7,6 +7,7 @@
 //! last bits of floating-point arithmetic.
 
 mod faults;
+mod strays;
 
 use crate::camera::homography::Homography;
 use crate::camera::photograph::Photograph;
@@ -26,6 +27,7 @@ use phasefront_io::dice::Dice;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
+pub use strays::Strays;
 
 /// The phase curves of pixels: level/255 = v gives 2π·range·(v − steepness·sin(2πv)/2π + bend·v(1 − v)), where range
 /// varies over the panel.
@@ -74,6 +76,7 @@ pub struct SimulatedDisplay {
     aberration: Aberration,
     camera: Camera,
     faults: Option<Faults>,
+    strays: Strays,
 }
 
 impl SimulatedDisplay {
@@ -143,6 +146,7 @@ impl SimulatedDisplay {
             aberration: Aberration::none(display.colours()),
             camera,
             faults: None,
+            strays: Strays::default(),
         })
     }
 
@@ -156,6 +160,12 @@ impl SimulatedDisplay {
     /// aperture, and a laser that drifts from photograph to photograph.
     pub fn with_faults(mut self) -> Self {
         self.faults = Some(Faults::new(self.seed));
+        self
+    }
+
+    /// Adds light beside the picture's to a display without [faults](Self::with_faults).
+    pub fn with_strays(mut self, strays: Strays) -> Self {
+        self.strays = strays;
         self
     }
 
@@ -258,7 +268,9 @@ impl SimulatedDisplay {
         }
         let (pitch, wavelength) = (self.display.pitch_m(), self.display.wavelengths_m()[colour]);
         let distance = z_m - self.display.offset_m();
-        let more = (self.aberration.reach_m(pitch) / pitch).ceil() as usize + 8;
+        let reach = |shift: &f64| shift.abs().ceil() as usize;
+        let ghost = self.strays.ghost_shift_px.iter().map(reach).max().unwrap_or_default();
+        let more = (self.aberration.reach_m(pitch) / pitch).ceil() as usize + ghost + 8;
         let wider = Size {
             width: width + more,
             height: height + more,
@@ -276,7 +288,7 @@ impl SimulatedDisplay {
                 match &self.faults {
                     _ if !aperture::passes(fx, fy, self.display.aperture_radius()) => *value = Complex32::ZERO,
                     Some(faults) => *value *= faults.aperture(fx, fy),
-                    None => (),
+                    None => *value *= self.strays.ghost(colour, fx, fy, pitch, wavelength),
                 }
             }
         });
@@ -323,7 +335,8 @@ impl SimulatedDisplay {
             let mut plane = vec![Complex32::ZERO; height * width];
             plane.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
                 for (x, value) in row.iter_mut().enumerate() {
-                    *value = Complex32::from_polar(light(y, x) as f32, phase(y, x) as f32);
+                    let lit = self.strays.modulated(colour, phase(y, x)) * light(y, x);
+                    *value = Complex32::new(lit.re as f32, lit.im as f32);
                 }
             });
             let fft = Fft2::new(Size { width, height }, Size { width: pw, height: ph });

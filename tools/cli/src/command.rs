@@ -5,6 +5,7 @@ mod calibrate;
 mod compare;
 mod completions;
 mod devices;
+mod diagnose;
 mod doctor;
 mod encode;
 pub(crate) mod help;
@@ -59,6 +60,7 @@ pub(crate) enum Command {
     Video(video::Video),
     Multiplex(multiplex::MultiplexCommand),
     Devices(devices::Devices),
+    Diagnose(diagnose::Diagnose),
     Doctor(doctor::Doctor),
     Completions(completions::Completions),
     Man(completions::Man),
@@ -89,6 +91,7 @@ impl Command {
             Command::Video(command) => command.run(common.threads(), json, flags),
             Command::Multiplex(command) => command.run(json),
             Command::Devices(command) => command.run(json),
+            Command::Diagnose(command) => command.run(json),
             Command::Doctor(command) => command.run(json),
             Command::Completions(command) => command.run(),
             Command::Man(command) => command.run(json),

@@ -10,7 +10,6 @@ use crate::camera::photograph::Photograph;
 use ndarray::Array2;
 use phasefront::Size;
 use phasefront_io::Result;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// A pixel of a dark square is darker than this fraction of the local light.
@@ -92,6 +91,12 @@ impl Registration {
         [mean(0), mean(1)]
     }
 
+    /// Returns the corners of a modulator of this size in photographs: top left, top right, bottom left, bottom right.
+    pub fn corners(&self, Size { width, height }: Size) -> [[f64; 2]; 4] {
+        let (w, h) = (width as f64, height as f64);
+        [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]].map(|corner| self.map.map(corner))
+    }
+
     /// Returns the mean of `photograph` over a square of the modulator that extends `half` pixels to each side of (`x`,
     /// `y`).
     fn mean(&self, photograph: &Photograph, x: f64, y: f64, half: f64) -> f32 {
@@ -124,23 +129,7 @@ impl Registration {
     /// Resamples `photograph` to the modulator's pixels, (H, W). Each value is the mean over a pixel, as a fraction of
     /// the sensor's range.
     pub fn resample(&self, photograph: &Photograph, Size { width, height }: Size) -> Array2<f32> {
-        let n = self.zoom.ceil().clamp(1.0, 8.0) as usize;
-        let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;
-        let scale = 1.0 / (f32::from(photograph.full) * (n * n) as f32);
-        let mut out = Array2::zeros((height, width));
-        let rows = out.as_slice_mut().expect("standard layout");
-        rows.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-            for (x, value) in row.iter_mut().enumerate() {
-                for i in 0..n {
-                    for j in 0..n {
-                        let [u, v] = self.map.map([x as f64 + at(i), y as f64 + at(j)]);
-                        *value += photograph.sample(u, v);
-                    }
-                }
-                *value *= scale;
-            }
-        });
-        out
+        photograph.through(&self.map, self.zoom, Size { width, height })
     }
 
     /// Returns the light of `photograph` at the middle of each pixel of the modulator, (H, W), as a fraction of the

@@ -2,10 +2,15 @@
 //!
 //! The camera's tone curve must be off, as in a raw file developed linearly. This module cannot undo a tone curve.
 
+use crate::camera::homography::Homography;
 use image::DynamicImage;
+use ndarray::Array2;
+use phasefront::Size;
+use phasefront_core::frame::encoding::RgbEncoding;
 use phasefront_io::input::decode::{self, Reading};
 use phasefront_io::output::write_atomically;
 use phasefront_io::{Error, Result};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// The maximum number of pixels of a photograph: 200 megapixels.
@@ -62,6 +67,19 @@ impl Photograph {
             values,
             full,
         })
+    }
+
+    /// Returns the photograph with values linear in light, of 16 bits, where they are those of sRGB.
+    pub fn linear_of_srgb(&self) -> Self {
+        let linear = |value: &u16| {
+            let light = RgbEncoding::Srgb.light(f64::from(*value) / f64::from(self.full));
+            (light * 65535.0).round() as u16
+        };
+        Photograph {
+            values: self.values.iter().map(linear).collect(),
+            full: 65535,
+            ..*self
+        }
     }
 
     /// Writes a grey PNG, with 8 bits if `full` is 255 and 16 bits otherwise.
@@ -126,6 +144,28 @@ impl Photograph {
         };
         let (top, bottom) = (at(y0), at(y0 + 1.0));
         top + (bottom - top) * fy
+    }
+
+    /// Resamples the photograph to pixels of `size`, (H, W). `map` takes their places to the photograph, in which one of
+    /// them is about `zoom` pixels wide. Each value is the mean over a pixel, as a fraction of the sensor's range.
+    pub fn through(&self, map: &Homography, zoom: f64, Size { width, height }: Size) -> Array2<f32> {
+        let n = zoom.ceil().clamp(1.0, 8.0) as usize;
+        let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;
+        let scale = 1.0 / (f32::from(self.full) * (n * n) as f32);
+        let mut out = Array2::zeros((height, width));
+        let rows = out.as_slice_mut().expect("standard layout");
+        rows.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                for i in 0..n {
+                    for j in 0..n {
+                        let [u, v] = map.map([x as f64 + at(i), y as f64 + at(j)]);
+                        *value += self.sample(u, v);
+                    }
+                }
+                *value *= scale;
+            }
+        });
+        out
     }
 
     /// Averages blocks of `factor`×`factor` pixels and drops incomplete blocks at the end: (H/f, W/f).

@@ -11,7 +11,7 @@ use phasefront_io::Result;
 ///
 /// # Errors
 /// Returns an error if three of the corners then lie on one line.
-pub(super) fn refined(
+pub(crate) fn refined(
     map: &Homography,
     light: &Array2<f32>,
     expected: &Array2<f32>,

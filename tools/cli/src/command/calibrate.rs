@@ -77,7 +77,7 @@ fn reading_captures(captures: &Path, colours: &[&str]) -> Result<()> {
 }
 
 /// Returns the channel of an RGB photograph that sees laser `colour` of `display`: 0 red, 1 green, 2 blue.
-fn channel(display: &Display, colour: usize) -> usize {
+pub(super) fn channel(display: &Display, colour: usize) -> usize {
     match display.wavelengths_m() {
         // Where two neighbouring channels of a camera see about as much.
         [laser_m] if *laser_m > 585e-9 => 0,
