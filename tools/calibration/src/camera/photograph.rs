@@ -146,8 +146,8 @@ impl Photograph {
         top + (bottom - top) * fy
     }
 
-    /// Resamples the photograph to pixels of `size`, (H, W). `map` takes their places to the photograph, in which one of
-    /// them is about `zoom` pixels wide. Each value is the mean over a pixel, as a fraction of the sensor's range.
+    /// Resamples the photograph to pixels of `size`, (H, W). `map` takes their places to the photograph, in which
+    /// each is about `zoom` pixels wide. Each value is the mean over a pixel, as a fraction of the sensor's range.
     pub fn through(&self, map: &Homography, zoom: f64, Size { width, height }: Size) -> Array2<f32> {
         let n = zoom.ceil().clamp(1.0, 8.0) as usize;
         let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;

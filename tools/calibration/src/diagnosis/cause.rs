@@ -474,8 +474,8 @@ impl Search<'_> {
     }
 
     /// Returns the shifts whose ghost image lowers what is left of the photographs fastest, by the gradient of its
-    /// square: the correlation of each laser's field, weighted by what is left, with the ghost image's. Returns how fast,
-    /// too.
+    /// square: the correlation of each laser's field, weighted by what is left, with the ghost image's. Returns how
+    /// fast, too.
     fn ghost_shifts(
         &self,
         state: &State,

@@ -1,5 +1,5 @@
-//! Where the hologram's picture lies in a photograph, without the assumption that it is right: any orientation, size and
-//! place, with views from several distances.
+//! Where the hologram's picture lies in a photograph, without the assumption that it is right: any orientation, size
+//! and place, with views from several distances.
 
 use super::scene::{Rect, Scene};
 use super::score::{Comparison, Sampled, map_of, plain};
