@@ -8,13 +8,11 @@ use phasefront_calibration::camera::pattern::Pattern;
 use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_calibration::camera::program::{self, Shot};
 use phasefront_calibration::colours;
-use phasefront_calibration::diagnosis::{Finding, Shown, diagnose_at};
 use phasefront_calibration::learned::album::Album;
 use phasefront_calibration::learned::fit::{self, Fitted, Sample};
 use phasefront_calibration::learned::scenes::{self, Scene};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag};
 use phasefront_command::terminal::{self, progress_bar};
-use phasefront_core::display::levels::Levels;
 use phasefront_core::display::model::Model;
 use phasefront_core::runtime::file;
 use phasefront_io::display::calibration;
@@ -95,9 +93,8 @@ impl LearnModel {
         if missing > 0 {
             return Ok(self.ask(missing));
         }
-        let fitted: Result<Vec<_>> = jobs.iter().map(|job| job.fit(capture)).collect();
-        let (fitted, firsts): (Vec<Fitted>, Vec<Sample>) = fitted?.into_iter().unzip();
-        let left = left(&target, &firsts)?;
+        let fitted: Result<Vec<Fitted>> = jobs.iter().map(|job| job.fit(capture)).collect();
+        let fitted = fitted?;
         let misfit: Vec<[f64; 2]> = fitted.iter().map(|one| one.misfit).collect();
         let models = fitted.into_iter().map(|one| one.model).collect();
         calibration::write_model(&self.output, &Model::new(fit::nodes(target.modulator()), models)?)?;
@@ -105,8 +102,8 @@ impl LearnModel {
             let all: Vec<_> = misfit.iter().map(|of| format!("{:.3}", of[which])).collect();
             all.join(" / ")
         };
-        let told = Told::new(
-            json!({"output": self.output.display().to_string(), "misfit": misfit, "left": left}),
+        Ok(Told::new(
+            json!({"output": self.output.display().to_string(), "misfit": misfit}),
             format!(
                 "{}: misfit of the light {} without the model, {} with it ({})",
                 terminal::name(&self.output),
@@ -114,11 +111,7 @@ impl LearnModel {
                 list(1),
                 names.join(" / ")
             ),
-        );
-        Ok(Told {
-            table: in_words(&left),
-            ..told
-        })
+        ))
     }
 
     /// Writes the list of holograms, or compares it with that of an earlier run.
@@ -159,34 +152,6 @@ impl LearnModel {
     }
 }
 
-/// Returns what a photograph of each laser's light says is wrong with the display before the model.
-fn left(target: &Target, samples: &[Sample]) -> Result<Vec<Finding>> {
-    let levels: Vec<u8> = samples
-        .iter()
-        .flat_map(|sample| sample.scene.levels.iter().copied())
-        .collect();
-    let shown = Shown {
-        levels: Levels::Bytes(&levels),
-        size: target.modulator(),
-        target,
-        z_m: samples[0].scene.z_m,
-    };
-    let photographs: Vec<_> = samples.iter().map(|sample| sample.photograph.clone()).collect();
-    let corners = samples[0].registration.corners(target.modulator());
-    Ok(diagnose_at(&shown, &photographs, corners)?.findings)
-}
-
-fn in_words(left: &[Finding]) -> String {
-    let all: Vec<_> = left
-        .iter()
-        .map(|finding| format!("{}: {}", finding.cause, finding.evidence))
-        .collect();
-    match all.as_slice() {
-        [] => "left for the model: nothing that has a name".into(),
-        all => format!("left for the model: {}", all.join("; ")),
-    }
-}
-
 /// The photographs of one colour.
 struct OfColour<'a> {
     target: &'a Target,
@@ -203,9 +168,9 @@ impl OfColour<'_> {
         there("marks") && (0..self.count).all(|index| there(&format!("{index:03}")))
     }
 
-    /// Fits the model to the photographs. Returns the first of them too.
-    fn fit(&self, capture: &mut Capture<'_>) -> Result<(Fitted, Sample)> {
-        let (mut samples, _) = self.samples(capture)?;
+    /// Fits the model to the photographs.
+    fn fit(&self, capture: &mut Capture<'_>) -> Result<Fitted> {
+        let (samples, _) = self.samples(capture)?;
         let bar = progress_bar(0, self.name);
         let progress = |done: usize, of: usize| {
             bar.set_length(of as u64);
@@ -213,8 +178,7 @@ impl OfColour<'_> {
         };
         let fitted = fit::fit(self.target, self.colour, &samples, &progress);
         bar.finish_and_clear();
-        let fitted = fitted.map_err(|e| Error::file(&self.folder, e))?;
-        Ok((fitted, samples.swap_remove(0)))
+        fitted.map_err(|e| Error::file(&self.folder, e))
     }
 
     /// Returns the photographs and the number of those that are missing. A program takes them if there is one.
