@@ -21,6 +21,7 @@ mod colours;
 mod command;
 mod depth_files;
 mod devices;
+mod diagnose;
 mod doctor;
 mod encode;
 mod films;
