@@ -6,6 +6,7 @@
 pub mod align;
 pub mod camera;
 pub mod condition;
+pub mod enlarged;
 pub mod image;
 pub mod range;
 pub mod sharpness;

@@ -15,6 +15,7 @@ use phasefront::input::RgbEncoding;
 use phasefront_core::depth;
 use phasefront_core::depth::DepthUnit;
 use phasefront_core::depth::condition::Conditioner;
+use phasefront_core::depth::enlarged::{self, Enlarged};
 use std::fmt::Display;
 use std::path::Path;
 
@@ -111,6 +112,8 @@ pub(crate) fn stored(
 pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions, asked: Option<RgbEncoding>) -> Result<Captured> {
     let warn = |doubt: Doubt| log::warn!("{}: {doubt}", depth_path.display());
     let Stored { colours, readings } = stored([rgb_path, depth_path], options, asked, &mut { warn })?;
+    let (readings, enlarged) = before_enlarging(readings, colours.size());
+    enlarged.map(Doubt::Enlarged).into_iter().for_each(warn);
     let Colours { rgb, encoding } = colours;
     let normalized = depth::normalize(readings.view(), options.unit, options.near_m, options.far_m)
         .map_err(|e| Error::file(depth_path, e))?;
@@ -141,6 +144,20 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions, asked: Op
         depth: normalized.depth,
         shown,
     })
+}
+
+/// Returns the readings that `depth`, (H, W), was enlarged from, if it is as large as its `picture` and was enlarged;
+/// otherwise `depth`.
+pub(crate) fn before_enlarging(depth: Array2<f32>, picture: Size) -> (Array2<f32>, Option<Enlarged>) {
+    match of_size(Size::from_shape(depth.dim()), picture).then(|| enlarged::find(depth.view())) {
+        Some(Some(found)) => (found.readings(depth.view()), Some(found)),
+        _ => (depth, None),
+    }
+}
+
+/// Checks whether depth has at least the size of its picture. Smaller depth has the sensor's size.
+pub(crate) fn of_size(depth: Size, picture: Size) -> bool {
+    depth.width >= picture.width && depth.height >= picture.height
 }
 
 /// Refuses numbers that normalized depth cannot have.
@@ -207,6 +224,8 @@ pub(crate) fn is_turned_alone(depth_path: &Path, depth: &DepthFile, colour: Orie
 /// What is doubtful about a frame's depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Doubt {
+    /// It was enlarged from fewer readings, which are taken in its place.
+    Enlarged(Enlarged),
     /// The colour's Exif data turned the colour alone, though both shapes match.
     Turned(Orientation),
     /// Normalized depth reaches only this value.
@@ -299,6 +318,7 @@ impl Doubt {
 impl Display for Doubt {
     fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Doubt::Enlarged(how) => write!(to, "was {how}; it is conditioned as depth of that size"),
             Doubt::Turned(how) => write!(
                 to,
                 "is taken as it is, upright; the colour's Exif data turn the colour: {how:?}"

@@ -76,6 +76,14 @@ impl<'a> Method<'a> {
         }
     }
 
+    /// Returns the midpoint hologram, (C, H, W), of `scene`.
+    ///
+    /// # Errors
+    /// Returns the errors of the method.
+    pub fn field(&self, scene: &Ldi) -> Result<Array3<Complex32>> {
+        (self.field)(scene)
+    }
+
     /// Takes the visible image itself, with phase 0, as the field: the baseline without any computation.
     pub fn rgb(display: &'a Display) -> Self {
         Self::new("rgb", move |ldi| {

@@ -2,6 +2,7 @@
 //! volume needs. Both compare the amplitudes of midpoint holograms with those of the finest setting, over random
 //! scenes.
 
+pub mod enlarged;
 pub mod flicker;
 pub mod occlusion;
 pub mod slopes;

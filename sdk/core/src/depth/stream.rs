@@ -4,13 +4,14 @@
 use super::align::Cameras;
 use super::camera::{Alignment, CameraFrame};
 use super::condition::{ConditionScratch, ConditionedReadings, Conditioner};
+use super::enlarged::{self, Enlarged};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::smoothing::Smoother;
 use crate::Size;
 use crate::frame::{Crop, Orientation, Past, Plane};
 use crate::runtime::error::{Error, Result};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use std::time::Duration;
 
 /// The depth settings of a session.
@@ -57,6 +58,8 @@ pub struct DepthReport {
     pub range_m: Option<(f32, f32)>,
     /// The share of the sensor's pixels with a usable reading.
     pub valid: f32,
+    /// How the depth was enlarged to the colour's size, if it was. Its own readings were conditioned.
+    pub enlarged: Option<Enlarged>,
 }
 
 /// The inputs that determine the plans and the memory of a [`DepthStream`].
@@ -77,7 +80,14 @@ struct Plan {
     confidence: Vec<f32>,
     /// Buffers for `values` and `confidence` while they are aligned or turned.
     moved: (Vec<f32>, Vec<f32>),
+    /// How the depth was enlarged to the colour's size. The conditioner then takes the readings that it came from.
+    enlarged: Option<Enlarged>,
+    /// The number of frames until depth of the colour's size is examined for that.
+    examined_in: u32,
 }
+
+/// The number of frames after which depth that was not enlarged is examined again: the first may show too few edges.
+const EXAMINED_EVERY: u32 = 64;
 
 /// Processes the depth of a sequence of frames for one display shape.
 pub struct DepthStream {
@@ -112,8 +122,13 @@ impl DepthStream {
         self.range.reset();
         self.relative_range.reset();
         self.smoother.reset();
+        // A frame without a past depends on no frame before it.
+        if self.plan.as_ref().is_some_and(|plan| plan.enlarged.is_some()) {
+            self.plan = None;
+        }
         if let Some(plan) = &mut self.plan {
             plan.scratch.reset();
+            plan.examined_in = 0;
         }
     }
 
@@ -160,7 +175,8 @@ impl DepthStream {
     /// Reads the depth of `frame` and conditions its readings along the edges of `rgb`.
     ///
     /// `rgb`, (3, H, W), is the part [`Crop::cover`] of the frame's colour. Without a `past` there is no previous
-    /// frame to smooth with. Later frames of the same layout do not allocate.
+    /// frame to smooth with. Later frames of the same layout do not allocate, unless depth of the colour's size is
+    /// [`Enlarged`] or examined for that.
     ///
     /// # Errors
     /// Returns an error if the frame has no depth or no usable reading.
@@ -238,8 +254,9 @@ impl DepthStream {
                 layout.sensor.width, layout.sensor.height, self.options.least_confidence
             )));
         }
+        plan.shrink(self.out)?;
         let elapsed = past.map_or(Duration::ZERO, |past| past.elapsed);
-        let width = plan.upright().width;
+        let width = plan.grid().width;
         let metric = layout.format.is_metric();
         if metric {
             self.smoother.smooth(&mut plan.values, width, elapsed, true);
@@ -268,20 +285,27 @@ impl DepthStream {
         plan.conditioner.find(&plan.values, rgb, &mut plan.scratch)?;
         Ok(DepthReport {
             range_m: range.filter(|_| metric),
-            valid: found as f32 / plan.values.len() as f32,
+            valid: found as f32 / layout.sensor.pixels() as f32,
+            enlarged: plan.enlarged,
         })
+    }
+}
+
+impl Layout {
+    /// Plans the conditioning of `readings` of the sensor's field of view, upright.
+    fn conditioner(&self, readings: Size, out: Size) -> Result<Conditioner> {
+        let colour = self.orientation.upright_size(self.colour);
+        let crop = Crop::cover(colour, out).scaled(
+            readings.width as f64 / colour.width as f64,
+            readings.height as f64 / colour.height as f64,
+        );
+        Conditioner::new(readings, crop, out, self.cameras.is_some())
     }
 }
 
 impl Plan {
     fn new(layout: Layout, out: Size) -> Result<Self> {
-        let upright = layout.orientation.upright_size(layout.sensor);
-        let colour = layout.orientation.upright_size(layout.colour);
-        let crop = Crop::cover(colour, out).scaled(
-            upright.width as f64 / colour.width as f64,
-            upright.height as f64 / colour.height as f64,
-        );
-        let conditioner = Conditioner::new(upright, crop, out, layout.cameras.is_some())?;
+        let conditioner = layout.conditioner(layout.orientation.upright_size(layout.sensor), out)?;
         let scratch = conditioner.scratch();
         let plane = || vec![f32::NAN; layout.sensor.pixels()];
         Ok(Plan {
@@ -291,6 +315,8 @@ impl Plan {
             values: plane(),
             confidence: plane(),
             moved: (plane(), plane()),
+            enlarged: None,
+            examined_in: 0,
         })
     }
 
@@ -298,9 +324,39 @@ impl Plan {
         self.layout.orientation.upright_size(self.layout.sensor)
     }
 
+    /// Returns the size of the readings that are conditioned, upright.
+    fn grid(&self) -> Size {
+        self.enlarged.map_or(self.upright(), |enlarged| enlarged.grid)
+    }
+
+    /// Replaces `values` that were enlarged to the colour's size by the readings that they came from.
+    fn shrink(&mut self, out: Size) -> Result<()> {
+        let layout = self.layout;
+        if layout.sensor != layout.colour || layout.cameras.is_some() {
+            return Ok(());
+        }
+        let depth = ArrayView2::from_shape(self.upright().shape(), &self.values).expect("upright values");
+        if self.enlarged.is_none() {
+            let is_due = self.examined_in == 0;
+            self.examined_in = self.examined_in.checked_sub(1).unwrap_or(EXAMINED_EVERY - 1);
+            self.enlarged = if is_due { enlarged::find(depth) } else { None };
+            if let Some(found) = self.enlarged {
+                self.conditioner = layout.conditioner(found.grid, out)?;
+                self.scratch = self.conditioner.scratch();
+            }
+        }
+        if let Some(found) = self.enlarged {
+            let readings = found.readings(depth);
+            self.values.clear();
+            self.values.extend(readings.iter());
+        }
+        Ok(())
+    }
+
     /// Reads `image`, aligned with the colour and upright, into `values` and `confidence`, and returns the number of
     /// readings.
     fn readings(&mut self, image: &DepthImage<'_>, least: f32) -> usize {
+        self.values.resize(self.layout.sensor.pixels(), f32::NAN);
         let mut found = image.readings(least, &mut self.values, &mut self.confidence);
         if let Some(cameras) = self.layout.cameras {
             found = cameras.reproject(

@@ -2,6 +2,7 @@
 //! benefit of temporal smoothing of video, as a table and JSON, the plane sweep's ablation, and the sweep on slopes
 //! and on other displays.
 
+mod enlarged;
 mod flicker;
 
 use super::sensors::{self, Sensors};
@@ -19,8 +20,8 @@ use phasefront_lab::study::{self, Row, Scenes};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Study the number of layers or planes that a hologram needs, the benefit of the plane sweep's parts, and the flicker
-/// of video
+/// Study the number of layers or planes that a hologram needs, the benefit of the plane sweep's parts, the flicker of
+/// video, and depth that was enlarged
 #[derive(Args)]
 pub(crate) struct Study {
     /// The study to run
@@ -42,9 +43,9 @@ pub(crate) struct Study {
     /// Seed of the first scene, or of the first reading of --data; the others use the following seeds
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 48))]
     seed: u64,
-    /// Folder of a data set whose scenes, from the first, the study of flicker takes instead of random ones. They need
-    /// --sensor
-    #[arg(long, value_name = "DIR", requires = "sensor")]
+    /// Folder of a data set whose scenes, from the first, the study of enlarged depth takes, and with --sensor that of
+    /// flicker
+    #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     #[arg(
         long,
@@ -81,12 +82,15 @@ enum What {
     Displays,
     /// How much the displayed image of a static scene changes from frame to frame, over 30 frames of each scene
     Flicker,
+    /// What it is worth to read enlarged depth on the grid that it came from, on the scenes of --data
+    Enlarged,
 }
 
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let of_planes = self.what == What::Planes;
         let of_flicker = self.what == What::Flicker;
+        let of_enlarged = self.what == What::Enlarged;
         check_used(&[
             (
                 "--display",
@@ -103,11 +107,22 @@ impl Study {
             (
                 "--size",
                 self.size.is_some(),
-                !of_flicker,
-                "studies other than of flicker",
+                !of_flicker && !of_enlarged,
+                "studies other than of flicker and of enlarged depth",
             ),
-            ("--planes", self.planes.is_some(), !of_flicker, "studies of exact waves"),
-            ("--data", self.data.is_some(), of_flicker, "the study of flicker"),
+            (
+                "--planes",
+                self.planes.is_some(),
+                !of_flicker && !of_enlarged,
+                "studies of exact waves",
+            ),
+            (
+                "--data",
+                self.data.is_some(),
+                of_enlarged || of_flicker && !self.sensor.is_empty(),
+                "the study of enlarged depth, and with --sensor that of flicker",
+            ),
+            ("--sensor", !self.sensor.is_empty(), of_flicker, "the study of flicker"),
         ])?;
         output::folder(&self.output, Holding::Anything)?;
         match self.what {
@@ -118,6 +133,7 @@ impl Study {
                     None => self.flicker(json),
                 };
             }
+            What::Enlarged => return self.enlarged(json),
             What::Sweep => return self.sweep(json),
             What::Slopes => return self.slopes(json),
             What::Displays => return self.displays(json),

@@ -13,6 +13,7 @@ mod skip;
 
 mod command;
 mod corrected;
+mod enlarged;
 mod evaluate;
 mod models;
 mod networks;

@@ -1,0 +1,238 @@
+//! The least squares fit of a line of pixels by an enlarged line of readings.
+
+use super::Enlarging;
+
+/// The number of readings that make a pixel, at most.
+const TAPS: usize = 4;
+/// The readings beyond both ends of a line that a shifted grid needs.
+const BEYOND: usize = 2;
+/// What is added to the diagonal of the normal equations, for readings beyond the ends that make no pixel.
+const RIDGE: f64 = 1e-9;
+
+/// A map from readings to pixels along one axis. The middle of pixel x lies at (x + ½)/factor − ½ among the readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kernel {
+    /// The reading nearest to the pixel's middle.
+    Nearest,
+    /// The reading nearest to the pixel's left end, as OpenCV and PyTorch take it. The same with whole factors.
+    NearestAtCorner,
+    Linear,
+    /// Keys' cubic with a = −½: Pillow, Catmull and Rom.
+    CubicHalf,
+    /// Keys' cubic with a = −¾: OpenCV, PyTorch.
+    CubicThreeQuarters,
+}
+
+impl Kernel {
+    pub(super) const ALL: [Kernel; 5] = [
+        Kernel::Nearest,
+        Kernel::NearestAtCorner,
+        Kernel::Linear,
+        Kernel::CubicHalf,
+        Kernel::CubicThreeQuarters,
+    ];
+
+    pub(super) fn enlarging(self) -> Enlarging {
+        match self {
+            Kernel::Nearest | Kernel::NearestAtCorner => Enlarging::Nearest,
+            Kernel::Linear => Enlarging::Bilinear,
+            Kernel::CubicHalf | Kernel::CubicThreeQuarters => Enlarging::Bicubic,
+        }
+    }
+
+    /// Returns the first reading that makes a pixel at `place` among the readings, and the weights from there on.
+    fn weights(self, place: f64) -> (f64, [f64; TAPS]) {
+        /// Places that lie on the border of two readings but for rounding belong to the second.
+        const ROUNDING: f64 = 1e-9;
+        let before = place.floor();
+        let t = place - before;
+        match self {
+            Kernel::Nearest | Kernel::NearestAtCorner => ((place + 0.5 + ROUNDING).floor(), [1.0, 0.0, 0.0, 0.0]),
+            Kernel::Linear => (before, [1.0 - t, t, 0.0, 0.0]),
+            Kernel::CubicHalf => (before - 1.0, cubic(t, -0.5)),
+            Kernel::CubicThreeQuarters => (before - 1.0, cubic(t, -0.75)),
+        }
+    }
+}
+
+/// Returns Keys' weights of the four readings around a place `t` after the second.
+fn cubic(t: f64, a: f64) -> [f64; TAPS] {
+    let near = |s: f64| ((a + 2.0) * s - (a + 3.0)) * s * s + 1.0;
+    let far = |s: f64| ((a * s - 5.0 * a) * s + 8.0 * a) * s - 4.0 * a;
+    [far(1.0 + t), near(t), near(1.0 - t), far(2.0 - t)]
+}
+
+/// The fit of lines of a given length.
+pub(super) struct Fit {
+    /// For each pixel the first of the readings that make it, and their weights. Beyond the ends, readings repeat.
+    taps: Vec<(usize, [f64; TAPS])>,
+    /// The Cholesky factor of the normal equations: of each row, the diagonal and the three entries left of it.
+    factor: Vec<[f64; TAPS]>,
+    /// The readings beyond the first that are no readings of the grid.
+    beyond: usize,
+    grid: usize,
+}
+
+/// Working memory.
+pub(super) struct FitScratch {
+    readings: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+impl Fit {
+    /// Plans lines of `pixels` that `kernel` made of `grid` readings, shifted by `shift` readings.
+    pub(super) fn new(pixels: usize, grid: usize, kernel: Kernel, shift: f64) -> Self {
+        let beyond = if shift == 0.0 { 0 } else { BEYOND };
+        let (count, factor) = (grid + 2 * beyond, pixels as f64 / grid as f64);
+        let corner = if kernel == Kernel::NearestAtCorner {
+            0.5 / factor
+        } else {
+            0.0
+        };
+        let taps = (0..pixels).map(|x| {
+            let place = (x as f64 + 0.5) / factor - 0.5 - corner + shift + beyond as f64;
+            let (first, weights) = kernel.weights(place);
+            let last = count as f64 - 1.0;
+            let from = first.clamp(0.0, (count - TAPS) as f64);
+            let mut clamped = [0.0; TAPS];
+            for (i, weight) in weights.into_iter().enumerate() {
+                // A weight of 0 may lie past the window.
+                let at = ((first + i as f64).clamp(0.0, last) - from) as usize;
+                clamped[at.min(TAPS - 1)] += weight;
+            }
+            (from as usize, clamped)
+        });
+        let taps: Vec<_> = taps.collect();
+        let factor = cholesky(&taps, count);
+        Fit {
+            taps,
+            factor,
+            beyond,
+            grid,
+        }
+    }
+
+    pub(super) fn scratch(&self) -> FitScratch {
+        FitScratch {
+            readings: vec![0.0; self.factor.len()],
+            errors: vec![0.0; self.taps.len()],
+        }
+    }
+
+    /// Returns the readings of the grid whose enlargement is nearest to `line`.
+    pub(super) fn readings<'a>(&self, line: &[f32], scratch: &'a mut FitScratch) -> &'a [f64] {
+        self.solve(line, &mut scratch.readings);
+        &scratch.readings[self.beyond..][..self.grid]
+    }
+
+    /// Returns how much each pixel of `line` differs from the nearest enlargement.
+    pub(super) fn errors<'a>(&self, line: &[f32], scratch: &'a mut FitScratch) -> &'a [f64] {
+        let FitScratch { readings, errors } = scratch;
+        self.solve(line, readings);
+        for ((error, value), (first, weights)) in errors.iter_mut().zip(line).zip(&self.taps) {
+            let made = &readings[*first..][..TAPS];
+            let made: f64 = weights.iter().zip(made).map(|(weight, reading)| weight * reading).sum();
+            *error = f64::from(*value) - made;
+        }
+        errors
+    }
+
+    fn solve(&self, line: &[f32], readings: &mut [f64]) {
+        readings.fill(0.0);
+        for (value, (first, weights)) in line.iter().zip(&self.taps) {
+            for (reading, weight) in readings[*first..][..TAPS].iter_mut().zip(weights) {
+                *reading += weight * f64::from(*value);
+            }
+        }
+        for i in 0..readings.len() {
+            let below: f64 = (1..TAPS.min(i + 1)).map(|k| self.factor[i][k] * readings[i - k]).sum();
+            readings[i] = (readings[i] - below) / self.factor[i][0];
+        }
+        let count = readings.len();
+        for i in (0..count).rev() {
+            let above: f64 = (1..TAPS.min(count - i))
+                .map(|k| self.factor[i + k][k] * readings[i + k])
+                .sum();
+            readings[i] = (readings[i] - above) / self.factor[i][0];
+        }
+    }
+}
+
+/// Returns the Cholesky factor of the normal equations of `taps` for `count` readings: entry k of row i is that of
+/// column i − k.
+fn cholesky(taps: &[(usize, [f64; TAPS])], count: usize) -> Vec<[f64; TAPS]> {
+    let mut rows = vec![[0.0; TAPS]; count];
+    for (first, weights) in taps {
+        for (i, weight) in weights.iter().enumerate() {
+            for (k, entry) in rows[first + i].iter_mut().take(i + 1).enumerate() {
+                *entry += weight * weights[i - k];
+            }
+        }
+    }
+    rows.iter_mut().for_each(|row| row[0] += RIDGE);
+    for i in 0..count {
+        for k in (0..TAPS.min(i + 1)).rev() {
+            let column = i - k;
+            let known: f64 = (1..TAPS - k)
+                .filter(|m| *m <= column)
+                .map(|m| rows[i][k + m] * rows[column][m])
+                .sum();
+            let rest = rows[i][k] - known;
+            rows[i][k] = if k == 0 { rest.sqrt() } else { rest / rows[column][0] };
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn the_fit_is_that_of_the_dense_normal_equations() {
+        let line: Vec<f32> = (0..70).map(|x| ((x * 37 + 11) % 29) as f32 / 29.0).collect();
+        for kernel in Kernel::ALL {
+            for (grid, shift) in [(35, 0.0), (20, 0.0), (10, 0.25), (14, 0.5)] {
+                let fit = Fit::new(line.len(), grid, kernel, shift);
+                let errors = fit.errors(&line, &mut fit.scratch()).to_vec();
+                // The errors of a least squares fit are orthogonal to every reading's enlargement.
+                let mut along = vec![0.0; fit.factor.len()];
+                for (error, (first, weights)) in errors.iter().zip(&fit.taps) {
+                    weights
+                        .iter()
+                        .enumerate()
+                        .for_each(|(i, weight)| along[first + i] += weight * error);
+                }
+                let most = along.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+                assert!(most < 1e-6, "{kernel:?} {grid} {shift}: {most}");
+            }
+        }
+    }
+
+    #[test]
+    fn readings_of_an_enlarged_line_are_those_that_made_it() {
+        let readings: Vec<f64> = (0..20).map(|i| f64::from((i * 7 + 3) % 11)).collect();
+        for kernel in Kernel::ALL {
+            for pixels in [40, 50, 60, 150] {
+                let fit = Fit::new(pixels, readings.len(), kernel, 0.0);
+                let line = fit.taps.iter().map(|(first, weights)| {
+                    weights
+                        .iter()
+                        .zip(&readings[*first..])
+                        .map(|(weight, reading)| weight * reading)
+                        .sum::<f64>() as f32
+                });
+                let line: Vec<f32> = line.collect();
+                let mut scratch = fit.scratch();
+                let found = fit.readings(&line, &mut scratch);
+                let apart = found
+                    .iter()
+                    .zip(&readings)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max);
+                assert!(apart < 1e-4, "{kernel:?} {pixels}: {apart}");
+            }
+        }
+    }
+}
