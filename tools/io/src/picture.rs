@@ -4,6 +4,7 @@ pub mod colours;
 pub mod depth_map;
 pub mod difference;
 pub mod export;
+pub(crate) mod heif;
 pub mod photo;
 pub mod plot;
 

@@ -21,15 +21,19 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// The flags for an RGB-D image, for flags that conflict with them. clap makes no group of a struct that holds others.
-pub(crate) const IMAGE_FLAGS: [&str; 7] = [
+pub(crate) const IMAGE_FLAGS: [&str; 8] = [
     "rgb",
     "depth",
+    "z_mm",
     "photo",
     "fit",
     "ColourFlags",
     "SeenDepthFlags",
     "DepthFlags",
 ];
+
+/// The value of --depth for a picture on one plane.
+const FLAT: &str = "flat";
 
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
@@ -42,19 +46,23 @@ pub(crate) struct FrameFlags {
         value_name = "FILE",
         requires = "rgb",
         conflicts_with = "depth_network",
-        help = format!("Depth image: {DEPTH_FORMATS}")
+        help = format!("Depth image: {DEPTH_FORMATS}; or `flat` for a picture on one plane, at --z-mm")
     )]
     depth: Option<PathBuf>,
-    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth)
+    /// Depth of the plane of --depth flat, mm from the middle of the volume, positive toward the viewer [default: 0]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "depth")]
+    z_mm: Option<f64>,
+    /// A phone's photo with depth inside: JPEG (GDepth, Dynamic Depth) or HEIC; with --depth-network any picture
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]
     photo: Option<PathBuf>,
     #[command(flatten)]
     colours: ColourFlags,
     #[command(flatten)]
     seen: SeenDepthFlags,
-    /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: unchanged;
-    /// contain with --photo]. A warning appears if the image's size differs from that of the --display, or, without
-    /// --display, if the image is larger than the default display
+    /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: contain
+    /// with --photo and for a picture that is wider and higher than the modulator; otherwise unchanged]. A warning
+    /// appears if the image's size differs from that of the --display, or, without --display, if the image is larger
+    /// than the default display
     #[arg(long, value_enum, help_heading = "Display")]
     fit: Option<FitName>,
     #[command(flatten)]
@@ -216,12 +224,14 @@ impl FrameFlags {
     pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
         let is_folder = |path: &Option<PathBuf>| path.as_ref().is_some_and(|path| path.is_dir());
         let (rgb, depth) = (is_folder(&self.rgb), is_folder(&self.depth));
+        let flat = self.is_flat();
         if let Some(folder) = self.photo.as_deref().filter(|path| path.is_dir()) {
             return of_one_folder(folder).map(Some);
         }
         match (&self.rgb, &self.depth) {
             (Some(colour), Some(depths)) if rgb && depth => of_two_folders(colour, depths).map(Some),
             (Some(colour), None) if rgb => of_one_folder(colour).map(Some),
+            (Some(colour), Some(_)) if rgb && flat => of_one_folder(colour).map(Some),
             (Some(_), Some(_)) if rgb || depth => Err(Error::Input(
                 "--rgb and --depth name two files, or two folders of files with equal names".into(),
             )),
@@ -231,9 +241,10 @@ impl FrameFlags {
 
     /// Returns the files, or the folders that [`Self::pictures`] reads.
     pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
-        [&self.rgb, &self.depth, &self.photo]
+        let depth = self.depth.as_deref().filter(|_| !self.is_flat());
+        [self.rgb.as_deref(), depth, self.photo.as_deref()]
             .into_iter()
-            .filter_map(|path| path.as_deref())
+            .flatten()
     }
 
     /// Selects one picture of a folder.
@@ -243,8 +254,14 @@ impl FrameFlags {
             self.photo = files.next();
         } else {
             self.rgb = files.next();
-            self.depth = files.next();
+            if !self.is_flat() {
+                self.depth = files.next();
+            }
         }
+    }
+
+    fn is_flat(&self) -> bool {
+        self.depth.as_ref().is_some_and(|depth| depth.as_os_str() == FLAT)
     }
 
     /// Returns the file of the picture.
@@ -264,6 +281,15 @@ impl FrameFlags {
         let asked = self.colours.asked();
         let mut distances = None;
         let (frame, encoding) = match (&self.rgb, &self.depth, &self.photo) {
+            (Some(rgb), Some(_), _) if self.is_flat() => {
+                let (Colours { rgb, encoding }, _) = colours::read(rgb, asked)?;
+                (self.flat(&rgb, display)?, encoding)
+            }
+            (Some(_), Some(_), _) if self.z_mm.is_some() => {
+                return Err(Error::Input(
+                    "--z-mm is for --depth flat; a depth image has depths of its own".into(),
+                ));
+            }
             (Some(rgb), Some(depth), _) => {
                 let options = self.depth_numbers.options(self.seen.invert)?;
                 let Captured {
@@ -279,18 +305,17 @@ impl FrameFlags {
                 let (Colours { rgb, encoding }, _) = colours::read(rgb, asked)?;
                 (self.by_network(&rgb, display)?, encoding)
             }
+            (None, _, Some(path)) if self.seen.network().is_some() => {
+                let (Colours { rgb, encoding }, _) = colours::read(path, asked)?;
+                (self.by_network(&rgb, display)?, encoding)
+            }
             (None, _, Some(path)) => {
                 let photo = photo::read(path, asked)?;
-                let Colours { rgb, encoding } = &photo.colours;
-                let frame = match self.seen.network() {
-                    Some(_) => self.by_network(rgb, display)?,
-                    None => self.of_photo(path, &photo, display)?,
-                };
-                (frame, *encoding)
+                (self.of_photo(path, &photo, display)?, photo.colours.encoding)
             }
             _ => {
                 return Err(Error::Input(
-                    "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
+                    "an image is needed: --rgb with --depth, --depth flat or --depth-network, or --photo".into(),
                 ));
             }
         };
@@ -309,7 +334,14 @@ impl FrameFlags {
     }
 
     fn placement(&self, picture: Size, display: &Display) -> Placement {
-        let default = self.photo.is_some().then_some(Fit::Contain);
+        let modulator = display.size();
+        let is_larger = picture.width > modulator.width && picture.height > modulator.height;
+        if self.fit.is_none() && is_larger {
+            log::warn!(
+                "the picture is {picture} and is fitted into the modulator's {modulator}; --fit cover or centre fills it, --display names a larger one"
+            );
+        }
+        let default = (self.photo.is_some() || is_larger).then_some(Fit::Contain);
         match self.fit.map(FitName::fit).or(default) {
             Some(fit) => Placement::new(picture, display.size(), fit),
             None => Placement::as_is(picture),
@@ -324,6 +356,27 @@ impl FrameFlags {
         let (_, height, width) = rgb.dim();
         let _stage = stage!("depth");
         frame::conditioned(rgb, &depth, &self.placement(Size { width, height }, display))
+    }
+
+    /// Makes the frame of a picture on one plane, at --z-mm.
+    fn flat(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
+        if self.seen.invert {
+            return Err(Error::Input(
+                "--invert has no meaning with --depth flat; --z-mm moves its plane".into(),
+            ));
+        }
+        let (_, height, width) = rgb.dim();
+        let (z_mm, half_mm) = (self.z_mm.unwrap_or(0.0), 500.0 * display.volume_depth_m());
+        if !(-half_mm..=half_mm).contains(&z_mm) {
+            return Err(Error::Input(format!(
+                "--z-mm {z_mm} lies outside the volume, from {} mm to {half_mm} mm",
+                -half_mm
+            )));
+        }
+        let placement = self.placement(Size { width, height }, display);
+        let depth = (0.5 - z_mm / (2.0 * half_mm)) as f32;
+        let depth = Array2::from_elem(placement.inner().shape(), depth);
+        placement.frame(placement.colour(rgb.view()), depth)
     }
 
     /// Makes the frame of a photo: from its distances if --near or --far is given, else from d_n unchanged.
@@ -347,7 +400,8 @@ impl FrameFlags {
         let (_, height, width) = rgb.dim();
         let (Some(path), Some(network)) = (self.seen.network(), self.seen.open(Size { width, height })?) else {
             return Err(Error::Input(
-                "--rgb needs --depth, or --depth-network that estimates it".into(),
+                "--rgb needs --depth, --depth-network that estimates it, or --depth flat for a picture on one plane"
+                    .into(),
             ));
         };
         let colours = rgb.as_standard_layout();

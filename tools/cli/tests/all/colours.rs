@@ -362,7 +362,7 @@ fn views_turn_light_back_into_srgb() {
 
 /// An ICC profile (version 2) of a matrix and a gamma, written by hand: `columns` are X, Y, Z of red, green and blue,
 /// adapted to D50.
-fn icc(columns: [Colour; 3], gamma: Option<f64>) -> Vec<u8> {
+pub(crate) fn icc(columns: [Colour; 3], gamma: Option<f64>) -> Vec<u8> {
     let fixed = |v: f64| ((v * 65536.0).round() as i32).to_be_bytes();
     let xyz = |v: Colour| [b"XYZ \0\0\0\0".as_slice(), &v.map(fixed).concat()].concat();
     let curve = match gamma {
@@ -415,7 +415,7 @@ fn icc(columns: [Colour; 3], gamma: Option<f64>) -> Vec<u8> {
 }
 
 /// Display P3's and Adobe RGB's colorants as their profiles have them, adapted to D50.
-const P3_COLORANTS: [Colour; 3] = [
+pub(crate) const P3_COLORANTS: [Colour; 3] = [
     [0.51512, 0.2412, -0.00105],
     [0.29198, 0.69225, 0.04189],
     [0.1571, 0.06657, 0.78407],

@@ -1123,3 +1123,62 @@ fn a_calibrated_display_is_packed_for_an_app() {
     let deep = [&pack[..4], &deep[..1], &pack[4..], &deep[1..]].concat();
     folder.refuses(&deep, 1, &["changes over depth"]);
 }
+
+/// A camera's photo is far larger than any modulator.
+#[test]
+fn a_picture_larger_than_the_modulator_is_fitted_and_told_of() {
+    let folder = Folder::new().with_frame();
+    fs::write(folder.path("display.toml"), "width = 24\nheight = 24").unwrap();
+    let output = folder.run(&made(&["--display", "display.toml"]));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && said.lines().count() == 1, "{said}");
+    assert!(
+        said.contains("48×32") && said.contains("24×24") && said.contains("--fit"),
+        "{said}"
+    );
+    let size = |name: &str| hologram::read_hologram(&folder.path(name)).unwrap().size();
+    assert_eq!(size("h.png"), Size { width: 24, height: 24 });
+}
+
+/// Depth that a program enlarged makes the hologram of the readings that it came from, and the command says so.
+#[test]
+fn depth_that_was_enlarged_is_read_on_its_own_grid() {
+    let folder = Folder::new();
+    let near = |x: u32, y: u32, i: u32| {
+        let (dx, dy) = (
+            x as i32 - (29 + 37 * i as i32) % 160,
+            y as i32 - (31 + 53 * i as i32) % 120,
+        );
+        dx * dx + dy * dy < 30 + 40 * (i as i32 % 7)
+    };
+    let shade = |x: u32, y: u32| (0..24).filter(|i| near(x, y, *i)).map(|i| 9 * i).max().unwrap_or(220) as u8;
+    let rgb = image::RgbImage::from_fn(160, 120, |x, y| image::Rgb([shade(x, y), 255 - shade(x, y), 80]));
+    rgb.save(folder.path("rgb.png")).unwrap();
+    let coarse = image::GrayImage::from_fn(40, 30, |x, y| image::Luma([shade(4 * x + 2, 4 * y + 2)]));
+    coarse.save(folder.path("coarse.png")).unwrap();
+    for filter in [
+        image::imageops::FilterType::Nearest,
+        image::imageops::FilterType::Triangle,
+    ] {
+        image::imageops::resize(&coarse, 160, 120, filter)
+            .save(folder.path("large.png"))
+            .unwrap();
+        let by = |depth: &str| {
+            let call = hologram("rgb.png", depth);
+            let output = folder.run(&[&call[..], &["--method", "sweep"]].concat());
+            let said = String::from_utf8(output.stderr).unwrap();
+            assert!(output.status.success(), "{said}");
+            (hologram::read_hologram(&folder.path("h.png")).unwrap(), said)
+        };
+        let ((small, nothing), (large, said)) = (by("coarse.png"), by("large.png"));
+        assert_eq!(nothing, "");
+        assert!(
+            said.lines().count() == 1 && said.contains("large.png: was enlarged 4 times"),
+            "{said}"
+        );
+        assert!(said.contains("from 40×30"), "{said}");
+        let view = |hologram: &hologram::Hologram| hologram.views(&[0.0]).unwrap().remove(0);
+        let apart = (view(&small) - view(&large)).mapv(f32::abs).mean().unwrap();
+        assert!(apart < 0.01, "{filter:?}: {apart}");
+    }
+}

@@ -1,4 +1,5 @@
 //! Tests photos with embedded depth, built byte by byte from the specifications, and depth from the user's own network.
+use crate::colours::{P3_COLORANTS, icc};
 use crate::depth_models;
 use crate::folder;
 use phasefront::Size;
@@ -11,9 +12,10 @@ use image::{DynamicImage, ImageFormat};
 use ndarray::Array3;
 use phasefront::input::{ColourScale, DepthNetwork};
 use phasefront_io::hologram;
-use phasefront_io::picture::photo;
+use phasefront_io::picture::photo::{self, Range};
 use std::fs;
 use std::io::Cursor;
+use std::process::Command;
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 32;
@@ -412,4 +414,161 @@ fn folders_of_photos_and_of_pictures_become_holograms_too() {
         assert!(read("h.png") == read(&format!("{out}/cat.png")));
     }
     assert!(folder.path("out-photos/dog.png").exists());
+}
+
+/// Checks that the command fails in one line that has all `words`.
+fn refuses(folder: &Folder, arguments: &[&str], words: &[&str]) {
+    let errors = folder.fails(arguments, 1);
+    assert!(
+        errors.lines().count() == 1 && words.iter().all(|word| errors.contains(word)),
+        "{errors}"
+    );
+}
+
+/// A picture without depth lies on one plane, and looks sharp there.
+#[test]
+fn a_picture_lies_on_one_plane() {
+    let folder = Folder::new();
+    colour().save(folder.path("rgb.png")).unwrap();
+    let call = |more: &[&'static str]| {
+        let base = [
+            "hologram", "--rgb", "rgb.png", "--depth", "flat", "--method", "sweep", "-o", "h.png",
+        ];
+        [&base[..], more].concat()
+    };
+    folder.succeeds(&call(&["--z-mm", "1.5"]));
+    let made = hologram::read_hologram(&folder.path("h.png")).unwrap();
+    let half = image::GrayImage::from_pixel(WIDTH, HEIGHT, image::Luma([64]));
+    half.save(folder.path("quarter.png")).unwrap();
+    let mut by_file = call(&[]);
+    by_file[4] = "quarter.png";
+    folder.succeeds(&by_file);
+    // z = 6 mm/2 − 6 mm·64/255 = 1.494 mm.
+    let known = hologram::read_hologram(&folder.path("h.png")).unwrap();
+    let view = |hologram: &hologram::Hologram, z_m: f64| hologram.views(&[z_m]).unwrap().remove(0);
+    let apart = |z_m: f64| (view(&made, 1.5e-3) - view(&known, z_m)).mapv(f32::abs).mean().unwrap();
+    assert!(
+        apart(1.494e-3) < 0.3 * apart(-1.5e-3),
+        "{} {}",
+        apart(1.494e-3),
+        apart(-1.5e-3)
+    );
+    refuses(&folder, &call(&["--z-mm", "3.5"]), &["--z-mm 3.5", "-3 mm to 3 mm"]);
+    by_file.extend(["--z-mm", "1"]);
+    refuses(&folder, &by_file, &["--z-mm is for --depth flat"]);
+    refuses(&folder, &call(&["--invert"]), &["--invert", "flat"]);
+}
+
+/// A photo that holds no depth takes that of a network, whatever its kind.
+#[test]
+fn a_photo_without_depth_takes_that_of_a_network() {
+    let folder = Folder::new();
+    image::DynamicImage::from(colour())
+        .to_rgb8()
+        .save(folder.path("plain.jpg"))
+        .unwrap();
+    colour().save(folder.path("plain.png")).unwrap();
+    fs::write(folder.path("depth.onnx"), network(Some((16, 24)), false)).unwrap();
+    for name in ["plain.jpg", "plain.png"] {
+        let call = [
+            "hologram", "--photo", name, "--method", "sweep", "-o", "h.png", "--fit", "centre",
+        ];
+        let network = ["--depth-network", "depth.onnx"];
+        folder.succeeds(&[&call[..], &network].concat());
+        assert!(hologram::read_hologram(&folder.path("h.png")).is_ok());
+    }
+    refuses(
+        &folder,
+        &["hologram", "--photo", "plain.jpg", "-o", "n.png"],
+        &["--depth-network", "--depth flat"],
+    );
+}
+
+/// Writes `name`.heic by libheif's encoder: `rgba` in Display P3, its alpha as the auxiliary picture of type `aux`, 1
+/// for alpha and 2 for depth.
+fn write_heic(folder: &Folder, name: &str, rgba: &image::RgbaImage, aux: u8) {
+    let mut png = std::io::BufWriter::new(fs::File::create(folder.path("rgba.png")).unwrap());
+    let mut encoder = image::codecs::png::PngEncoder::new(&mut png);
+    image::ImageEncoder::set_icc_profile(&mut encoder, icc(P3_COLORANTS, None)).unwrap();
+    let (w, h) = rgba.dimensions();
+    image::ImageEncoder::write_image(encoder, rgba, w, h, image::ExtendedColorType::Rgba8).unwrap();
+    drop(png);
+    let made = Command::new("heif-enc")
+        .args(["-L", "-p", "chroma=444", "rgba.png", "-o", "made.heic"])
+        .current_dir(folder.path("."))
+        .output();
+    let made = made.expect("heif-enc runs: apt-get install libheif-examples");
+    assert!(made.status.success(), "{made:?}");
+    let mut bytes = fs::read(folder.path("made.heic")).unwrap();
+    let kind = b"urn:mpeg:hevc:2015:auxid:1";
+    let at = bytes.windows(kind.len()).position(|found| found == kind).unwrap();
+    bytes[at + kind.len() - 1] = b'0' + aux;
+    fs::write(folder.path(&format!("{name}.heic")), bytes).unwrap();
+}
+
+/// An iPhone's portrait: HEIC in Display P3 with an auxiliary picture of disparity.
+#[test]
+fn a_heic_portrait_becomes_a_hologram() {
+    let folder = Folder::new();
+    let near = |x: u32, y: u32| (20..60).contains(&x) && (16..48).contains(&y);
+    let rgba = image::RgbaImage::from_fn(96, 64, |x, y| match near(x, y) {
+        true => image::Rgba([230, 120, (4 * x) as u8, 240]),
+        false => image::Rgba([40, (3 * y) as u8, 90, 30]),
+    });
+    write_heic(&folder, "portrait", &rgba, 2);
+    write_heic(&folder, "plain", &rgba, 1);
+    let read = photo::read(&folder.path("portrait.heic"), None).unwrap();
+    assert_eq!(read.colours.encoding, phasefront::input::RgbEncoding::DisplayP3);
+    assert_eq!((read.range, read.range_m), (Range::Inverse, None));
+    for (at, (x, y)) in [(40, 30), (5, 5), (80, 50)].into_iter().enumerate() {
+        let pixel = rgba.get_pixel(x, y).0;
+        let depth = 1.0 - f32::from(pixel[3]) / 255.0;
+        assert!((read.depth[(y as usize, x as usize)] - depth).abs() < 0.02, "{at}");
+        for channel in 0..3 {
+            let value = read.colours.rgb[(channel, y as usize, x as usize)];
+            assert!(
+                (value - f32::from(pixel[channel]) / 255.0).abs() < 0.03,
+                "{at} {channel}: {value}"
+            );
+        }
+    }
+    fs::write(folder.path("display.toml"), "width = 96\nheight = 64").unwrap();
+    let more = ["--display", "display.toml", "--method", "sweep", "-o", "h.png"];
+    folder.succeeds(&[&["hologram", "--photo", "portrait.heic"], &more[..]].concat());
+    assert!(hologram::read_hologram(&folder.path("h.png")).is_ok());
+    folder.succeeds(&[&["hologram", "--rgb", "plain.heic", "--depth", "flat"], &more[..]].concat());
+    refuses(
+        &folder,
+        &["hologram", "--photo", "plain.heic", "-o", "n.png"],
+        &["plain.heic", "no depth", "--depth-network"],
+    );
+    fs::write(folder.path("cut.heic"), b"\0\0\0\x18ftypheic\0\0\0\0mif1heic").unwrap();
+    refuses(
+        &folder,
+        &["hologram", "--photo", "cut.heic", "-o", "n.png"],
+        &["cut.heic", "heif-"],
+    );
+    // Without the program the message names its package.
+    for call in [
+        ["hologram", "--photo", "portrait.heic"],
+        ["hologram", "--rgb", "portrait.heic"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .args([&call[..], &["-o", "n.png"]].concat())
+            .args(if call[1] == "--rgb" {
+                &["--depth", "flat"][..]
+            } else {
+                &[]
+            })
+            .current_dir(folder.path("."))
+            .env("PATH", folder.path("."))
+            .output()
+            .unwrap();
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{errors}");
+        assert!(
+            errors.lines().count() == 1 && errors.contains("libheif-examples"),
+            "{errors}"
+        );
+    }
 }

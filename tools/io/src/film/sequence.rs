@@ -15,6 +15,8 @@ const TUM_UNITS_PER_M: f64 = 5000.0;
 const COLOUR_FOLDERS: [&str; 3] = ["rgb", "color", "image"];
 /// The file extensions of pictures.
 const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff"];
+/// The further file extensions of colour.
+const PHOTOS: [&str; 2] = ["heic", "heif"];
 /// The further file extensions of depth.
 const NUMBERS: [&str; 5] = ["exr", "npy", "npz", "pgm", "pfm"];
 
@@ -30,14 +32,17 @@ pub enum Shows {
 impl Shows {
     /// Checks whether the file at `path` may show this. Hidden files do not.
     fn is_by(self, path: &Path) -> bool {
-        let numbers = NUMBERS.iter().filter(|_| self == Shows::Depth);
+        let more: &[&str] = match self {
+            Shows::Colour => &PHOTOS,
+            Shows::Depth => &NUMBERS,
+        };
         let hidden = path
             .file_name()
             .is_none_or(|name| name.to_string_lossy().starts_with('.'));
         !hidden
             && PICTURES
                 .iter()
-                .chain(numbers)
+                .chain(more)
                 .any(|ending| output::has_extension(path, ending))
     }
 }

@@ -26,8 +26,8 @@ pub const MOST_PIXELS: u64 = 1 << 26;
 /// The maximum number of bytes of a PNG's colour profile, other metadata and a row of its pixels.
 const MOST_PNG_DATA: u64 = 1 << 25;
 
-/// Advice for HEIC and AVIF files, for which no maintained Rust decoder exists.
-const HEIC: &str = "is HEIC, which is not read; `heif-convert --with-aux photo.heic photo.jpg` of libheif writes the photo and its disparity as two pictures: give these to --rgb and --depth with --invert";
+/// Advice for HEIC and AVIF files, for which no maintained Rust decoder exists. libheif decodes HEIC's pictures.
+const HEIC: &str = "is HEIC, which is not read here; --photo takes it with its depth, --rgb its colour, and `heif-convert --with-aux` of libheif writes it as PNG";
 const AVIF: &str = "is AVIF, which is not read; save it as PNG or JPEG";
 
 /// Advice for GIF files, which are read nowhere because they hold at most 256 colours.
@@ -170,6 +170,11 @@ pub(crate) fn unread_container(head: &[u8]) -> Option<&'static str> {
         b"heic" | b"heix" | b"hevc" | b"heim" | b"mif1" | b"msf1" => Some(HEIC),
         _ => None,
     }
+}
+
+/// Checks whether `head` begins a HEIC file.
+pub(crate) fn is_heic(head: &[u8]) -> bool {
+    unread_container(head) == Some(HEIC)
 }
 
 /// Returns the kind of a file, from its first bytes.

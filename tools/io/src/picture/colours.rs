@@ -3,7 +3,7 @@
 
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PICTURE, quiet};
-use crate::picture;
+use crate::picture::{self, heif};
 use crate::{Error, Result};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
@@ -87,6 +87,9 @@ enum Said {
 /// # Errors
 /// Returns the errors of [`picture::read_rgb`].
 pub fn read(path: &Path, asked: Option<RgbEncoding>) -> Result<(Colours, Orientation)> {
+    if heif::is(path)? {
+        return Ok((heif::decode(path)?.colours(asked)?, Orientation::NoTransforms));
+    }
     let (image, orientation) = decode::open_picture(path, Reading::UPRIGHT)?;
     let said = match asked {
         Some(encoding) => Said::Encoding(encoding),

@@ -1,4 +1,5 @@
-//! Photos with embedded depth from phones: JPEGs with XMP of GDepth or Dynamic Depth 1.0.
+//! Photos with embedded depth from phones: JPEGs with XMP of GDepth or Dynamic Depth 1.0, and HEIC with an auxiliary
+//! picture of disparity ([`heif`]).
 //!
 //! * GDepth (`developers.google.com/depthmap-metadata`): the XMP itself contains the depth image in base64. An image
 //!   too long for one segment is in extended XMP (Adobe's XMP specification, part 3).
@@ -7,13 +8,16 @@
 //! A depth image holds d_n from 0, near, to 1, far. `RangeLinear`: d = near + d_n·(far − near). `RangeInverse`, which
 //! portrait modes use: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
 
+use crate::frame::{Doubt, before_enlarging, check_aspect};
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PHOTO};
 use crate::picture::colours::{self, Colours};
+use crate::picture::heif;
 use crate::{Error, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
 use ndarray::Array2;
+use phasefront::Size;
 use phasefront::input::RgbEncoding;
 use roxmltree::{Document, Node};
 use std::path::Path;
@@ -77,7 +81,33 @@ impl Photo {
 /// Returns an error with advice if the file is missing or broken or has no supported depth.
 pub fn read(path: &Path, asked: Option<RgbEncoding>) -> Result<Photo> {
     let bytes = input::bytes(path, MOST_PHOTO)?;
+    if decode::is_heic(&bytes) {
+        return of_heic(path, asked);
+    }
     of_bytes(&bytes, &path.display().to_string(), asked).map_err(|why| Error::file(path, why))
+}
+
+/// Reads a portrait in HEIC, whose depth is disparity.
+fn of_heic(path: &Path, asked: Option<RgbEncoding>) -> Result<Photo> {
+    let decoded = heif::decode(path)?;
+    let colours = decoded.colours(asked)?;
+    let Some(disparity) = decoded.disparity()? else {
+        return Err(Error::file(
+            path,
+            "holds no depth, which phones store in portraits; for other photos there is --depth-network, and --rgb with --depth flat",
+        ));
+    };
+    check_aspect(Size::from_shape(disparity.dim()), colours.size()).map_err(|why| Error::file(path, why))?;
+    let (depth, enlarged) = before_enlarging(disparity.mapv(|d| 1.0 - d), colours.size());
+    if let Some(enlarged) = enlarged {
+        log::warn!("{}: its depth {}", path.display(), Doubt::Enlarged(enlarged));
+    }
+    Ok(Photo {
+        colours,
+        depth,
+        range: Range::Inverse,
+        range_m: None,
+    })
 }
 
 fn of_bytes(bytes: &[u8], name: &str, asked: Option<RgbEncoding>) -> std::result::Result<Photo, String> {
@@ -85,7 +115,7 @@ fn of_bytes(bytes: &[u8], name: &str, asked: Option<RgbEncoding>) -> std::result
         return Err(why.into());
     }
     if !bytes.starts_with(&[0xFF, 0xD8]) {
-        return Err("is no JPEG; --photo takes a JPEG with depth inside, other pictures go to --rgb with --depth or --depth-network".into());
+        return Err("is no JPEG; --photo takes a JPEG with depth inside, or with --depth-network any picture; other pictures go to --rgb with --depth".into());
     }
     let (colour, orientation) = decode::picture_of(bytes, Reading::UPRIGHT)?;
     let found = Xmp::read(bytes)?.depth(bytes)?;
@@ -100,9 +130,15 @@ fn of_bytes(bytes: &[u8], name: &str, asked: Option<RgbEncoding>) -> std::result
     let grey = depth.into_luma16();
     let (w, h) = (grey.width() as usize, grey.height() as usize);
     let grey = grey.into_raw().into_iter().map(|v| f32::from(v) / 65535.0);
+    let colours = colours::of_bytes(colour, bytes, name, asked)?;
+    let depth = Array2::from_shape_vec((h, w), grey.collect()).map_err(|e| e.to_string())?;
+    let (depth, enlarged) = before_enlarging(depth, colours.size());
+    if let Some(enlarged) = enlarged {
+        log::warn!("{name}: its depth {}", Doubt::Enlarged(enlarged));
+    }
     Ok(Photo {
-        colours: colours::of_bytes(colour, bytes, name, asked)?,
-        depth: Array2::from_shape_vec((h, w), grey.collect()).map_err(|e| e.to_string())?,
+        colours,
+        depth,
         range: found.range,
         range_m: found.range_m,
     })
@@ -133,7 +169,7 @@ impl Xmp {
             }
         }
         let main = main.ok_or(
-            "holds no depth: it has no XMP. Phones store depth in portraits; for other photos there is --depth-network",
+            "holds no depth: it has no XMP. Phones store depth in portraits; for other photos there is --depth-network, and --rgb with --depth flat",
         )?;
         let main = String::from_utf8(main.to_vec()).map_err(|_| "its XMP is no UTF-8")?;
         let extended = if parts.is_empty() {
@@ -171,7 +207,7 @@ impl Xmp {
             let image = item(&main, jpeg, uri)?.to_vec();
             return Found::new(image, |name| value(DEPTH_MAP, name));
         }
-        Err("holds no depth: its XMP has neither GDepth nor Dynamic Depth. Phones store depth in portraits; for other photos there is --depth-network".into())
+        Err("holds no depth: its XMP has neither GDepth nor Dynamic Depth. Phones store depth in portraits; for other photos there is --depth-network, and --rgb with --depth flat".into())
     }
 }
 
