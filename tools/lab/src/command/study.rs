@@ -88,42 +88,7 @@ enum What {
 
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        let of_planes = self.what == What::Planes;
-        let of_flicker = self.what == What::Flicker;
-        let of_enlarged = self.what == What::Enlarged;
-        check_used(&[
-            (
-                "--display",
-                self.display.is_given(),
-                self.what != What::Displays && self.data.is_none(),
-                "studies of one display, `displays` and --data have displays of their own",
-            ),
-            (
-                "--ldi-layers",
-                self.ldi_layers.is_some(),
-                of_planes,
-                "the study of planes",
-            ),
-            (
-                "--size",
-                self.size.is_some(),
-                !of_flicker && !of_enlarged,
-                "studies other than of flicker and of enlarged depth",
-            ),
-            (
-                "--planes",
-                self.planes.is_some(),
-                !of_flicker && !of_enlarged,
-                "studies of exact waves",
-            ),
-            (
-                "--data",
-                self.data.is_some(),
-                of_enlarged || of_flicker && !self.sensor.is_empty(),
-                "the study of enlarged depth, and with --sensor that of flicker",
-            ),
-            ("--sensor", !self.sensor.is_empty(), of_flicker, "the study of flicker"),
-        ])?;
+        self.check_flags()?;
         output::folder(&self.output, Holding::Anything)?;
         match self.what {
             What::Layers | What::Planes => {}
@@ -171,6 +136,46 @@ impl Study {
         }
         terminal::print(json, &result, text);
         Ok(())
+    }
+
+    /// Returns an error for flags that the study does not use.
+    fn check_flags(&self) -> Result<()> {
+        let of_planes = self.what == What::Planes;
+        let of_flicker = self.what == What::Flicker;
+        let of_enlarged = self.what == What::Enlarged;
+        check_used(&[
+            (
+                "--display",
+                self.display.is_given(),
+                self.what != What::Displays && self.data.is_none(),
+                "studies of one display, `displays` and --data have displays of their own",
+            ),
+            (
+                "--ldi-layers",
+                self.ldi_layers.is_some(),
+                of_planes,
+                "the study of planes",
+            ),
+            (
+                "--size",
+                self.size.is_some(),
+                !of_flicker && !of_enlarged,
+                "studies other than of flicker and of enlarged depth",
+            ),
+            (
+                "--planes",
+                self.planes.is_some(),
+                !of_flicker && !of_enlarged,
+                "studies of exact waves",
+            ),
+            (
+                "--data",
+                self.data.is_some(),
+                of_enlarged || of_flicker && !self.sensor.is_empty(),
+                "the study of enlarged depth, and with --sensor that of flicker",
+            ),
+            ("--sensor", !self.sensor.is_empty(), of_flicker, "the study of flicker"),
+        ])
     }
 
     fn scenes(&self) -> Result<Scenes> {

@@ -159,16 +159,7 @@ pub fn study(
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Row>> {
     let viewer = Viewer::new(manifest)?;
-    let mut cases = vec![(1.0, None)];
-    cases.extend(
-        FACTORS
-            .iter()
-            .flat_map(|factor| WAYS.iter().map(move |way| (*factor, Some(way.0)))),
-    );
-    let cases: Vec<_> = cases
-        .iter()
-        .flat_map(|case| Spoiled::ALL.map(|spoiled| (*case, spoiled)))
-        .collect();
+    let cases = cases();
     let of_scene = |index: usize| {
         let pair = dataset::read_pair(manifest, dir, index)?;
         let (rgb, truth) = (visible_rgb(&pair.ldi), visible_depth(&pair.ldi));
@@ -236,6 +227,19 @@ pub fn study(
         }
     });
     Ok(rows.collect())
+}
+
+/// A factor, the way of enlarging, `None` for the true depth, and what became of the depth.
+type Case = ((f64, Option<Enlarging>), Spoiled);
+
+fn cases() -> Vec<Case> {
+    let enlarged = FACTORS
+        .iter()
+        .flat_map(|factor| WAYS.iter().map(move |way| (*factor, Some(way.0))));
+    std::iter::once((1.0, None))
+        .chain(enlarged)
+        .flat_map(|case| Spoiled::ALL.map(|spoiled| (case, spoiled)))
+        .collect()
 }
 
 fn mean(all: impl ExactSizeIterator<Item = Quality>) -> Quality {
