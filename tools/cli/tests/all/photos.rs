@@ -463,10 +463,7 @@ fn a_picture_lies_on_one_plane() {
 #[test]
 fn a_photo_without_depth_takes_that_of_a_network() {
     let folder = Folder::new();
-    image::DynamicImage::from(colour())
-        .to_rgb8()
-        .save(folder.path("plain.jpg"))
-        .unwrap();
+    colour().to_rgb8().save(folder.path("plain.jpg")).unwrap();
     colour().save(folder.path("plain.png")).unwrap();
     fs::write(folder.path("depth.onnx"), network(Some((16, 24)), false)).unwrap();
     for name in ["plain.jpg", "plain.png"] {
@@ -524,10 +521,10 @@ fn a_heic_portrait_becomes_a_hologram() {
         let pixel = rgba.get_pixel(x, y).0;
         let depth = 1.0 - f32::from(pixel[3]) / 255.0;
         assert!((read.depth[(y as usize, x as usize)] - depth).abs() < 0.02, "{at}");
-        for channel in 0..3 {
+        for (channel, level) in pixel.iter().enumerate().take(3) {
             let value = read.colours.rgb[(channel, y as usize, x as usize)];
             assert!(
-                (value - f32::from(pixel[channel]) / 255.0).abs() < 0.03,
+                (value - f32::from(*level) / 255.0).abs() < 0.03,
                 "{at} {channel}: {value}"
             );
         }
