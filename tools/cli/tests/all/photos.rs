@@ -483,6 +483,7 @@ fn a_photo_without_depth_takes_that_of_a_network() {
 
 /// Writes `name`.heic by libheif's encoder: `rgba` in Display P3, its alpha as the auxiliary picture of type `aux`, 1
 /// for alpha and 2 for depth.
+#[cfg(not(windows))]
 fn write_heic(folder: &Folder, name: &str, rgba: &image::RgbaImage, aux: u8) {
     let mut png = std::io::BufWriter::new(fs::File::create(folder.path("rgba.png")).unwrap());
     let mut encoder = image::codecs::png::PngEncoder::new(&mut png);
@@ -503,7 +504,9 @@ fn write_heic(folder: &Folder, name: &str, rgba: &image::RgbaImage, aux: u8) {
     fs::write(folder.path(&format!("{name}.heic")), bytes).unwrap();
 }
 
-/// An iPhone's portrait: HEIC in Display P3 with an auxiliary picture of disparity.
+/// An iPhone's portrait: HEIC in Display P3 with an auxiliary picture of disparity. Nobody packs libheif's programs for
+/// Windows.
+#[cfg(not(windows))]
 #[test]
 fn a_heic_portrait_becomes_a_hologram() {
     let folder = Folder::new();
