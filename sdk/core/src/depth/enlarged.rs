@@ -1,8 +1,8 @@
 //! Finds whether depth was enlarged from a coarser grid, and reads that grid again.
 //!
 //! Depth of a picture's size is often the readings of a sensor or the output of a network that an app, a data set or an
-//! image program enlarged. Its edges are blocks or ramps, which conditioning cannot tell from surfaces. Read on the grid
-//! that it came from, it is conditioned as a sensor's depth is.
+//! image program enlarged. Its edges are blocks or ramps, which conditioning cannot tell from surfaces. Read on the
+//! grid that it came from, it is conditioned as a sensor's depth is.
 //!
 //! A factor and a way of enlarging are a linear map from a line of readings to a line of pixels. The least squares fit
 //! of such a map leaves only noise and rounding of a line that it made, at edges too. It does so at one place of the
@@ -18,8 +18,8 @@ use fit::{Fit, Kernel};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
-/// The ratios of the depth's size to the grid's that are tried. A ratio that is not whole is tried only where it divides
-/// both sides.
+/// The ratios of the depth's size to the grid's that are tried. A ratio that is not whole is tried only where it
+/// divides both sides.
 const FACTORS: [f64; 14] = [2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.25, 5.5, 6.0, 6.5, 7.0, 7.5, 8.0];
 /// The least side of depth that is examined, in pixels.
 const LEAST_SIDE: usize = 64;

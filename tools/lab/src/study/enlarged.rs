@@ -86,8 +86,8 @@ impl Spoiled {
     }
 }
 
-/// Reads `depth`, (H, W), on a grid that is `factor` times coarser, in the middle of each cell where `by` is nearest and
-/// by its mean otherwise, and enlarges it again.
+/// Reads `depth`, (H, W), on a grid that is `factor` times coarser, in the middle of each cell where `by` is nearest
+/// and by its mean otherwise, and enlarges it again.
 pub fn enlarge(depth: &Array2<f32>, factor: f64, by: Enlarging) -> Array2<f32> {
     let sensor = Coarse {
         ratio: factor,

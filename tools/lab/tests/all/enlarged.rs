@@ -1,5 +1,5 @@
-//! Tests what the core finds of enlarged depth on the generators' scenes: nothing in depth of full resolution, and factor
-//! and way in what the image crate enlarged.
+//! Tests what the core finds of enlarged depth on the generators' scenes: nothing in depth of full resolution, and
+//! factor and way in what the image crate enlarged.
 use ndarray::Array2;
 use phasefront::Size;
 use phasefront_core::depth::enlarged::{Enlarging, find};
