@@ -1,4 +1,5 @@
 //! Displays and pictures of the quick tests, which the diagnosis was tuned on.
+#![allow(dead_code)] // Tests and the example `planted` take different displays.
 
 use crate::plant::{Bench, Picture};
 use ndarray::{Array2, Array3, stack};

@@ -2,108 +2,12 @@
 #![allow(clippy::unwrap_used)]
 
 mod displays;
-mod held_out;
 mod plant;
 
-use phasefront_calibration::diagnosis::{Diagnosis, Shown, diagnose};
+use phasefront_calibration::diagnosis::{Shown, diagnose};
 use phasefront_core::display::levels::Levels;
 use phasefront_io::dice::Dice;
-use plant::{Bench, Plant, taken};
-use std::collections::BTreeMap;
-
-fn diagnosed(bench: &Bench, plants: &[Plant], shot: u64) -> Result<Diagnosis, String> {
-    let taken = taken(bench, plants, shot);
-    let shown = Shown {
-        levels: Levels::Bytes(taken.levels.as_slice().unwrap()),
-        size: bench.display.size(),
-        target: &taken.target,
-        z_m: bench.z_m,
-    };
-    diagnose(&shown, &taken.photographs).map_err(|e| e.to_string())
-}
-
-fn names(diagnosis: &Result<Diagnosis, String>) -> Vec<&str> {
-    match diagnosis {
-        Ok(diagnosis) => diagnosis.findings.iter().map(|finding| finding.cause).collect(),
-        Err(why) => vec![why],
-    }
-}
-
-/// The number of plants of each cause, found ones among them, and of causes that were named and not there.
-#[derive(Default)]
-struct Table {
-    alone: BTreeMap<&'static str, [usize; 3]>,
-    in_pairs: BTreeMap<&'static str, [usize; 2]>,
-    pairs: [usize; 3],
-    good: [usize; 2],
-}
-
-impl Table {
-    fn add(&mut self, bench: &Bench, plants: &[Plant], shot: u64) {
-        let diagnosis = diagnosed(bench, plants, shot);
-        let found = names(&diagnosis);
-        let hits = plants.iter().filter(|plant| found.contains(&plant.name())).count();
-        let others = found.len() - hits;
-        println!("{}: {plants:?}: {found:?}", bench.name);
-        match plants {
-            [] => {
-                self.good[0] += 1;
-                self.good[1] += usize::from(others > 0);
-            }
-            [plant] => {
-                let row = self.alone.entry(plant.name()).or_default();
-                *row = [row[0] + 1, row[1] + hits, row[2] + usize::from(others > 0)];
-            }
-            _ => {
-                for plant in plants {
-                    let row = self.in_pairs.entry(plant.name()).or_default();
-                    *row = [row[0] + 1, row[1] + usize::from(found.contains(&plant.name()))];
-                }
-                self.pairs[0] += 1;
-                self.pairs[1] += usize::from(hits == plants.len());
-                self.pairs[2] += usize::from(others > 0);
-            }
-        }
-    }
-
-    fn print(&self) {
-        println!("\n| cause | alone | with another name | in pairs |\n|---|---|---|---|");
-        for (name, [planted, found, others]) in &self.alone {
-            let [pairs, in_pairs] = self.in_pairs.get(name).copied().unwrap_or_default();
-            println!("| {name} | {found} of {planted} | {others} | {in_pairs} of {pairs} |");
-        }
-        let sum = |at: usize| self.alone.values().map(|row| row[at]).sum::<usize>();
-        println!("| all | {} of {} | {} | |", sum(1), sum(0), sum(2));
-        let [planted, both, others] = self.pairs;
-        println!("\npairs: both found in {both} of {planted}, another name in {others}");
-        println!("good displays: {} of {} with a false alarm", self.good[1], self.good[0]);
-    }
-}
-
-fn run(benches: &[Bench], pairs: usize, good: u64, seed: u64) {
-    let mut table = Table::default();
-    for bench in benches {
-        let lasers = bench.display.colours();
-        let mut dice = Dice::new(seed ^ bench.seed);
-        for shot in 0..good {
-            table.add(bench, &[], shot);
-        }
-        for (at, plant) in Plant::each(lasers, &mut dice).into_iter().enumerate() {
-            table.add(bench, &[plant], 100 + at as u64);
-        }
-        for pair in 0..pairs {
-            let [one, other] = loop {
-                let (ones, others) = (Plant::each(lasers, &mut dice), Plant::each(lasers, &mut dice));
-                let pair = [dice.pick(&ones), dice.pick(&others)];
-                if pair[0].goes_with(&pair[1]) {
-                    break pair;
-                }
-            };
-            table.add(bench, &[one, other], 200 + pair as u64);
-        }
-    }
-    table.print();
-}
+use plant::{Bench, Plant, diagnosed, names, taken};
 
 /// Checks that the causes found are those planted.
 fn finds(bench: &Bench, plants: &[Plant]) {
@@ -199,25 +103,4 @@ fn photographs_of_something_else_are_refused() {
     taken.photographs[0].values.fill(300);
     let error = diagnose(&shown, &taken.photographs).unwrap_err().to_string();
     assert!(error.contains("too dark"), "{error}");
-}
-
-#[test]
-#[ignore = "slow: minutes; prints the table of docs/runs for displays that the diagnosis was not tuned on"]
-fn held_out_displays() {
-    run(&held_out::benches(), 5, 3, 2027);
-}
-
-#[test]
-#[ignore = "slow: minutes; prints the same table for displays that the diagnosis was tuned on"]
-fn tuned_displays() {
-    run(
-        &[
-            displays::on_the_panel(),
-            displays::three_lasers(),
-            displays::one_laser(),
-        ],
-        6,
-        2,
-        5,
-    );
 }

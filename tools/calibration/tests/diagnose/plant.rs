@@ -1,4 +1,5 @@
 //! Causes planted on simulated displays, and the photographs of them.
+#![allow(dead_code)] // Tests and the example `planted` take different parts.
 
 use ndarray::{Array2, Array3, Axis};
 use num_complex::{Complex32, Complex64};
@@ -6,7 +7,9 @@ use phasefront::Size;
 use phasefront::target::Aberration;
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use phasefront_calibration::camera::photograph::Photograph;
+use phasefront_calibration::diagnosis::{Diagnosis, Shown, diagnose};
 use phasefront_calibration::simulated_display::{Camera, Curves, SimulatedDisplay, Strays};
+use phasefront_core::display::levels::Levels;
 use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::dice::Dice;
@@ -409,4 +412,24 @@ pub(crate) fn depth_of_focus(display: &Display) -> f64 {
 /// Returns a disc's share of a pixel.
 pub(crate) fn soft(distance: f64) -> f64 {
     0.5 - (distance.clamp(-1.0, 1.0) * PI / 2.0).sin() / 2.0
+}
+
+/// Photographs what is planted and diagnoses it. `shot` seeds the camera's noise.
+pub(crate) fn diagnosed(bench: &Bench, plants: &[Plant], shot: u64) -> Result<Diagnosis, String> {
+    let taken = taken(bench, plants, shot);
+    let shown = Shown {
+        levels: Levels::Bytes(taken.levels.as_slice().unwrap()),
+        size: bench.display.size(),
+        target: &taken.target,
+        z_m: bench.z_m,
+    };
+    diagnose(&shown, &taken.photographs).map_err(|e| e.to_string())
+}
+
+/// Returns the causes that were found, or why there is no diagnosis.
+pub(crate) fn names(diagnosis: &Result<Diagnosis, String>) -> Vec<&str> {
+    match diagnosis {
+        Ok(diagnosis) => diagnosis.findings.iter().map(|finding| finding.cause).collect(),
+        Err(why) => vec![why],
+    }
 }
