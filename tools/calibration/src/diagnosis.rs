@@ -1,10 +1,10 @@
 //! Why a photograph of a displayed hologram looks wrong.
 //!
-//! The photograph is placed first, in any orientation, without the assumption that it is right ([`placement`]). Each
-//! cause is then a free parameter of a forward model of what the camera sees ([`scene`]), and is fitted to the
-//! photograph ([`cause`]). Causes are added one after another as long as the likelihood of the photograph rises. The
+//! The photograph is placed first, in any orientation, without the assumption that it is right (`placement`). Each
+//! cause is then a free parameter of a forward model of what the camera sees (`scene`), and is fitted to the
+//! photograph (`cause`). Causes are added one after another as long as the likelihood of the photograph rises. The
 //! confidence of each is that of Vuong's test against the best model that has no more of it than a good display has,
-//! and against models that have a similar cause in its place ([`score`]).
+//! and against models that have a similar cause in its place (`score`).
 
 mod cause;
 mod placement;
