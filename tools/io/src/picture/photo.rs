@@ -1,5 +1,5 @@
 //! Photos with embedded depth from phones: JPEGs with XMP of GDepth or Dynamic Depth 1.0, and HEIC with an auxiliary
-//! picture of disparity ([`heif`]).
+//! picture of disparity (`heif`).
 //!
 //! * GDepth (`developers.google.com/depthmap-metadata`): the XMP itself contains the depth image in base64. An image
 //!   too long for one segment is in extended XMP (Adobe's XMP specification, part 3).
