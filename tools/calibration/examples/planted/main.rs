@@ -1,5 +1,5 @@
-//! Plants each cause on simulated displays, alone and in pairs, and prints how often a diagnosis finds it. Takes minutes
-//! for each display.
+//! Plants each cause on simulated displays, alone and in pairs, and prints how often a diagnosis finds it. Takes
+//! minutes for each display.
 //!
 //!     cargo run --release --package phasefront-calibration --example planted [-- --tuned]
 //!
