@@ -126,16 +126,6 @@ pub fn diagnose(shown: &Shown<'_>, photographs: &[Photograph]) -> Result<Diagnos
     )
 }
 
-/// Returns what [`diagnose`] does where the corners of the modulator in the photographs are known: top left, top right,
-/// bottom left, bottom right.
-///
-/// # Errors
-/// Returns an error if the photographs differ in size or are dark, or if the camera's z is too far away.
-pub fn diagnose_at(shown: &Shown<'_>, photographs: &[Photograph], corners: [[f64; 2]; 4]) -> Result<Diagnosis> {
-    check(photographs)?;
-    of_places(shown, photographs, &[corners])
-}
-
 /// Returns the diagnosis at the best of some places, each with its corners.
 fn of_places(shown: &Shown<'_>, photographs: &[Photograph], places: &[[[f64; 2]; 4]]) -> Result<Diagnosis> {
     let roi = compared(shown.size);

@@ -91,12 +91,6 @@ impl Registration {
         [mean(0), mean(1)]
     }
 
-    /// Returns the corners of a modulator of this size in photographs: top left, top right, bottom left, bottom right.
-    pub fn corners(&self, Size { width, height }: Size) -> [[f64; 2]; 4] {
-        let (w, h) = (width as f64, height as f64);
-        [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]].map(|corner| self.map.map(corner))
-    }
-
     /// Returns the mean of `photograph` over a square of the modulator that extends `half` pixels to each side of (`x`,
     /// `y`).
     fn mean(&self, photograph: &Photograph, x: f64, y: f64, half: f64) -> f32 {

@@ -172,7 +172,7 @@ impl Study {
                 "--data",
                 self.data.is_some(),
                 of_enlarged || of_flicker && !self.sensor.is_empty(),
-                "the study of enlarged depth, and with --sensor that of flicker",
+                "the study of enlarged depth and, with --sensor, the study of flicker",
             ),
             ("--sensor", !self.sensor.is_empty(), of_flicker, "the study of flicker"),
         ])
