@@ -43,14 +43,17 @@ const zOf = (focus) => (0.5 - focus / STEPS) * DEPTH_MM;
 
 let session, planned, hologram, said;
 
+const LABELS = { shown: "What an eye sees of the hologram", phases: "The phases of the hologram" };
+
 // Draws to the canvas of the page that the session's worker has, or else to a new one.
 const canvases = {};
 async function draw(id, { width, height }, onto) {
   const canvas = (canvases[id] ??= Object.assign(document.createElement("canvas"), { width, height }));
   await onto(canvas);
   if (canvas.isConnected || canvases[id] !== canvas) return;
-  // Keep the controls in sight.
-  canvas.style.maxWidth = `calc(72vh * ${width / height})`;
+  canvas.style.setProperty("--aspect", width / height);
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", LABELS[id]);
   at(id).querySelector("canvas").replaceWith(canvas);
 }
 
@@ -109,6 +112,17 @@ async function look() {
 
 // Views are not computed more often than the display shows them.
 const view = newest(() => Promise.all([look(), new Promise(requestAnimationFrame)]));
+
+// The focus on the subject: the nearest surface that fills a tenth of the middle half of a hologram.
+async function subject(of) {
+  const places = [];
+  for (let y = 0.26; y < 0.75; y += 0.04) for (let x = 0.26; x < 0.75; x += 0.04) places.push(of.zAt(x, y));
+  const nearestFirst = (await Promise.all(places)).sort((a, b) => b - a);
+  const tenth = Math.ceil(nearestFirst.length / 10);
+  const from = nearestFirst.findIndex((zMm, i) => zMm - nearestFirst[i + tenth - 1] < DEPTH_MM / 12);
+  if (from < 0) return STEPS / 2;
+  return Math.round((0.5 - nearestFirst[from + (tenth >> 1)] / DEPTH_MM) * STEPS);
+}
 
 let picture, stream;
 async function show() {
@@ -182,6 +196,7 @@ async function take(source, files) {
 const open = newest(async (source, files) => {
   await take(source, files);
   await show();
+  if (hologram) await focus(await subject(hologram));
 });
 
 async function sample() {

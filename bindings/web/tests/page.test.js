@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { GPU, click, open, picture, serveBuilt } from "./support.js";
+import { GPU, click, layout, open, picture, serveBuilt } from "./support.js";
 
 const HELPERS = readFileSync(new URL("helpers.js", import.meta.url), "utf8");
 // Parts of the sample image: its nearest and its farthest objects.
@@ -25,6 +25,12 @@ test("the page focuses, computes what is chosen, fills a screen and takes a came
   const { source, frames, wrong: said } = await still();
   assert.deepEqual([source, frames, said], ["sample", 1, ""]);
   assert.deepEqual(await page.evaluate("[pixels('shown').width, pixels('shown').height, pixels('phases').width]"), [640, 360, 640]);
+
+  // It opens in focus on the nearest surface in the middle, the chart at depths from 0.07 to 0.13.
+  const { focus } = await still();
+  assert.ok(focus >= 60 * 0.07 - 1 && focus <= 60 * 0.13 + 1, `${focus}`);
+  assert.equal(await page.$eval("#focus", ({ value }) => Number(value)), focus);
+  assert.match(await page.evaluate("textOf('z')"), /\+2\./);
 
   // The slider: near objects are sharper at a near focus, and far objects at a far focus.
   const sharp = {};
@@ -82,6 +88,7 @@ test("the page focuses, computes what is chosen, fills a screen and takes a came
   await still();
   const wide = await page.evaluate("document.documentElement.scrollWidth");
   assert.ok(wide <= 390, `${wide} pixels wide`);
+  await layout(page);
 });
 
 test("the page shows on WebGPU what it shows on the CPU", async (t) => {

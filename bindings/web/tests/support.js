@@ -1,4 +1,5 @@
 // Serves the built package with its tests, and starts browsers.
+import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { createReadStream, existsSync, mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
@@ -126,6 +127,35 @@ export async function click(page, selector, x = 0.5, y = 0.5) {
   await element.scrollIntoView();
   const { width, height } = await element.boundingBox();
   await element.click({ offset: { x: x * width, y: y * height } });
+}
+
+/** Checks at the sizes of a desktop and of a phone upright and on its side that the page is no wider than the window, that
+ * its slider is in sight without scrolling and after it, and that every canvas has a name. */
+export async function layout(page) {
+  const accessibility = await page.createCDPSession();
+  for (const [width, height] of [[1280, 900], [375, 667], [667, 375]]) {
+    await page.setViewport({ width, height, isMobile: width < 1000, deviceScaleFactor: 1 });
+    for (const scrolled of [0, 1]) {
+      const seen = await page.evaluate((part) => {
+        scrollTo(0, part * document.documentElement.scrollHeight);
+        const { top, bottom, left, right } = document.getElementById("focus").getBoundingClientRect();
+        return { top, bottom, left, right, wide: document.documentElement.scrollWidth, high: innerHeight };
+      }, scrolled * 0.3);
+      const inside = seen.top >= 0 && seen.bottom <= seen.high && seen.left >= 0 && seen.right <= width;
+      assert.ok(inside && seen.wide <= width, `${width}×${height}: ${JSON.stringify(seen)}`);
+    }
+    await page.evaluate("scrollTo(0, 0)");
+    // Chromium computes the names that a screen reader gets, some time after it has laid out the page.
+    const drawn = await page.$$eval("canvas", (all) => all.filter((one) => one.checkVisibility()).length);
+    let names = [];
+    for (let i = 0; i < 50 && (i === 0 || names.length < drawn); i++) {
+      await new Promise((done) => setTimeout(done, 100));
+      const { nodes } = await accessibility.send("Accessibility.getFullAXTree");
+      names = nodes.filter(({ role, name, ignored }) => !ignored && role?.value === "image" && name?.value);
+    }
+    assert.ok(drawn > 0 && names.length === drawn, `${names.length} names for ${drawn} canvases at ${width}×${height}`);
+    await picture(page, `layout-${width}x${height}.jpg`, false);
+  }
 }
 
 /** Saves a picture of the page for the documents, in the folder that PHASEFRONT_PICTURES names. */

@@ -26,6 +26,7 @@ mod doctor;
 mod encode;
 mod films;
 mod focus;
+mod guides;
 mod inputs;
 mod kernels;
 mod misuse;

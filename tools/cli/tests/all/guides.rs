@@ -1,0 +1,55 @@
+//! Runs the commands of README and of a guide as a reader pastes them: in a clone, after `samples/run`.
+use crate::folder::Folder;
+use std::path::Path;
+
+/// Returns the arguments of the commands `phasefront` in the blocks of shell code of a document.
+fn commands(document: &str) -> Vec<Vec<String>> {
+    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(document)).unwrap();
+    let blocks = page
+        .split("```sh\n")
+        .skip(1)
+        .filter_map(|rest| rest.split("```").next());
+    let lines = blocks.flat_map(str::lines).map(|line| line.split(" #").next().unwrap());
+    lines
+        .filter_map(|line| line.strip_prefix("phasefront "))
+        .map(|line| line.split_whitespace().map(str::to_owned).collect())
+        .collect()
+}
+
+/// Runs the commands of `document` in a folder that has the samples, and what `samples/run` makes of them.
+fn runs(document: &str, least: usize) {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("samples")).unwrap();
+    std::fs::create_dir(folder.path("out")).unwrap();
+    for name in ["scene_rgb.jpg", "scene_depth.png"] {
+        let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../samples").join(name);
+        std::fs::copy(sample, folder.path("samples").join(name)).unwrap();
+    }
+    let colour = [
+        "hologram",
+        "--rgb",
+        "samples/scene_rgb.jpg",
+        "--depth",
+        "samples/scene_depth.png",
+    ];
+    folder.succeeds(&[&colour[..], &["-o", "out/hologram.png"]].concat());
+    let commands = commands(document);
+    assert!(commands.len() >= least, "{commands:?}");
+    for command in &commands {
+        let command: Vec<_> = command.iter().map(String::as_str).collect();
+        folder.succeeds(&command);
+        let output = command.iter().position(|flag| *flag == "-o").unwrap();
+        assert!(std::fs::metadata(folder.path(command[output + 1])).unwrap().len() > 10_000);
+    }
+}
+
+#[test]
+fn the_first_commands_run_as_they_stand() {
+    runs("README.md", 3);
+}
+
+#[test]
+#[ignore = "slow: 60 seconds of a core"]
+fn the_commands_of_the_guide_to_pages_run_as_they_stand() {
+    runs("docs/view.md", 6);
+}
