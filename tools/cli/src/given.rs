@@ -1,7 +1,12 @@
 //! The flags of a command line, with their groups of help: what a record of a run is made of.
 
-use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, Id, ValueHint};
 use std::path::PathBuf;
+
+/// The group of the flags that name the input. A flag declares `group = SOURCE` to stay out of records: what it names is
+/// identified by its content.
+pub(crate) const SOURCE: &str = "source";
 
 /// The value of a flag.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,19 +22,33 @@ pub(crate) enum Given {
 /// A flag of a command.
 #[derive(Debug, Clone)]
 pub(crate) struct Flag {
+    pub(crate) id: Id,
     /// The name, such as `--depth-unit`.
     pub(crate) name: String,
     /// The group in help.
     pub(crate) group: String,
     pub(crate) value: Given,
+    /// Whether the command line has the flag.
+    pub(crate) is_given: bool,
+    /// Whether the flag is of the group [`SOURCE`].
+    pub(crate) is_source: bool,
 }
 
 /// Returns the flags of `command` as `matches` has them.
 pub(crate) fn flags(command: &Command, matches: &ArgMatches) -> Vec<Flag> {
-    command.get_arguments().filter_map(|arg| flag(arg, matches)).collect()
+    let groups = command.get_groups().filter(|group| group.get_id() == SOURCE);
+    let sources: Vec<&Id> = groups.flat_map(|group| group.get_args()).collect();
+    let flag = |arg: &Arg| flag(arg, matches, sources.contains(&arg.get_id()));
+    command.get_arguments().filter_map(flag).collect()
 }
 
-fn flag(arg: &Arg, matches: &ArgMatches) -> Option<Flag> {
+/// Returns the flags that `A` declares, for flags that conflict with all of them.
+pub(crate) fn ids<A: Args>() -> Vec<Id> {
+    let command = A::augment_args(Command::new("flags"));
+    command.get_arguments().map(|arg| arg.get_id().clone()).collect()
+}
+
+fn flag(arg: &Arg, matches: &ArgMatches, is_source: bool) -> Option<Flag> {
     let id = arg.get_id().as_str();
     let raw = || {
         let values = matches.get_raw(id)?;
@@ -43,8 +62,11 @@ fn flag(arg: &Arg, matches: &ArgMatches) -> Option<Flag> {
         _ => return None,
     };
     Some(Flag {
+        id: arg.get_id().clone(),
         name: format!("--{}", arg.get_long()?),
         group: arg.get_help_heading()?.to_owned(),
         value,
+        is_given: matches.value_source(id) == Some(ValueSource::CommandLine),
+        is_source,
     })
 }

@@ -9,10 +9,10 @@ mod layers;
 mod request;
 
 pub(crate) use judged::{Judged, judge};
-pub(crate) use request::{HologramRequest, Image, METHOD_FLAGS, Method};
+pub(crate) use request::{HologramRequest, Image, ImageFlags, Method};
 
 use crate::flags::encoder::Encoder;
-use crate::flags::method::{CoreMethod, Parts};
+use crate::flags::method::CoreMethod;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront_command::flags::sweep_for;
@@ -29,10 +29,10 @@ impl HologramRequest {
     pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<HologramResult> {
         let method = self.method();
         let is_of_rgbd = matches!((method, image), (Method::Core(_), Image::Rgbd(_)));
-        self.encoder.check_focus(is_of_rgbd)?;
+        self.hologram.encoder.check_focus(is_of_rgbd)?;
         let device = self.backend.device()?;
         if device.is_some()
-            && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.ldi.is_some())
+            && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.image.ldi.is_some())
         {
             return Err(Error::Input(
                 "--backend gpu runs --method network, sweep and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
@@ -41,13 +41,9 @@ impl HologramRequest {
         }
         let made = match (method, image) {
             (Method::Core(method), Image::Rgbd(frame)) => {
-                let (core, encoder) = method.of(&Parts {
-                    network: self.network.as_deref(),
-                    precision: self.precision,
-                    display: &display.target.display,
-                    sweep: sweep_for(&display.target.display, self.planes, self.taps),
-                    encoder: &self.encoder,
-                })?;
+                let shown = &display.target.display;
+                let sweep = sweep_for(shown, self.planes, self.taps);
+                let (core, encoder) = self.hologram.read(method, shown, sweep)?;
                 match &device {
                     Some(options) => self.on_gpu(core, frame, display, encoder, options),
                     None => self.on_cpu(core, frame, display, encoder),
@@ -55,9 +51,9 @@ impl HologramRequest {
             }
             (method, Image::Rgbd(frame)) => {
                 let ldi = Ldi::new(vec![LdiLayer::from(frame)])?;
-                self.by_layers(method, &ldi, display, self.encoder.read()?)
+                self.by_layers(method, &ldi, display, self.hologram.encoder.read()?)
             }
-            (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.encoder.read()?),
+            (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.hologram.encoder.read()?),
         }?;
         Ok(HologramResult {
             view_colours: self.view_colours(&display.target.display, image),
@@ -106,16 +102,26 @@ fn described(engine: &Engine) -> String {
     format!("{} ({})", engine.name, engine.why)
 }
 
+/// Returns the metadata for files of levels that `encoder` made for `display`. `colours` are those of views, if they are
+/// known.
+pub(crate) fn levels_info(display: &DisplayFile, encoder: &str, colours: Option<&ViewColours>) -> HologramInfo {
+    let shown = &display.target.display;
+    HologramInfo {
+        calibrated: display.calibrated(true),
+        display: shown.clone(),
+        encoder: Some(encoder.into()),
+        scale: None,
+        lut: display.lut.map(Vec::from),
+        levels_turns: display.target.panel.levels_turns.clone(),
+        srgb_of_light: colours.and_then(|colours| HologramInfo::light_rows(colours, shown.colours())),
+    }
+}
+
 /// Returns the metadata for files of the levels and of the field.
 pub(crate) fn infos(display: &DisplayFile, made: &HologramResult) -> (HologramInfo, HologramInfo) {
     let levels = HologramInfo {
-        calibrated: display.calibrated(true),
-        display: display.target.display.clone(),
-        encoder: Some(made.encoder.name.into()),
         scale: Some(made.scale),
-        lut: display.lut.map(Vec::from),
-        levels_turns: display.target.panel.levels_turns.clone(),
-        srgb_of_light: HologramInfo::light_rows(&made.view_colours, display.target.display.colours()),
+        ..levels_info(display, made.encoder.name, Some(&made.view_colours))
     };
     let field = HologramInfo {
         encoder: None,

@@ -25,25 +25,20 @@ const VERSION: &str = "phasefront";
 pub(crate) struct RunRecord(BTreeMap<String, Value>);
 
 impl RunRecord {
-    /// Creates a record of `command` without flags.
-    pub(crate) fn new(command: &str) -> Self {
+    /// Records `command` with its flags, but for those that name the input or the output and those of all commands.
+    pub(crate) fn new(command: &str, flags: &[Flag]) -> Result<Self> {
         let mut record = RunRecord(BTreeMap::new());
         record.set(VERSION, Some(env!("CARGO_PKG_VERSION")));
         record.set("command", Some(command));
-        record
-    }
-
-    /// Adds the flags that decide what is made: those about depth, method and display, and those for experts.
-    pub(crate) fn add(&mut self, flags: &[Flag]) -> Result<()> {
-        const GROUPS: [&str; 4] = ["Depth", "Method", "Display", "Expert"];
-        for Flag { name, value, .. } in flags.iter().filter(|flag| GROUPS.contains(&&*flag.group)) {
+        let decides = |flag: &&Flag| !flag.is_source && !["Output", "General"].contains(&&*flag.group);
+        for Flag { name, value, .. } in flags.iter().filter(decides) {
             match value {
-                Given::Switch(is_given) => self.switch(name, *is_given),
-                Given::Text(text) => self.set(name, text.as_ref()),
-                Given::File(file) => self.file(name, file.as_deref())?,
+                Given::Switch(is_given) => record.switch(name, *is_given),
+                Given::Text(text) => record.set(name, text.as_ref()),
+                Given::File(file) => record.file(name, file.as_deref())?,
             }
         }
-        Ok(())
+        Ok(record)
     }
 
     pub(crate) fn set(&mut self, flag: &str, value: Option<impl Display>) {
@@ -52,7 +47,7 @@ impl RunRecord {
         self.0.insert(flag.to_owned(), value.into());
     }
 
-    pub(crate) fn switch(&mut self, flag: &str, is_given: bool) {
+    fn switch(&mut self, flag: &str, is_given: bool) {
         self.0.insert(flag.to_owned(), is_given.into());
     }
 

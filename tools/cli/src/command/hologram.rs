@@ -4,7 +4,7 @@ mod stills;
 
 use crate::flags::frame::Picture;
 use crate::flags::outputs::OutputFlags;
-use crate::given::Flag;
+use crate::given::{self, Flag};
 use crate::make::HologramRequest;
 use crate::record::{Before, RunRecord};
 use clap::Args;
@@ -46,7 +46,7 @@ impl Hologram {
                 "needs a flag that says what it is: --photo for a photo with depth inside, --rgb with --depth or --depth-network for other pictures",
             ));
         }
-        if let Some(pictures) = self.request.pictures()? {
+        if let Some(pictures) = self.request.image.frame.pictures()? {
             return self.stills(json, pictures, flags);
         }
         if self.resume || self.overwrite {
@@ -65,15 +65,14 @@ impl Hologram {
     }
 
     fn stills(self, json: bool, pictures: Vec<Picture>, flags: &[Flag]) -> Result<()> {
-        if let Some(flag) = self.outputs.given() {
+        let outputs = given::ids::<OutputFlags>();
+        if let Some(Flag { name, .. }) = flags.iter().find(|flag| flag.is_given && outputs.contains(&flag.id)) {
             return Err(Error::Input(format!(
-                "{flag} goes with one picture, not with a folder of them"
+                "{name} goes with one picture, not with a folder of them"
             )));
         }
         let before = Before::of_flags(self.resume, self.overwrite);
-        let mut record = RunRecord::new("hologram");
-        record.add(flags)?;
-        self.request.record_colours(&mut record);
+        let record = RunRecord::new("hologram", flags)?;
         stills::run(self.request, pictures, &self.output, before, record, json)
     }
 }

@@ -2,16 +2,16 @@
 
 use crate::flags::colours::ColourFlags;
 use crate::flags::encoder::{EncoderFlags, FocusName};
-use crate::flags::frame::{FrameFlags, IMAGE_FLAGS, shown_json, shown_text};
-use crate::flags::method::CoreMethod;
-use crate::make::{HologramRequest, HologramResult, Image, Method, infos};
+use crate::flags::frame::{shown_json, shown_text};
+use crate::flags::method::{CoreMethod, HologramFlags};
+use crate::make::{HologramRequest, HologramResult, Image, ImageFlags, Method, infos};
 use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::EncoderOptions;
 use phasefront::Size;
 use phasefront_cli::viewer::{self, Depth, Scene};
-use phasefront_command::flags::{DisplayFlags, EncoderName};
+use phasefront_command::flags::{DisplayFlags, EncoderName, PrecisionName};
 use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_core::depth::sharpness;
@@ -34,12 +34,10 @@ use std::time::Duration;
 /// that the sweep finds; otherwise it is the wave of the largest network. The answer names the reference. The second is
 /// natural: what incoherent light, as in the world, shows of the same surfaces through the display's aperture.
 #[derive(Args)]
+#[command(mut_arg("ldi", |ldi| ldi.help("Folder of a layered depth image")))]
 pub(crate) struct Judge {
     #[command(flatten)]
-    frame: FrameFlags,
-    /// Folder of a layered depth image
-    #[arg(long, value_name = "DIR", conflicts_with_all = IMAGE_FLAGS, help_heading = "Input")]
-    ldi: Option<PathBuf>,
+    image: ImageFlags,
     /// Methods [default: sweep, and network if one was trained for the display]
     #[arg(long, value_enum, value_delimiter = ',', help_heading = "Method")]
     method: Vec<CoreMethod>,
@@ -95,15 +93,12 @@ impl Judge {
         if let Some(path) = &self.output {
             output::file(path, &["html"])?;
         }
-        let file = match self.ldi {
-            Some(_) => self.display.read()?,
-            None => self.frame.colours().display(&self.display)?,
-        };
+        let file = self.image.display(&self.display)?;
         let display = &file.target.display;
-        let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
+        let layers = self.image.ldi.as_deref().map(Ldi::read).transpose()?;
         let (frame, depth_shown) = match &layers {
             Some(ldi) => (truth::visible_frame(ldi, display)?, None),
-            None => self.frame.read(display, self.display.is_given())?,
+            None => self.image.frame.read(display, self.display.is_given())?,
         };
         let Size { width, height } = frame.size();
         if 2 * self.margin >= height.min(width) {
@@ -119,12 +114,7 @@ impl Judge {
             None => truth::filled(&frame, display)?,
         };
         let image = Image::Rgbd(frame);
-        let mut request = HologramRequest::new(self.display.clone());
-        request.set_colours(match layers {
-            Some(_) => ColourFlags::AMPLITUDE,
-            None => self.frame.colours(),
-        });
-        let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean, &mut request)?;
+        let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean)?;
         let z_m = truth::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;
         let natural = incoherent::Judge::of(&surfaces, display, Pupil::of_aperture(display))?;
@@ -133,12 +123,16 @@ impl Judge {
         let bar = progress_bar(combinations.len() as u64, "combinations");
         let mut rows = Vec::new();
         for combination in combinations {
-            request.set_method(
-                Method::Core(combination.method),
-                combination.network.map(str::to_owned),
-                combination.encoder,
-            );
-            let made = request.make(&file, &image)?;
+            let made = self
+                .request(
+                    Method::Core(combination.method),
+                    HologramFlags {
+                        network: combination.network.map(str::to_owned),
+                        encoder: combination.encoder,
+                        ..HologramFlags::default()
+                    },
+                )
+                .make(&file, &image)?;
             let (info, _) = infos(&file, &made);
             let hologram = made.hologram(info);
             let shown = hologram.views_on(&file, &z_m)?;
@@ -179,50 +173,71 @@ impl Judge {
         image: &Image,
         layers: Option<&Ldi>,
         clean: bool,
-        request: &mut HologramRequest,
     ) -> Result<(Hologram, String)> {
         let display = &file.target.display;
         let best = "15";
         let trained = networks::network(best, Some(networks::Precision::Float32))?
             .check_display(display)
             .is_ok();
-        request.keeps_field = true;
         let (made, what) = match (layers, image) {
             (Some(ldi), _) => {
                 let what = format!("the exact wave of its {} layers: the truth", ldi.layers.len());
-                (self.exact(request, file, ldi)?, what)
+                (self.exact(file, ldi)?, what)
             }
             (None, Image::Rgbd(frame)) if clean || !trained => {
                 let filled = truth::filled(frame, display)?;
                 let what = "the exact wave of what is visible and of hidden surfaces as the sweep finds them, for there is no truth";
-                (self.exact(request, file, &filled)?, what.to_owned())
+                (self.exact(file, &filled)?, what.to_owned())
             }
             _ => {
-                request.set_method(
-                    Method::Core(CoreMethod::Network),
-                    Some(best.into()),
-                    EncoderFlags::default(),
-                );
-                request.in_float32();
+                let hologram = HologramFlags {
+                    network: Some(best.into()),
+                    precision: Some(PrecisionName::F32),
+                    ..HologramFlags::default()
+                };
+                let mut request = self.request(Method::Core(CoreMethod::Network), hologram);
+                request.keeps_field = true;
                 let made = request.make(file, image)?;
                 let what =
                     "the wave of the network of 15 layers, for depth is noisy or incomplete and there is no truth";
                 (made, what.to_owned())
             }
         };
-        request.keeps_field = false;
         let (_, mut info) = infos(file, &made);
         // The exact wave of an image is made of its layers, whose colours are the image's amplitudes.
-        let colours = request.view_colours(display, image);
+        let colours = ViewColours::new(self.colours().viewed(), display);
         info.srgb_of_light = HologramInfo::light_rows(&colours, display.colours());
         let field: Array3<Complex32> = made.field.expect("kept for this");
         Ok((Hologram::Complex(field, info), what))
     }
 
-    fn exact(&self, request: &mut HologramRequest, file: &DisplayFile, ldi: &Ldi) -> Result<HologramResult> {
-        request.set_method(Method::Layers, None, EncoderFlags::default());
-        request.with_planes(self.planes.into());
+    fn exact(&self, file: &DisplayFile, ldi: &Ldi) -> Result<HologramResult> {
+        let mut request = self.request(Method::Layers, HologramFlags::default());
+        request.planes = Some(self.planes.into());
+        request.keeps_field = true;
         request.make(file, &Image::Layers(ldi.clone()))
+    }
+
+    /// Returns the meaning of the image's colours. Those of a layered depth image are amplitudes.
+    fn colours(&self) -> ColourFlags {
+        match self.image.ldi {
+            Some(_) => ColourFlags::AMPLITUDE,
+            None => self.image.frame.colours,
+        }
+    }
+
+    /// Returns the request for a hologram of the image on the display.
+    fn request(&self, method: Method, hologram: HologramFlags) -> HologramRequest {
+        let mut request = HologramRequest {
+            method: Some(method),
+            hologram: HologramFlags {
+                display: self.display.clone(),
+                ..hologram
+            },
+            ..HologramRequest::default()
+        };
+        request.image.frame.colours = self.colours();
+        request
     }
 
     fn combinations(&self, display: &phasefront::Display) -> Vec<Combination> {

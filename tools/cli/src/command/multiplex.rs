@@ -1,16 +1,16 @@
 //! `phasefront multiplex`: makes several phase maps of one image, for modulators that are faster than the eye.
 
-use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::{FrameFlags, shown_json, shown_text};
-use crate::flags::method::{CoreMethod, Parts};
+use crate::flags::method::{CoreMethod, HologramFlags};
+use crate::make::levels_info;
 use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::output::Packing;
 use phasefront::session::Focus;
-use phasefront::{EncoderOptions, Pipeline, RgbdFrame, Size};
+use phasefront::{EncoderOptions, Pipeline, RgbdFrame, Size, Sweep};
 use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
-use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, check_used, sweep_for};
+use phasefront_command::flags::{OverwriteFlag, check_used};
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_core::view::colours::ViewColours;
 use phasefront_io::display::DisplayFile;
@@ -27,16 +27,8 @@ pub(crate) struct MultiplexCommand {
     /// Method for the wave [default: auto; network with --network or --encoder deep]
     #[arg(long, value_enum, help_heading = "Method")]
     method: Option<CoreMethod>,
-    /// A bundled network, or an ONNX file [default: 8]
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Method")]
-    network: Option<String>,
-    /// Number type of a bundled network [default: int8]
-    #[arg(long, value_enum, help_heading = "Expert")]
-    precision: Option<PrecisionName>,
     #[command(flatten)]
-    encoder: EncoderFlags,
-    #[command(flatten)]
-    display: DisplayFlags,
+    hologram: HologramFlags,
     /// Number of maps
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Method")]
     maps: u16,
@@ -75,7 +67,7 @@ impl MultiplexCommand {
         if let Some(folder) = &self.output {
             output::folder(folder, self.overwrite.holding())?;
         }
-        let file = self.frame.colours().display(&self.display)?;
+        let file = self.frame.colours.display(&self.hologram.display)?;
         let target = file.corrected()?;
         if target.display.bits() > 8 || target.panel.adds() {
             return Err(Error::Input(
@@ -83,16 +75,10 @@ impl MultiplexCommand {
             ));
         }
         self.check_flags()?;
-        let (frame, depth) = self.frame.read(&target.display, self.display.is_given())?;
-        let network = self.network.as_deref();
-        let method = CoreMethod::or_default(self.method, network, &self.encoder);
-        let (method, encoder) = method.of(&Parts {
-            network,
-            precision: self.precision,
-            display: &target.display,
-            sweep: sweep_for(&target.display, None, None),
-            encoder: &self.encoder,
-        })?;
+        let (frame, depth) = self.frame.read(&target.display, self.hologram.display.is_given())?;
+        let method = self.hologram.method(self.method);
+        let sweep = Sweep::for_display(&target.display);
+        let (method, encoder) = self.hologram.read(method, &target.display, sweep)?;
         // Joint steps follow after all maps.
         let options = EncoderOptions {
             focus_steps: 0,
@@ -135,15 +121,15 @@ impl MultiplexCommand {
 
     /// Refuses flags that natural focus does not use.
     fn check_flags(&self) -> Result<()> {
-        let coherent = !self.encoder.is_natural();
+        let coherent = !self.hologram.encoder.is_natural();
         let with = "--focus coherent";
         check_used(&[
             ("--method", self.method.is_some(), coherent, with),
-            ("--network", self.network.is_some(), coherent, with),
-            ("--precision", self.precision.is_some(), coherent, with),
+            ("--network", self.hologram.network.is_some(), coherent, with),
+            ("--precision", self.hologram.precision.is_some(), coherent, with),
             ("--no-feedback", self.no_feedback, coherent, with),
         ])?;
-        if self.encoder.focus()? == (Focus::Natural { steps: 0 }) {
+        if self.hologram.encoder.focus()? == (Focus::Natural { steps: 0 }) {
             return Err(Error::Input(
                 "--focus-steps 0 is for one map, by a network; several maps of natural focus take at least 1 joint step"
                     .into(),
@@ -167,17 +153,12 @@ impl MultiplexCommand {
         };
         output::make_folder(dir)?;
         let path = |n: usize| dir.join(format!("phase_{n:03}.png"));
-        let shown = &display.target.display;
-        let colours = ViewColours::new(self.frame.colours().viewed(), shown);
+        let colours = ViewColours::new(self.frame.colours.viewed(), &display.target.display);
+        let info = levels_info(display, encoder, Some(&colours));
         for (n, map) in maps.iter().enumerate() {
             let info = HologramInfo {
-                display: display.target.display.clone(),
-                encoder: Some(encoder.into()),
                 scale: Some(map.scale),
-                lut: display.lut.map(Vec::from),
-                levels_turns: display.target.panel.levels_turns.clone(),
-                calibrated: display.calibrated(true),
-                srgb_of_light: HologramInfo::light_rows(&colours, shown.colours()),
+                ..info.clone()
             };
             let levels = Levels::Bytes(map.levels.clone());
             hologram::write_hologram(&path(n), &Hologram::Levels(levels, info))?;

@@ -6,18 +6,18 @@ mod source;
 use crate::flags::backend::BackendFlags;
 use crate::flags::colours::ColourFlags;
 use crate::flags::depth::DepthFlags;
-use crate::flags::encoder::EncoderFlags;
 use crate::flags::frame::{SeenDepthFlags, warn_of_size};
-use crate::flags::method::{CoreMethod, Parts};
-use crate::given::Flag;
+use crate::flags::method::{CoreMethod, HologramFlags};
+use crate::given::{Flag, SOURCE};
+use crate::make::levels_info;
 use crate::record::{Before, RunRecord};
-use clap::{Args, ValueEnum, ValueHint};
+use clap::{ArgGroup, Args, ValueEnum};
 use phasefront::Size;
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, SessionHandle, Statistics};
 use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
 use phasefront_cli::gpu;
-use phasefront_command::flags::{DisplayFlags, PrecisionName, parse_size};
+use phasefront_command::flags::parse_size;
 use phasefront_command::terminal;
 use phasefront_core::display::panel::Panel;
 use phasefront_io::hologram::{self, HologramInfo};
@@ -32,48 +32,41 @@ use std::time::{Duration, Instant};
 
 /// Make phase maps and previews of RGB-D video
 #[derive(Args)]
+#[command(group = ArgGroup::new(SOURCE).multiple(true))]
 pub(crate) struct Video {
     /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …, of folders rgb and depth with equal names,
     /// or in the layout of TUM's or Redwood's data sets; a film (.mp4, by ffmpeg); or - for raw frames on stdin. All
     /// frames must have one size
     input: PathBuf,
     /// Names of a folder's colour and depth files, where each * stands for the same text: 'left_*.png,left_*_z.png'
-    #[arg(long, value_name = "COLOUR,DEPTH", help_heading = "Input")]
+    #[arg(long, group = SOURCE, value_name = "COLOUR,DEPTH", help_heading = "Input")]
     pairs: Option<String>,
     /// Film in grey with the depth of the input film
-    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    #[arg(long, group = SOURCE, value_name = "FILE", help_heading = "Input")]
     depth_video: Option<PathBuf>,
     /// Take the depth of a film from the right half of its pictures, in grey; a margin in their middle is left out
-    #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"], help_heading = "Input")]
+    #[arg(long, group = SOURCE, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"], help_heading = "Input")]
     depth_beside: bool,
     #[command(flatten)]
     colours: ColourFlags,
     #[command(flatten)]
     seen: SeenDepthFlags,
     /// Size of the colour of raw frames on stdin, rows of RGB bytes
-    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Input")]
+    #[arg(long, group = SOURCE, value_name = "WxH", value_parser = parse_size, help_heading = "Input")]
     raw: Option<Size>,
     /// Size of the depth of raw frames on stdin, rows of 16-bit little-endian numbers [default: the colour's]
-    #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "raw", help_heading = "Input")]
+    #[arg(long, group = SOURCE, value_name = "WxH", value_parser = parse_size, requires = "raw", help_heading = "Input")]
     raw_depth: Option<Size>,
     #[command(flatten)]
     depth: DepthFlags,
     /// Method for the holograms [default: auto; network with --network or --encoder deep]
     #[arg(long, value_enum, help_heading = "Method")]
     method: Option<CoreMethod>,
-    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
-    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, help_heading = "Method")]
-    network: Option<String>,
-    /// Number type of a bundled network [default: int8]
-    #[arg(long, value_enum, help_heading = "Expert")]
-    precision: Option<PrecisionName>,
-    #[command(flatten)]
-    encoder: EncoderFlags,
     /// Size of the holograms [default: the size of the first frame's colour]
     #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Display")]
     size: Option<Size>,
     #[command(flatten)]
-    display: DisplayFlags,
+    hologram: HologramFlags,
     #[command(flatten)]
     backend: BackendFlags,
     /// Amplitude that full light stands for
@@ -89,7 +82,7 @@ pub(crate) struct Video {
     #[arg(long, requires = "live", help_heading = "Input")]
     adaptive: bool,
     /// Number of times to show the frames of a folder
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Input")]
+    #[arg(long, group = SOURCE, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Input")]
     repeat: u32,
     /// Also write a preview of each hologram, focused at this z
     #[arg(
@@ -181,18 +174,13 @@ impl Video {
         self.preview_mm.or(film.map(|_| 0.0))
     }
 
-    /// Records all flags that affect the output. The input is left out, because each frame is identified by itself.
+    /// Records all flags that affect the output, with the values that folders, films and defaults give them.
     fn record(&self, flags: &[Flag], display: &phasefront::Display, rate: f64) -> Result<RunRecord> {
-        let mut record = RunRecord::new("video");
-        record.add(flags)?;
-        self.colours.record(&mut record);
+        let mut record = RunRecord::new("video", flags)?;
         self.depth.record(&mut record);
-        let method = CoreMethod::or_default(self.method, self.network.as_deref(), &self.encoder);
-        record.choice("--method", Some(&method));
-        record.display(self.display.name(), display)?;
+        record.choice("--method", Some(&self.hologram.method(self.method)));
+        record.display(self.hologram.display.name(), display)?;
         record.set("--rate", Some(rate));
-        record.switch("--live", self.live);
-        record.switch("--adaptive", self.adaptive);
         record.set("--preview-mm", self.preview_mm());
         Ok(record)
     }
@@ -203,12 +191,12 @@ impl Video {
         threads: Option<NonZeroUsize>,
         rate: f64,
     ) -> Result<(SessionOptions, HologramInfo)> {
-        let file = self.colours.display(&self.display)?;
+        let file = self.colours.display(&self.hologram.display)?;
         let modulator = &file.target.display;
         if self.size.is_none() {
             let Size { width, height } = modulator.size();
             let flag = format!("--size {width}x{height}");
-            warn_of_size(colour, modulator, self.display.is_given(), &flag);
+            warn_of_size(colour, modulator, self.hologram.display.is_given(), &flag);
         }
         let size = self.size.unwrap_or(colour);
         if let Some(light) = &file.target.illumination
@@ -233,15 +221,8 @@ impl Video {
             ..target
         };
         let display = target.display.clone();
-        let network = self.network.as_deref();
-        let method = CoreMethod::or_default(self.method, network, &self.encoder);
-        let (method, encoder) = method.of(&Parts {
-            network,
-            precision: self.precision,
-            display: &display,
-            sweep: Sweep::for_display(&display),
-            encoder: &self.encoder,
-        })?;
+        let method = self.hologram.method(self.method);
+        let (method, encoder) = self.hologram.read(method, &display, Sweep::for_display(&display))?;
         let mut options = SessionOptions::new(target, method);
         options.encoder = encoder.options;
         options.encoder.brightness = match self.brightness {
@@ -273,12 +254,7 @@ impl Video {
         }
         let info = HologramInfo {
             display,
-            encoder: Some(encoder.name.into()),
-            scale: None,
-            lut: file.lut.map(Vec::from),
-            levels_turns: file.target.panel.levels_turns.clone(),
-            calibrated: file.calibrated(true),
-            srgb_of_light: None, // The frames say it.
+            ..levels_info(&file, encoder.name, None) // The frames say their scale and colours.
         };
         Ok((options, info))
     }

@@ -1,15 +1,16 @@
 //! `phasefront view`: makes one HTML file that shows holograms.
 
-use crate::flags::frame::{IMAGE_FLAGS, shown_json, shown_text};
-use crate::make::{HologramRequest, Image, Judged, METHOD_FLAGS, infos, judge};
-use clap::Args;
+use crate::flags::frame::{shown_json, shown_text};
+use crate::given;
+use crate::make::{HologramRequest, Image, Judged, infos, judge};
+use clap::{Args, Id};
 use image::RgbImage;
 use indicatif::ProgressBar;
 use ndarray::Array2;
 use phasefront::Display;
 use phasefront::Size;
 use phasefront_cli::viewer::{self, Depth, Phase, Scene};
-use phasefront_command::flags::check_used;
+use phasefront_command::flags::{DisplayFlags, check_used};
 use phasefront_command::terminal::{self, progress_bar};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::frame::ShownDepth;
@@ -26,7 +27,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct View {
     /// Holograms (.png, or .npy with its .json; with --display phase maps of other software), folders of `video`, or
     /// pages of this command, all joined in one page
-    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = IMAGE_FLAGS, conflicts_with_all = METHOD_FLAGS)]
+    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = making_flags())]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     request: HologramRequest,
@@ -46,6 +47,14 @@ pub(crate) struct View {
     /// Output page
     #[arg(short, long, value_name = "OUT.html")]
     output: PathBuf,
+}
+
+/// Returns the flags that make a hologram. The display also goes with holograms that exist.
+fn making_flags() -> impl Iterator<Item = Id> {
+    let display = given::ids::<DisplayFlags>();
+    given::ids::<HologramRequest>()
+        .into_iter()
+        .filter(move |id| !display.contains(id))
 }
 
 /// The default number of views of a still and of a frame of video.
@@ -151,7 +160,7 @@ impl View {
             ),
             (
                 "--display",
-                self.request.is_for_a_display(),
+                self.request.hologram.display.is_given(),
                 made,
                 "an image or a hologram, not with pages alone",
             ),
@@ -197,7 +206,11 @@ impl View {
         );
         figures.extend(judged_figures(&judged));
         figures.extend(shown_depth.map(|shown| ("Distances".into(), shown.to_string())));
-        let title = self.request.source().map_or("hologram".into(), |path| self.title(path));
+        let title = self
+            .request
+            .image
+            .source()
+            .map_or("hologram".into(), |path| self.title(path));
         let phase = Some(Phase::new(made.levels.upper(file.target.display.bits()).view())?);
         let shown = made.hologram(levels);
         let wave = Hologram::Complex(made.field.expect("kept for this"), field);
@@ -219,14 +232,14 @@ impl View {
 
     /// Returns the display that a hologram file was made for.
     fn display_of(&self, info: &HologramInfo) -> Result<DisplayFile> {
-        match self.request.display_if_given()? {
+        match self.request.hologram.display.read_if_given()? {
             Some(display) => Ok(display),
             None => info.display_file(),
         }
     }
 
     fn of_hologram(&self, path: &Path) -> Result<Parts> {
-        let given = self.request.display_if_given()?;
+        let given = self.request.hologram.display.read_if_given()?;
         let hologram = hologram::read_for(path, given.as_ref())?;
         let file = given.map_or_else(|| hologram.info().display_file(), Ok)?;
         let z_m = self.z_m(&hologram.info().display, STILL_VIEWS);

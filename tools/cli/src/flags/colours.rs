@@ -1,6 +1,5 @@
 //! The flag for the meaning of a picture's colours.
 
-use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
 use phasefront::input::RgbEncoding;
 use phasefront_command::flags::DisplayFlags;
@@ -62,9 +61,5 @@ impl ColourFlags {
     /// Returns an encoding whose views are those of the pictures: light in sRGB, or amplitudes.
     pub(crate) fn viewed(self) -> RgbEncoding {
         self.asked().unwrap_or(RgbEncoding::Srgb)
-    }
-
-    pub(crate) fn record(self, record: &mut RunRecord) {
-        record.choice("--rgb-encoding", Some(&self.rgb_encoding));
     }
 }

@@ -9,7 +9,7 @@ use phasefront_io::{Error, Result};
 use std::sync::Arc;
 
 /// The encoder that turns a field into phases.
-#[derive(Default, Args)]
+#[derive(Clone, Default, Args)]
 #[command(next_help_heading = "Expert")]
 pub(crate) struct EncoderFlags {
     /// Encoder that turns the field into phases [default: anti-alias; deep with --network ddpm-8]

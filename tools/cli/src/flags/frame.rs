@@ -3,7 +3,8 @@
 
 use crate::flags::colours::ColourFlags;
 use crate::flags::depth::DepthFlags;
-use clap::{Args, ValueEnum, ValueHint};
+use crate::given::SOURCE;
+use clap::{ArgGroup, Args, ValueEnum, ValueHint};
 use ndarray::{Array2, Array3};
 use phasefront::Size;
 use phasefront::input::{ColourScale, DepthNetwork};
@@ -20,30 +21,19 @@ use phasefront_io::{Error, Result, frame, output};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// The flags for an RGB-D image, for flags that conflict with them. clap makes no group of a struct that holds others.
-pub(crate) const IMAGE_FLAGS: [&str; 8] = [
-    "rgb",
-    "depth",
-    "z_mm",
-    "photo",
-    "fit",
-    "ColourFlags",
-    "SeenDepthFlags",
-    "DepthFlags",
-];
-
 /// The value of --depth for a picture on one plane.
 const FLAT: &str = "flat";
 
 /// An RGB-D image, the meaning of its depth, and its placement on the modulator.
 #[derive(Default, Args)]
-#[command(next_help_heading = "Input")]
+#[command(next_help_heading = "Input", group = ArgGroup::new(SOURCE).multiple(true))]
 pub(crate) struct FrameFlags {
-    #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}"))]
+    #[arg(long, value_name = "FILE", group = SOURCE, conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}"))]
     rgb: Option<PathBuf>,
     #[arg(
         long,
         value_name = "FILE",
+        group = SOURCE,
         requires = "rgb",
         conflicts_with = "depth_network",
         help = format!("Depth image: {DEPTH_FORMATS}; or `flat` for a picture on one plane, at --z-mm")
@@ -53,10 +43,10 @@ pub(crate) struct FrameFlags {
     #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "depth")]
     z_mm: Option<f64>,
     /// A phone's photo with depth inside: JPEG (GDepth, Dynamic Depth) or HEIC; with --depth-network any picture
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]
+    #[arg(long, value_name = "FILE", group = SOURCE, conflicts_with_all = ["depth_unit", "depth_scale"])]
     photo: Option<PathBuf>,
     #[command(flatten)]
-    colours: ColourFlags,
+    pub(crate) colours: ColourFlags,
     #[command(flatten)]
     seen: SeenDepthFlags,
     /// Placement of the image on the modulator, which makes the hologram as large as the modulator [default: contain
@@ -321,16 +311,6 @@ impl FrameFlags {
         };
         warn_of_size(frame.size(), display, named, "--fit contain, cover or centre");
         Ok((frame.decoded(encoding, display), distances))
-    }
-
-    /// Returns the meaning of the colours.
-    pub(crate) fn colours(&self) -> ColourFlags {
-        self.colours
-    }
-
-    /// Sets the meaning of the colours.
-    pub(crate) fn set_colours(&mut self, colours: ColourFlags) {
-        self.colours = colours;
     }
 
     fn placement(&self, picture: Size, display: &Display) -> Placement {

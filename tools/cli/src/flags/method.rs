@@ -1,9 +1,9 @@
-//! The core's methods, with their names on the command line.
+//! The flags that all commands which make holograms share, and the core's methods by name.
 
 use crate::flags::encoder::{Encoder, EncoderFlags};
-use clap::ValueEnum;
+use clap::{Args, ValueEnum, ValueHint};
 use phasefront::{Display, Method, Sweep};
-use phasefront_command::flags::{PrecisionName, check_used};
+use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used};
 use phasefront_command::networks;
 use phasefront_io::Result;
 use phasefront_models::{NATURAL, default_network};
@@ -19,27 +19,23 @@ pub(crate) enum CoreMethod {
     Auto,
 }
 
-/// The inputs of a method besides its name.
-pub(crate) struct Parts<'a> {
-    /// The value of --network.
-    pub(crate) network: Option<&'a str>,
-    /// The value of --precision.
+/// The flags of every command that makes holograms of images: the network, the encoder and the display.
+#[derive(Clone, Default, Args)]
+#[command(next_help_heading = "Method")]
+pub(crate) struct HologramFlags {
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
+    #[arg(long, value_name = "NAME|FILE", value_hint = ValueHint::FilePath, help_heading = "Method")]
+    pub(crate) network: Option<String>,
+    /// Number type of a bundled network [default: int8]
+    #[arg(long, value_enum, help_heading = "Expert")]
     pub(crate) precision: Option<PrecisionName>,
-    pub(crate) display: &'a Display,
-    pub(crate) sweep: Sweep,
-    pub(crate) encoder: &'a EncoderFlags,
+    #[command(flatten)]
+    pub(crate) encoder: EncoderFlags,
+    #[command(flatten)]
+    pub(crate) display: DisplayFlags,
 }
 
 impl CoreMethod {
-    /// Returns the method that was asked for, or the default: a network if flags name one, otherwise [`Self::Auto`].
-    pub(crate) fn or_default(asked: Option<Self>, network: Option<&str>, encoder: &EncoderFlags) -> Self {
-        asked.unwrap_or(if network.is_some() || encoder.is_deep() {
-            CoreMethod::Network
-        } else {
-            CoreMethod::Auto
-        })
-    }
-
     pub(crate) fn name(self) -> &'static str {
         match self {
             CoreMethod::Network => "network",
@@ -47,25 +43,31 @@ impl CoreMethod {
             CoreMethod::Auto => "auto",
         }
     }
+}
 
-    /// Makes the method and the encoder of its fields.
-    pub(crate) fn of(self, parts: &Parts<'_>) -> Result<(Method, Encoder)> {
-        let Parts {
-            network,
-            precision,
-            display,
-            sweep,
-            encoder,
-        } = *parts;
-        let trained = self != CoreMethod::Sweep;
+impl HologramFlags {
+    /// Returns the method that was asked for, or the default: a network if flags name one, otherwise
+    /// [`CoreMethod::Auto`].
+    pub(crate) fn method(&self, asked: Option<CoreMethod>) -> CoreMethod {
+        asked.unwrap_or(if self.network.is_some() || self.encoder.is_deep() {
+            CoreMethod::Network
+        } else {
+            CoreMethod::Auto
+        })
+    }
+
+    /// Makes `method` for `display`, where `sweep` is its plane sweep, and the encoder of its fields.
+    pub(crate) fn read(&self, method: CoreMethod, display: &Display, sweep: Sweep) -> Result<(Method, Encoder)> {
+        let (network, encoder) = (self.network.as_deref(), &self.encoder);
+        let trained = method != CoreMethod::Sweep;
         let with = "a --method with a network, not with sweep";
         check_used(&[
             ("--network", network.is_some(), trained, with),
-            ("--precision", precision.is_some(), trained, with),
+            ("--precision", self.precision.is_some(), trained, with),
         ])?;
-        let precision = precision.map(PrecisionName::precision);
+        let precision = self.precision.map(PrecisionName::precision);
         let focus = encoder.focus()?;
-        let (method, encoder) = match self {
+        let (method, encoder) = match method {
             CoreMethod::Network => {
                 let (network, encoder) = encoder.with_network(network, precision, display)?;
                 (Method::trained(network), encoder)

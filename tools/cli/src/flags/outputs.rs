@@ -38,16 +38,6 @@ struct Reported<'a> {
 }
 
 impl OutputFlags {
-    /// Returns the name of a flag that is given, if there is one.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        let all = [
-            (self.complex.is_some(), "--complex"),
-            (self.packed.is_some(), "--packed"),
-            (self.judge, "--judge"),
-        ];
-        all.iter().find(|(is_given, _)| *is_given).map(|(_, flag)| *flag)
-    }
-
     /// Checks whether a result must keep its field.
     pub(crate) fn need_field(&self) -> bool {
         self.complex.is_some() || self.judge

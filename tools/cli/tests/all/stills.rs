@@ -169,6 +169,19 @@ fn holograms_of_the_same_request_are_kept() {
 }
 
 #[test]
+fn flat_pictures_on_another_plane_are_not_resumed() {
+    let folder = Folder::new();
+    let [rgb, out] = ["rgb", "out"].map(|name| folder.text(name));
+    let call = [
+        "hologram", "--rgb", &rgb, "--depth", "flat", "--method", "sweep", "-o", &out,
+    ];
+    json(&call);
+    let error = refusal(&[&call[..], &["--resume", "--z-mm", "1"]].concat());
+    assert!(error.contains("no --z-mm") && error.contains("--z-mm 1"), "{error}");
+    assert_eq!(json(&[&call[..], &["--resume"]].concat())["kept"], 3);
+}
+
+#[test]
 fn folders_that_cannot_be_meant_are_refused_before_work() {
     let folder = Folder::new();
     let [rgb, depth, out] = ["rgb", "depth", "out"].map(|name| folder.text(name));

@@ -28,7 +28,7 @@ pub(super) fn run(
     if output::has_extension(output, "png") {
         return Err(Error::file(output, "folders of pictures need the name of a folder"));
     }
-    for folder in request.folders() {
+    for folder in request.image.frame.folders() {
         output::reading(folder)?;
         if pictures.is_empty() {
             return Err(Error::file(folder, "holds no pictures"));
@@ -36,7 +36,7 @@ pub(super) fn run(
     }
     output::folder(output, before.holding())?;
     let display = request.display()?;
-    record.display(request.display.name(), &display.target.display)?;
+    record.display(request.hologram.display.name(), &display.target.display)?;
     let names: BTreeSet<_> = pictures.iter().map(|picture| format!("{}.png", picture.name)).collect();
     let claim = Claim::new(output, &record, before, |name| names.contains(name))?;
     interrupt::advise(format!(
@@ -108,7 +108,7 @@ fn still(
             }
         }
     }
-    request.take(picture);
+    request.image.frame.take(picture);
     let named = |e: Error| match e {
         Error::File { ref path, .. } if picture.files.contains(path) => e,
         other => Error::file(&picture.files[0], other),
