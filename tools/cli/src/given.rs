@@ -4,8 +4,8 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Id, ValueHint};
 use std::path::PathBuf;
 
-/// The group of the flags that name the input. A flag declares `group = SOURCE` to stay out of records: what it names is
-/// identified by its content.
+/// The group of the flags that name the input. A flag declares `group = SOURCE` to stay out of records, because what it
+/// names is identified by its content.
 pub(crate) const SOURCE: &str = "source";
 
 /// The value of a flag.

@@ -102,8 +102,8 @@ fn described(engine: &Engine) -> String {
     format!("{} ({})", engine.name, engine.why)
 }
 
-/// Returns the metadata for files of levels that `encoder` made for `display`. `colours` are those of views, if they are
-/// known.
+/// Returns the metadata for files of levels that `encoder` made for `display`. `colours` are those of views if they
+/// are known.
 pub(crate) fn levels_info(display: &DisplayFile, encoder: &str, colours: Option<&ViewColours>) -> HologramInfo {
     let shown = &display.target.display;
     HologramInfo {
