@@ -1,6 +1,7 @@
 //! Reading an RGB-D frame from files: depth is normalized and conditioned for the shape of the colour on a modulator.
 
 pub mod fit;
+mod middlebury;
 
 use crate::frame::fit::Placement;
 use crate::input::decode;
@@ -94,7 +95,10 @@ pub(crate) fn stored(
     if is_turned_alone(depth_path, &file, orientation, colour_size)? {
         told(Doubt::Turned(orientation));
     }
-    let readings = file.depth;
+    let mut readings = file.depth;
+    if options.unit == DepthUnit::Disparity && middlebury::inverse_metres(depth_path, &mut readings)? {
+        told(Doubt::Middlebury);
+    }
     if normalized {
         check_normalized(&readings).map_err(|why| Error::file(depth_path, why))?;
         if let Some(doubt) = Doubt::of_normalized(readings.iter().copied(), options.inverted) {
@@ -226,6 +230,8 @@ pub(crate) fn is_turned_alone(depth_path: &Path, depth: &DepthFile, colour: Orie
 pub enum Doubt {
     /// It was enlarged from fewer readings, which are taken in its place.
     Enlarged(Enlarged),
+    /// A calibration of Middlebury lies beside it, and its numbers are taken for pixels.
+    Middlebury,
     /// The colour's Exif data turned the colour alone, though both shapes match.
     Turned(Orientation),
     /// Normalized depth reaches only this value.
@@ -319,6 +325,7 @@ impl Display for Doubt {
     fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Doubt::Enlarged(how) => write!(to, "was {how}; it is conditioned as depth of that size"),
+            Doubt::Middlebury => write!(to, "is disparity in pixels, as calib.txt beside it is Middlebury's"),
             Doubt::Turned(how) => write!(
                 to,
                 "is taken as it is, upright; the colour's Exif data turn the colour: {how:?}"

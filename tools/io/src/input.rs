@@ -6,7 +6,7 @@ mod jpeg;
 mod jpeg_end;
 pub mod npy;
 pub(crate) mod npz;
-mod openexr;
+pub(crate) mod openexr;
 pub mod quiet;
 
 use crate::{Error, Result, output};

@@ -5,6 +5,7 @@ pub mod depth_map;
 pub mod difference;
 pub mod export;
 pub(crate) mod heif;
+pub(crate) mod linear;
 pub mod photo;
 pub mod plot;
 

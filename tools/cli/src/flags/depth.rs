@@ -34,8 +34,10 @@ enum UnitName {
     M,
     /// Millimetres
     Mm,
-    /// Inverse metres
+    /// Inverse metres; pixels where Middlebury's calib.txt lies beside
     Disparity,
+    /// 256 units per metre, as KITTI's PNGs of 16 bits
+    Kitti,
     /// --depth-scale units per metre
     Raw,
 }
@@ -87,6 +89,7 @@ impl DepthFlags {
             UnitName::M => DepthUnit::Metres,
             UnitName::Mm => DepthUnit::Millimetres,
             UnitName::Disparity => DepthUnit::Disparity,
+            UnitName::Kitti => DepthUnit::Raw { units_per_m: 256.0 },
             UnitName::Raw => DepthUnit::Raw {
                 units_per_m: self.depth_scale.unwrap_or(f64::NAN),
             },

@@ -15,6 +15,7 @@ mod reference;
 #[path = "../../../../tests/skip.rs"]
 mod skip;
 
+mod archives;
 mod calibrate_command;
 mod capture;
 mod colours;

@@ -151,7 +151,7 @@ fn picture(decoded: Decoded) -> Said<(DynamicImage, Orientation)> {
     match decoded.pixels {
         Pixels::Image(image) => Ok((image, decoded.orientation)),
         Pixels::Plane(_) => Err(format!(
-            "holds numbers of 32 bits or floating point, which are read as depth alone; a picture is {COLOUR_FORMATS}"
+            "holds numbers of 32 bits or floating point, which are read as depth alone here; a picture is {COLOUR_FORMATS}"
         )),
     }
 }

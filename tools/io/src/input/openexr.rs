@@ -1,7 +1,7 @@
-//! Depth maps in OpenEXR files: the choice of the depth channel, and its place in the picture.
+//! Depth maps and colours in OpenEXR files: the choice of the channels, and their place in the picture.
 
 use crate::input::decode::{Numbers, Plane, Said, broken, check};
-use exr::block::reader::ChunksReader;
+use exr::block::reader::{ChunksReader, Reader};
 use exr::math::Vec2;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::SampleType;
@@ -22,6 +22,68 @@ pub(crate) fn depth<R: Read + Seek>(from: R, most_pixels: u64) -> Said<Plane> {
         check_part(header, most_pixels)?;
     }
     let wanted = depth_channels(reader.headers())?;
+    let (mut planes, header) = planes(reader, &wanted, most_pixels)?;
+    let alike = |other: &Array2<f32>| other.iter().zip(&planes[0]).all(|(a, b)| a.to_bits() == b.to_bits());
+    if !planes[1..].iter().all(alike) {
+        return Err(
+            "is OpenEXR of colours without a channel of depth (Z or depth), and is read as colour alone".into(),
+        );
+    }
+    let numbers = match header.channels.list[wanted[0].index].sample_type {
+        SampleType::F16 => Numbers::Halves,
+        SampleType::F32 | SampleType::U32 => Numbers::Floats,
+    };
+    Ok(Plane {
+        values: planes.swap_remove(0),
+        numbers,
+    })
+}
+
+/// Linear light, with the x and y of red, green, blue and white if the file has them.
+pub(crate) struct Light {
+    /// Red, green and blue in the display window, NaN outside the data window, (H, W) each.
+    pub(crate) planes: Vec<Array2<f32>>,
+    pub(crate) primaries: Option<[[f32; 2]; 4]>,
+}
+
+/// Decodes the red, green and blue of the only layer that has them, or of the one without a name or called Combined.
+pub(crate) fn colour<R: Read + Seek>(from: R, most_pixels: u64) -> Said<Light> {
+    let reader = exr::block::read(from, false).map_err(|e| broken(&e))?;
+    for header in reader.headers() {
+        check_part(header, most_pixels)?;
+    }
+    let wanted = colour_channels(&flat_channels(reader.headers()))?;
+    let (planes, header) = planes(reader, &wanted, most_pixels)?;
+    let primaries = header.shared_attributes.chromaticities;
+    Ok(Light {
+        planes,
+        primaries: primaries.map(|p| [p.red, p.green, p.blue, p.white].map(|Vec2(x, y)| [x, y])),
+    })
+}
+
+/// Returns the red, green and blue of one layer.
+fn colour_channels(all: &[Channel]) -> Said<Vec<Channel>> {
+    let beside = |red: &Channel, name: &str| {
+        let found = all.iter().find(|other| other.is_beside(red) && other.words().1 == name);
+        found.cloned()
+    };
+    let reds = all.iter().filter(|channel| channel.words().1 == "r");
+    let mut layers: Vec<Vec<Channel>> = reds
+        .filter_map(|red| Some(vec![red.clone(), beside(red, "g")?, beside(red, "b")?]))
+        .collect();
+    let whole = |layer: &Vec<Channel>| ["", "combined", "rgb", "rgba"].contains(&layer[0].words().0.as_str());
+    if layers.len() > 1 {
+        layers.retain(whole);
+    }
+    match layers.len() {
+        1 => Ok(layers.remove(0)),
+        0 => Err("is OpenEXR without R, G and B of one picture; save its colours as such channels".into()),
+        _ => Err("is OpenEXR with several pictures; save one of them alone".into()),
+    }
+}
+
+/// Decodes channels of one part, in the display window; NaN outside the data window. Also returns the part's header.
+fn planes<R: Read + Seek>(reader: Reader<R>, wanted: &[Channel], most_pixels: u64) -> Said<(Vec<Array2<f32>>, Header)> {
     let part = wanted[0].part;
     let header = reader.headers()[part].clone();
     let window = Window::of(&header, most_pixels)?;
@@ -29,7 +91,7 @@ pub(crate) fn depth<R: Read + Seek>(from: R, most_pixels: u64) -> Said<Plane> {
     let described = |index: &usize| &header.channels.list[*index];
     if indices.iter().any(|index| described(index).sampling != Vec2(1, 1)) {
         return Err(
-            "is OpenEXR whose depth has fewer pixels than its picture; save it with a value for each pixel".into(),
+            "is OpenEXR with a channel of fewer pixels than its picture; save it with a value for each pixel".into(),
         );
     }
     let mut planes = vec![Array2::from_elem(window.size.shape(), f32::NAN); indices.len()];
@@ -55,18 +117,7 @@ pub(crate) fn depth<R: Read + Seek>(from: R, most_pixels: u64) -> Said<Plane> {
             );
         }
     }
-    let alike = |other: &Array2<f32>| other.iter().zip(&planes[0]).all(|(a, b)| a.to_bits() == b.to_bits());
-    if !planes[1..].iter().all(alike) {
-        return Err("is OpenEXR of colours without a channel of depth (Z or depth), and is read as depth alone".into());
-    }
-    let numbers = match described(&indices[0]).sample_type {
-        SampleType::F16 => Numbers::Halves,
-        SampleType::F32 | SampleType::U32 => Numbers::Floats,
-    };
-    Ok(Plane {
-        values: planes.swap_remove(0),
-        numbers,
-    })
+    Ok((planes, header))
 }
 
 /// Checks the number of pixels of an part and the bytes of all its channels, which are decoded together.

@@ -3,6 +3,7 @@
 
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PICTURE, quiet};
+use crate::picture::linear::{self, Linear};
 use crate::picture::{self, heif};
 use crate::{Error, Result};
 use image::metadata::Orientation;
@@ -89,6 +90,11 @@ enum Said {
 pub fn read(path: &Path, asked: Option<RgbEncoding>) -> Result<(Colours, Orientation)> {
     if heif::is(path)? {
         return Ok((heif::decode(path)?.colours(asked)?, Orientation::NoTransforms));
+    }
+    if let Some(Linear { light, profile }) = linear::read(path)? {
+        let said = asked.map_or_else(|| Said::Profile(Box::new(profile)), Said::Encoding);
+        let colours = of_values(light, said).map_err(|why| Error::file(path, why))?;
+        return Ok((colours, Orientation::NoTransforms));
     }
     let (image, orientation) = decode::open_picture(path, Reading::UPRIGHT)?;
     let said = match asked {
@@ -291,7 +297,11 @@ fn known(profile: &ColorProfile, layout: Layout) -> std::result::Result<Option<R
 }
 
 fn understood(image: DynamicImage, said: Said) -> std::result::Result<Colours, String> {
-    let rgb = picture::amplitudes(image);
+    of_values(picture::amplitudes(image), said)
+}
+
+/// Understands encoded values, (3, H, W), as [`read`] does.
+fn of_values(rgb: Array3<f32>, said: Said) -> std::result::Result<Colours, String> {
     let profile = match said {
         Said::Encoding(encoding) => return Ok(Colours { rgb, encoding }),
         Said::Profile(profile) => profile,
