@@ -49,7 +49,7 @@ fn the_first_commands_run_as_they_stand() {
 }
 
 #[test]
-#[ignore = "slow: 60 seconds of a core"]
+#[ignore = "slow: minutes of a core"]
 fn the_commands_of_the_guide_to_pages_run_as_they_stand() {
     runs("docs/view.md", 6);
 }
