@@ -14,7 +14,7 @@ use crate::record::{Before, RunRecord};
 use clap::{ArgGroup, Args, ValueEnum};
 use phasefront::Size;
 use phasefront::input::DepthRange;
-use phasefront::session::{Backend, Event, Quality, SessionHandle, Statistics};
+use phasefront::session::{Backend, Event, FrameTimes, Quality, SessionHandle, Statistics};
 use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
 use phasefront_cli::gpu;
 use phasefront_command::flags::parse_size;
@@ -371,9 +371,8 @@ impl Video {
         sink: &Sink,
         memory_mb: [Option<f64>; 2],
     ) -> Result<()> {
-        let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
         let stages: serde_json::Map<_, _> = (statistics.times.stages().into_iter())
-            .map(|(stage, time)| (stage.to_owned(), json!(ms(time))))
+            .map(|(stage, time)| (stage.to_owned(), json!(rounded_ms(time))))
             .collect();
         let s = statistics;
         let scales = &sink.scales;
@@ -387,7 +386,7 @@ impl Video {
                 "paused": s.dropped.paused, "reset": s.dropped.reset, "closed": s.dropped.closed,
             },
             "seconds": seconds, "rate_hz": s.processed as f64 / seconds, "recent_rate_hz": s.rate_hz,
-            "stage_ms": stages, "total_ms": ms(s.times.total()), "backend": s.backend.name,
+            "stage_ms": stages, "total_ms": rounded_ms(s.times.total()), "frame_times": frame_times(&sink.times), "backend": s.backend.name,
             "backend_reason": s.backend.why, "quality_level": s.quality_level, "scale_change": change, "memory_mb": memory_mb,
         });
         sink.write_report(&result)?;
@@ -401,11 +400,33 @@ impl Video {
                 s.processed as f64 / seconds,
                 s.dropped.total(),
                 s.failed,
-                ms(s.times.total())
+                rounded_ms(s.times.total())
             ),
         );
         Ok(())
     }
+}
+
+/// Returns the time of the first frame, and the median and the 95th percentile of each stage of all frames, in ms.
+fn frame_times(times: &[FrameTimes]) -> Option<serde_json::Value> {
+    let first = times.first()?;
+    let percentile = |share: f64| {
+        let of = |stage: &dyn Fn(&FrameTimes) -> Duration| {
+            let mut stages: Vec<_> = times.iter().map(stage).collect();
+            stages.sort_unstable();
+            json!(rounded_ms(stages[((stages.len() - 1) as f64 * share).round() as usize]))
+        };
+        let names = first.stages().map(|(name, _)| name);
+        let stages = (names.into_iter().enumerate()).map(|(i, name)| (name, of(&|times| times.stages()[i].1)));
+        (stages.chain([("total", of(&FrameTimes::total))])).collect::<std::collections::BTreeMap<_, _>>()
+    };
+    Some(json!({
+        "frames": times.len(), "first_ms": rounded_ms(first.total()), "median_ms": percentile(0.5), "p95_ms": percentile(0.95),
+    }))
+}
+
+fn rounded_ms(time: Duration) -> f64 {
+    (time.as_secs_f64() * 1e5).round() / 100.0
 }
 
 fn check_rate(rate_hz: Option<f64>) -> Result<()> {

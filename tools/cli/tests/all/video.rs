@@ -96,6 +96,13 @@ fn a_folder_becomes_phase_maps_previews_and_statistics() {
         (Some(4), Some(0))
     );
     sums_agree(&report);
+    let times = &report["frame_times"];
+    assert_eq!(times["frames"], 4);
+    for stage in ["colour", "depth", "method", "propagate", "encode", "total"] {
+        let (median, most) = (&times["median_ms"][stage], &times["p95_ms"][stage]);
+        assert!(median.as_f64().unwrap() <= most.as_f64().unwrap(), "{stage}: {times}");
+    }
+    assert!(times["first_ms"].as_f64() > Some(0.0), "{times}");
     let written: Value = serde_json::from_slice(&std::fs::read(out.join("statistics.json")).unwrap()).unwrap();
     assert_eq!(written, report);
     for index in 0..4 {

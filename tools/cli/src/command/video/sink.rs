@@ -5,6 +5,7 @@ use ndarray::Array3;
 use phasefront::Hologram;
 use phasefront::Size;
 use phasefront::output::Layout;
+use phasefront::session::FrameTimes;
 use phasefront_command::interrupt;
 use phasefront_io::film::video::VideoFrame;
 use phasefront_io::film::{self, Quality};
@@ -25,6 +26,8 @@ pub(super) struct Sink {
     record: RunRecord,
     claim: Option<Claim>,
     pub(super) scales: Vec<f32>,
+    /// The times of the frames that this run made.
+    pub(super) times: Vec<FrameTimes>,
 }
 
 impl Sink {
@@ -77,6 +80,7 @@ impl Sink {
             record,
             claim,
             scales: Vec::new(),
+            times: Vec::new(),
         })
     }
 
@@ -139,6 +143,7 @@ impl Sink {
     pub(super) fn take(&mut self, hologram: &Hologram, frame: Option<&VideoFrame>) -> Result<()> {
         let index = self.scales.len();
         self.scales.push(hologram.scale());
+        self.times.push(hologram.times());
         let Some(folder) = &self.folder else {
             return Ok(());
         };
