@@ -1,10 +1,10 @@
 //! Depth from colour alone, by a network that the user supplies: an ONNX file, run by tract, that takes one picture and
 //! returns one plane of relative inverse depth on any scale.
 
-mod bounds;
 mod picture;
 
 use crate::Size;
+use crate::method::network::graph::{self, flat, not_run, one_line};
 use crate::runtime::caught::caught;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::file::{self, MOST_DEPTH_NETWORK};
@@ -13,7 +13,6 @@ use picture::Picture;
 use std::fmt::{Debug, Formatter};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
-use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
 
 /// The scaling that a network expects for colour values from 0 to 1.
@@ -53,7 +52,7 @@ impl DepthNetwork {
     /// # Errors
     /// Returns [`Error::Network`] if tract does not read the file, or if it has too many parts.
     pub fn from_onnx(file: &[u8]) -> Result<Self> {
-        Self::of_messages(flat(caught(|| bounds::messages(file, None)))?, None)
+        Ok(Self::of_model(graph::read(file, None)?))
     }
 
     /// Reads the ONNX file at `path`, whose weights may lie in other files of the same folder. See [`Self::from_onnx`].
@@ -63,29 +62,16 @@ impl DepthNetwork {
     pub fn open(path: &Path) -> Result<Self> {
         let bytes =
             file::read(path, MOST_DEPTH_NETWORK).map_err(|why| Error::Network(format!("cannot be read: {why}")))?;
-        let proto = flat(caught(|| bounds::messages(&bytes, Some(path))))?;
-        // The messages hold copies of the weights.
-        drop(bytes);
-        Self::of_messages(proto, Some(path))
+        Ok(Self::of_model(graph::read(bytes, Some(path))?))
     }
 
-    fn of_messages(proto: ModelProto, path: Option<&Path>) -> Result<Self> {
-        // tract panics on files that it does not expect.
-        let read = caught(|| {
-            let folder = path.and_then(Path::parent).and_then(Path::to_str);
-            let parsed = (tract_onnx::onnx().parse(&proto, folder))
-                .map_err(|why| format!("is no ONNX file that tract reads: {}", one_line(&why)))?;
-            match parsed.unresolved_inputs.first() {
-                Some(name) => Err(format!("reads {name}, which no node gives")),
-                None => Ok(parsed.model),
-            }
-        });
-        Ok(DepthNetwork {
+    fn of_model(model: InferenceModel) -> Self {
+        DepthNetwork {
             colours: ColourScale::default(),
             gives_distance: false,
-            model: Arc::new(flat(read)?),
+            model: Arc::new(model),
             planned: Arc::default(),
-        })
+        }
     }
 
     /// Plans the network for pictures of `size`, which are brought to the size that the network takes.
@@ -100,7 +86,7 @@ impl DepthNetwork {
             Some(Planned { to, plan }) if *to == picture.to() => plan.clone(),
             _ => {
                 let model = (*self.model).clone();
-                let plan = flat(caught(|| plan(model, &picture).map_err(|why| not_run(&why))))?;
+                let plan = graph::plan(model, vec![picture.fact()], 1)?;
                 *planned = Some(Planned {
                     to: picture.to(),
                     plan: plan.clone(),
@@ -160,23 +146,6 @@ impl Debug for DepthEstimator {
     }
 }
 
-fn plan(mut model: InferenceModel, picture: &Picture) -> TractResult<Arc<TypedRunnableModel>> {
-    let outlets = model.output_outlets()?;
-    let outputs = outlets
-        .get(..1)
-        .ok_or_else(|| TractError::msg("it has no output"))?
-        .to_vec();
-    model = model
-        .with_input_fact(0, picture.fact())?
-        .with_output_outlets(&outputs)?;
-    bounds::analyse(&mut model)?;
-    let model = model.into_typed()?;
-    bounds::check_sizes(&model)?;
-    let model = model.into_optimized()?;
-    bounds::check_sizes(&model)?;
-    model.into_runnable()
-}
-
 /// Returns the single plane of `output`, whose other axes must have length 1.
 fn plane(output: &Tensor) -> std::result::Result<Array2<f32>, String> {
     let shape = output.shape();
@@ -192,19 +161,4 @@ fn plane(output: &Tensor) -> std::result::Result<Array2<f32>, String> {
         return Err("gives numbers that are not finite; does it take colours of another scale?".into());
     }
     Array2::from_shape_vec((height, width), values.iter().copied().collect()).map_err(|why| why.to_string())
-}
-
-/// Returns a caught result, or what went wrong as an [`Error::Network`].
-fn flat<T>(caught: std::result::Result<std::result::Result<T, String>, String>) -> Result<T> {
-    caught
-        .unwrap_or_else(|panic| Err(format!("tract does not run it: it fails with: {panic}")))
-        .map_err(Error::Network)
-}
-
-fn not_run(why: &TractError) -> String {
-    format!("tract does not run it: {}", one_line(why))
-}
-
-fn one_line(why: &TractError) -> String {
-    format!("{why:#}").split_whitespace().collect::<Vec<_>>().join(" ")
 }

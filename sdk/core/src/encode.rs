@@ -64,6 +64,12 @@ impl EncoderOptions {
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         self.brightness.check()?;
+        let steps = self.local_steps + self.midpoint_steps + self.focus_steps;
+        if matches!(self.encoding, Encoding::Phase) && (self.dark_threshold != 0.0 || steps > 0) {
+            return Err(Error::Setting(
+                "phases are shown as they are; a dark threshold and steps of 0 are right".into(),
+            ));
+        }
         if !(0.0..=1.0).contains(&self.dark_threshold) {
             return Err(Error::Setting(format!(
                 "the dark threshold is {}; it must be a share of full light from 0 to 1",
@@ -110,10 +116,10 @@ impl Default for EncoderOptions {
 
 impl From<Encoding> for EncoderOptions {
     /// Uses `encoding` with smoothed brightness, [`Self::DARK_THRESHOLD`] and one local step. For a pre-filter, which
-    /// was trained without the last two, both are 0.
+    /// was trained without the last two, and for [`Encoding::Phase`], both are 0.
     fn from(encoding: Encoding) -> Self {
         let (dark, local_steps) = match encoding {
-            Encoding::Deep(_) => (0.0, 0),
+            Encoding::Deep(_) | Encoding::Phase => (0.0, 0),
             _ => (Self::DARK_THRESHOLD, 1),
         };
         EncoderOptions {

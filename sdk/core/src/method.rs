@@ -50,6 +50,12 @@ impl Method {
             Method::Network(network) => (network, InputKind::Rgbd),
             Method::Seeded(network) if network.input() == InputKind::SeededColour => (network, InputKind::SeededColour),
             Method::Seeded(network) => (network, InputKind::Seeded),
+            Method::Auto(_, network) if network.chain().is_none() => {
+                return Err(Error::Network(
+                    "it has a form of its own, which the automatic choice does not take; the network alone is right"
+                        .into(),
+                ));
+            }
             Method::Auto(_, network) => {
                 return Method::trained(network.clone()).check(display);
             }
@@ -159,12 +165,21 @@ impl MethodPlan {
     }
 
     /// Returns the position of the hologram in metres from the midpoint toward the viewer. A sweep continues to the
-    /// display if that is close enough; all other methods end at the midpoint.
+    /// display if that is close enough, a network of any form where its file says; all other methods end at the
+    /// midpoint.
     pub fn z_m(&self) -> f64 {
         match &self.plan {
-            Plan::Network(_) | Plan::Seeded(_) | Plan::Auto(..) => 0.0,
+            Plan::Network(plan) => plan.z_m(),
+            Plan::Seeded(_) | Plan::Auto(..) => 0.0,
             Plan::Sweep(plan) => plan.z_m(),
         }
+    }
+
+    /// Returns whether the method gives the modulator's phase, which is shown as it is ([`Encoding::Phase`]).
+    ///
+    /// [`Encoding::Phase`]: crate::encode::Encoding::Phase
+    pub(crate) fn gives_phase(&self) -> bool {
+        matches!(&self.plan, Plan::Network(plan) if plan.gives_phase())
     }
 
     /// Returns the engine that runs the network and why it was chosen. Returns `None` for a method without a network.

@@ -7,12 +7,12 @@ pub mod field;
 use crate::Size;
 use crate::display::levels::LevelsMut;
 use crate::display::target::Target;
-use crate::encode::EncoderOptions;
+use crate::encode::{EncoderOptions, Encoding};
 use crate::frame::{Past, RgbdFrame};
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::pipeline::display_plan::{DisplayPlan, DisplayScratch, Modulation, remove_mean_phase};
 use crate::runtime::cancel::Cancel;
-use crate::runtime::error::Result;
+use crate::runtime::error::{Error, Result};
 use crate::runtime::stage::stage;
 use num_complex::Complex32;
 use std::fmt::{Debug, Formatter};
@@ -90,13 +90,29 @@ impl PipelineScratch {
 }
 
 impl Pipeline {
-    /// Plans `method` for frames of `size` and for `target`.
+    /// Plans `method` for frames of `size` and for `target`. If the method is a network that gives the modulator's
+    /// phase, the phase is shown as it is, whatever the encoding in `options`.
     ///
     /// # Errors
     /// Returns an error if [`Method`] or the propagation to the target cannot be planned: the network is for another
     /// display, an offset or correction moves light farther than can be padded, or a parameter is out of its range.
     pub fn new(size: Size, method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
         let method = MethodPlan::new(size, method, &target.display)?;
+        let as_it_is;
+        let options = if method.gives_phase() {
+            if options.midpoint_steps + options.focus_steps > 0 {
+                return Err(Error::Setting(
+                    "the network gives the modulator's phase, which is shown as it is; 0 steps of midpoint and focus are right".into(),
+                ));
+            }
+            as_it_is = EncoderOptions {
+                brightness: options.brightness,
+                ..Encoding::Phase.into()
+            };
+            &as_it_is
+        } else {
+            options
+        };
         // The display plan covers the remaining distance to the modulator.
         let display = DisplayPlan::for_frames(size, method.z_m(), target, options)?;
         Ok(Pipeline { method, display })

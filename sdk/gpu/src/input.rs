@@ -290,7 +290,7 @@ mod tests {
                     continue;
                 }
                 let source = Source::Frame(colour, Depth::U16);
-                let form = Form::Chain(network.chain(), numbers, 1.0);
+                let form = Form::Chain(network.chain().unwrap(), numbers, 1.0);
                 let packer = device
                     .guarded(|| Packer::new(&device, form, size, source, None))
                     .unwrap();

@@ -9,7 +9,7 @@ use super::device::Device;
 use super::input::{Colour, Depth, Form, Frame, Packer, Source};
 use super::numbers::Numbers;
 use super::{GpuError, Result};
-use chain::{ChainOptions, ChainPlan, End};
+use chain::{ChainOptions, ChainPlan, End, chain_of};
 use phasefront_core::Size;
 use phasefront_core::depth::softness::is_soft;
 use phasefront_core::display::Display;
@@ -69,8 +69,8 @@ impl Trained {
         packer: &Packer,
         options: ChainOptions,
     ) -> Result<Self> {
-        let (chain, fusion) = (network.chain(), options.fusion);
-        let end = End::Field(network.head(), network.input());
+        let (chain, head) = chain_of(network)?;
+        let (end, fusion) = (End::Field(head, network.input()), options.fusion);
         Ok(Trained {
             network: network.clone(),
             numbers,
@@ -98,7 +98,7 @@ impl MethodPlan {
     ) -> Result<Self> {
         let source = Source::Frame(formats.0, formats.1);
         let how = |network: &Network| {
-            let numbers = Numbers::of(device, network.chain(), options.float)?;
+            let numbers = Numbers::of(device, chain_of(network)?.0, options.float)?;
             Ok::<_, GpuError>((numbers, network.depth_scale(display)?))
         };
         let swept = |plan: SweepPlan| {
@@ -109,7 +109,7 @@ impl MethodPlan {
         let (packer, plan) = match method {
             Method::Network(network) => {
                 let how = how(network)?;
-                let form = Form::Chain(network.chain(), how.0, how.1);
+                let form = Form::Chain(chain_of(network)?.0, how.0, how.1);
                 let packer = Packer::new(device, form, size, source, None)?;
                 let trained = Trained::new(device, network, how, size, &packer, options)?;
                 (packer, Plan::Network(trained))
@@ -128,7 +128,7 @@ impl MethodPlan {
                 let plan = SweepPlan::new(size, display, sweep, 0.0)?;
                 let (packer, sweep) = swept(plan)?;
                 let how = how(network)?;
-                let form = Form::Chain(network.chain(), how.0, how.1);
+                let form = Form::Chain(chain_of(network)?.0, how.0, how.1);
                 let source = Source::Seeded(&packer.input.first, &sweep.field);
                 let seeded = Packer::new(device, form, size, source, None)?;
                 let trained = Trained::new(device, network, how, size, &seeded, options)?;
@@ -150,7 +150,7 @@ impl MethodPlan {
                     None => Source::Surfaces(surfaces),
                 };
                 let how = how(network)?;
-                let form = Form::Chain(network.chain(), how.0, how.1);
+                let form = Form::Chain(chain_of(network)?.0, how.0, how.1);
                 let input = Packer::new(device, form, size, source, None)?;
                 let trained = Trained::new(device, network, how, size, &input, options)?;
                 let field = trained.chain.field.clone();
@@ -175,7 +175,7 @@ impl MethodPlan {
             return Ok(());
         }
         let form = match &self.plan {
-            Plan::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers, trained.depth_scale),
+            Plan::Network(trained) => Form::Chain(chain_of(&trained.network)?.0, trained.numbers, trained.depth_scale),
             Plan::Sweep(_) | Plan::Seeded(..) | Plan::Auto(_) => Form::Surfaces,
         };
         let source = Source::Frame(formats.0, formats.1);

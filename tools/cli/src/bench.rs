@@ -9,7 +9,6 @@ use num_complex::Complex32;
 use phasefront::Size;
 use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
 use phasefront_core::display::levels::LevelsMut;
-use phasefront_core::method::network::Precision;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::{Error, Result};
 use phasefront_kernels::{f32_peak, int8_peak};
@@ -140,13 +139,14 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         .collect();
     let total_ms = median(&mut totals);
     let alone = network.filter(|_| name == "network");
-    let gmac_per_s = alone.map(|network| {
-        let macs = network.chain().macs_per_pixel() as f64 * (width * height) as f64;
+    let chain = alone.and_then(|network| network.chain());
+    let gmac_per_s = chain.map(|chain| {
+        let macs = chain.macs_per_pixel() as f64 * (width * height) as f64;
         macs / stage_ms[name] / 1e6
     });
     let isa = pipeline.method().engine().and_then(|engine| engine.isa);
     let peak = isa.and_then(|isa| match network?.precision() {
-        Precision::Int8 => int8_peak(isa, PEAK_TIME),
+        "int8" => int8_peak(isa, PEAK_TIME),
         _ => f32_peak(isa, PEAK_TIME),
     });
     Ok(Row {

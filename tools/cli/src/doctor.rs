@@ -227,7 +227,8 @@ fn int8() -> Result<Check> {
 
 fn f32() -> Result<Check> {
     let (network, input) = (coming_along(Precision::Float32)?, waves());
-    let naive = reference::run(network.chain(), &input, SIZE);
+    let chain = network.chain().expect("a bundled network is a chain");
+    let naive = reference::run(chain, &input, SIZE);
     let mut worst = 0.0f32;
     for isa in Isa::f32() {
         let output = run_on(&network, isa, &input)?;

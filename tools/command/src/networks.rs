@@ -47,6 +47,9 @@ pub fn network(name: &str, precision: Option<Precision>) -> Result<Arc<Network>>
         ));
     }
     let network = Network::from_onnx(&bytes).map_err(|e| Error::file(path, e))?;
+    if network.chain().is_none() {
+        log::warn!("{name}: tract runs this network, on one thread: a frame of 1920×1080 takes seconds to minutes");
+    }
     Ok(Arc::new(network))
 }
 

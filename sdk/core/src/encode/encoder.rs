@@ -1,6 +1,7 @@
 //! Plans that turn fields into phases or levels. Filters that need the whole field run first; the remaining work is one
 //! pass over memory, row by row.
 
+use super::Encoding;
 use super::dark_threshold::DarkThreshold;
 use super::encoding::{Prefilter, PrefilterScratch};
 use super::local::{LocalFilter, LocalScratch, Wanted};
@@ -21,6 +22,8 @@ pub struct Encoder {
     height: usize,
     width: usize,
     prefilter: Prefilter,
+    /// Whether the field's own phase is displayed.
+    is_phase: bool,
     dark_threshold: f32,
     local: Option<Local>,
     /// The illumination and the modulator's size. The hologram is in the middle of the modulator.
@@ -100,6 +103,7 @@ impl Encoder {
             height,
             width,
             prefilter,
+            is_phase: matches!(options.encoding, Encoding::Phase),
             dark_threshold: options.dark_threshold,
             local: (options.local_steps > 0).then(|| Local {
                 filter: LocalFilter::of_aperture(target.display.aperture_radius()),
@@ -154,8 +158,10 @@ impl Encoder {
             phase,
             scratch,
             |row, shown, phases| match shown {
-                Row::Field(values) => double_phase::encode_row(values, row % self.height, scale, phases),
-                Row::Corrected(values) => double_phase::phase_row(values, phases),
+                Row::Field(values) if !self.is_phase => {
+                    double_phase::encode_row(values, row % self.height, scale, phases)
+                }
+                Row::Field(values) | Row::Corrected(values) => double_phase::phase_row(values, phases),
             },
         );
         scale
@@ -176,10 +182,12 @@ impl Encoder {
         self.rows(field, self.work(scale), levels, scratch, |row, shown, levels| {
             let (y, first) = (row % self.height, row * self.width);
             match shown {
-                Row::Field(values) => {
+                Row::Field(values) if !self.is_phase => {
                     double_phase::encode_row_levels(values, y, scale, &self.response, first, levels);
                 }
-                Row::Corrected(values) => double_phase::phase_row_levels(values, &self.response, first, levels),
+                Row::Field(values) | Row::Corrected(values) => {
+                    double_phase::phase_row_levels(values, &self.response, first, levels);
+                }
             }
         });
         scale

@@ -37,6 +37,8 @@ pub enum Encoding {
     },
     /// DDPM: double phase after a pre-filter network that was trained for the modulator's offset.
     Deep(Arc<Network>),
+    /// The phase of the field as it is, without its amplitude. For methods that give the modulator's phase.
+    Phase,
 }
 
 impl Encoding {
@@ -60,10 +62,10 @@ impl Encoding {
         ),
     ];
 
-    /// Returns whether the encoding was trained on the phase of a network's field.
+    /// Returns whether the encoding needs the phase of a network's field as it is.
     #[doc(hidden)]
     pub fn keeps_phase(&self) -> bool {
-        matches!(self, Encoding::Deep(_))
+        matches!(self, Encoding::Deep(_) | Encoding::Phase)
     }
 }
 
@@ -95,7 +97,7 @@ impl Prefilter {
     /// Plans the filter of `encoding` for fields of a size and the colours of `display`.
     pub(super) fn new(Size { width, height }: Size, encoding: &Encoding, display: &Display) -> Result<Self> {
         Ok(match encoding {
-            Encoding::DoublePhase => Prefilter::None,
+            Encoding::DoublePhase | Encoding::Phase => Prefilter::None,
             Encoding::AntiAlias { sigma, width } => Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?),
             Encoding::BandLimit { k } => {
                 let plane = height * width;

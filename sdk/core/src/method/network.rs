@@ -5,17 +5,22 @@
 //! rows of a [`Source`] into rows of a complex field. [`NetworkPlan::run`] turns input planes into output planes, which
 //! [`Head::field`] turns into a field. [`chain`] defines the chain; [`mod@reference`] runs it naively and is the oracle
 //! of every fast path. The fast path is the crate `phasefront-kernels`. Chains that it does not support run on stock
-//! tract; [`NetworkPlan::engine`] reports the path.
+//! tract; [`NetworkPlan::engine`] reports the path. A file of any other form that declares its inputs and output (the
+//! module `own`) runs on tract too.
 
 pub mod bounds;
 pub mod chain;
 mod filter;
 mod fused;
+#[cfg(feature = "tract")]
+pub(crate) mod graph;
 mod head;
 mod metadata;
 mod onnx;
 #[cfg(feature = "tract")]
 mod operator;
+#[cfg(feature = "tract")]
+mod own;
 mod proto;
 pub mod reference;
 mod rgbd;
@@ -74,12 +79,24 @@ impl<S: Source + ?Sized> Source for Stretched<'_, S> {
     }
 }
 
-/// A network read from an ONNX file, with its chain, its input and output formats, and the display it was trained for.
+/// A network read from an ONNX file, with its input and output formats and the display it was trained for.
 pub struct Network {
+    form: Form,
+    display: TrainedDisplay,
+}
+
+/// What a network computes.
+enum Form {
+    Chain(Box<OfChain>),
+    #[cfg(feature = "tract")]
+    Own(Box<own::OwnNetwork>),
+}
+
+/// A chain, which the kernels run.
+struct OfChain {
     chain: Chain,
     input: InputKind,
     head: Head,
-    display: TrainedDisplay,
     seed_planes: Option<usize>,
     #[cfg(feature = "tract")]
     onnx: Box<[u8]>,
@@ -88,18 +105,19 @@ pub struct Network {
 impl std::fmt::Debug for Network {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (layers, filters) = (self.layers(), self.filters());
-        let (input, precision) = (self.input, self.precision());
+        let (input, precision) = (self.input(), self.precision());
         write!(f, "Network({input}, {layers} layers of {filters} filters, {precision})")
     }
 }
 
 impl Network {
     /// Reads the bytes of an ONNX file and checks that they hold a hologram network: the residual chain of [`chain`],
-    /// in f32 or quantised to int8 with QuantizeLinear/DequantizeLinear pairs, with `phasefront.*` metadata.
+    /// in f32 or quantised to int8 with QuantizeLinear/DequantizeLinear pairs, with `phasefront.*` metadata. A graph of
+    /// any other form, whose metadata has `phasefront.output`, runs on tract.
     ///
     /// # Errors
     /// Returns [`Error::Network`] with the name of the wrong node, tensor or metadata and the expected value, or if the
-    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading allocates at most 4 times the file size plus 200 MB.
+    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading a chain allocates at most 4 times the file size plus 200 MB.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
         bounds::check(bytes)?;
         let model = proto::Model::decode(bytes)
@@ -108,7 +126,15 @@ impl Network {
             .graph
             .as_ref()
             .ok_or_else(|| Error::Network("not an ONNX file: it holds no graph".into()))?;
-        let chain = onnx::chain(graph)?;
+        if metadata::is_own(&model.metadata_props) {
+            return Self::own(bytes, &model);
+        }
+        let chain = onnx::chain(graph).map_err(|why| match why {
+            Error::Network(why) if metadata::found(&model.metadata_props, "head").is_none() => Error::Network(format!(
+                "{why}; a network of another form needs metadata 'phasefront.output' (docs/own-networks.md)"
+            )),
+            other => other,
+        })?;
         let Description {
             input,
             head,
@@ -147,48 +173,111 @@ impl Network {
             _ => {}
         }
         Ok(Network {
-            chain,
-            input,
-            head,
+            form: Form::Chain(Box::new(OfChain {
+                chain,
+                input,
+                head,
+                seed_planes,
+                #[cfg(feature = "tract")]
+                onnx: bytes.into(),
+            })),
             display,
-            seed_planes,
-            #[cfg(feature = "tract")]
-            onnx: bytes.into(),
         })
     }
 
-    /// Returns the chain: layers, filters, weights, quantisation.
+    /// Reads a graph of any form, which the metadata of `model` describes.
+    #[cfg(feature = "tract")]
+    fn own(bytes: &[u8], model: &proto::Model) -> Result<Network> {
+        let (contract, display) = own::contract::read(&model.metadata_props)?;
+        let graph = own::OwnNetwork::new(bytes, model.graph.as_ref(), contract)?;
+        Ok(Network {
+            form: Form::Own(Box::new(graph)),
+            display,
+        })
+    }
+
+    #[cfg(not(feature = "tract"))]
+    fn own(_: &[u8], _: &proto::Model) -> Result<Network> {
+        Err(Error::Network(
+            "tract would run a network of this form, but this library was built without its feature 'tract'".into(),
+        ))
+    }
+
+    fn of_chain(&self) -> Option<&OfChain> {
+        match &self.form {
+            Form::Chain(of_chain) => Some(of_chain),
+            #[cfg(feature = "tract")]
+            Form::Own(_) => None,
+        }
+    }
+
+    /// Returns the chain that the kernels run.
+    fn needed(&self) -> Result<&OfChain> {
+        self.of_chain().ok_or_else(|| {
+            Error::Network("it has a form that tract alone runs; a chain of 3×3 convolutions is right here".into())
+        })
+    }
+
+    /// Returns the chain: layers, filters, weights, quantisation. `None` for a network of another form.
     #[doc(hidden)]
-    pub fn chain(&self) -> &Chain {
-        &self.chain
+    pub fn chain(&self) -> Option<&Chain> {
+        self.of_chain().map(|of| &of.chain)
     }
 
     /// Returns the number of convolutions.
     pub fn layers(&self) -> usize {
-        self.chain.layers.len()
+        match &self.form {
+            Form::Chain(of) => of.chain.layers.len(),
+            #[cfg(feature = "tract")]
+            Form::Own(own) => own.layers,
+        }
     }
 
-    /// Returns the number of filters of each hidden layer.
+    /// Returns the number of filters of each hidden layer, or of the widest convolution of a network of another form.
     pub fn filters(&self) -> usize {
-        self.chain.filters()
+        match &self.form {
+            Form::Chain(of) => of.chain.filters(),
+            #[cfg(feature = "tract")]
+            Form::Own(own) => own.filters,
+        }
     }
 
-    /// Returns the number format of the file's layers.
+    /// Returns the number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in
+    /// the formats that its file names.
     #[doc(hidden)]
-    pub fn precision(&self) -> Precision {
-        self.chain.precision
+    pub fn precision(&self) -> &'static str {
+        self.of_chain().map_or("own", |of| of.chain.precision.name())
     }
 
-    /// Returns the kind of the input planes.
+    /// Returns the kind of the input planes. A network of another form than a chain takes RGB-D.
     #[doc(hidden)]
     pub fn input(&self) -> InputKind {
-        self.input
+        self.of_chain().map_or(InputKind::Rgbd, |of| of.input)
     }
 
-    /// Returns the kind of the output planes.
+    /// Returns whether the output is the modulator's phase, which no encoding may change.
     #[doc(hidden)]
-    pub fn head(&self) -> Head {
-        self.head
+    pub fn gives_phase(&self) -> bool {
+        match &self.form {
+            Form::Chain(_) => false,
+            #[cfg(feature = "tract")]
+            Form::Own(own) => own.gives_phase(),
+        }
+    }
+
+    /// Returns how the network supports `display`.
+    fn serve(&self, display: &Display) -> Result<Served> {
+        match &self.form {
+            Form::Chain(_) => self.display.serve(display),
+            #[cfg(feature = "tract")]
+            Form::Own(own) => own.serve(&self.display, display),
+        }
+    }
+
+    /// Returns the kind of the output planes of a chain.
+    #[doc(hidden)]
+    pub fn head(&self) -> Option<Head> {
+        self.of_chain().map(|of| of.head)
     }
 
     /// Returns the display that the network was trained for.
@@ -206,7 +295,7 @@ impl Network {
     /// than 5 %.
     #[doc(hidden)]
     pub fn depth_scale(&self, display: &Display) -> Result<f32> {
-        Ok(depth_scale(self.display.serve(display)?))
+        Ok(depth_scale(self.serve(display)?))
     }
 
     /// Returns the factor of [`Self::depth_scale`] for each laser of `display`, for a network that takes the colours in
@@ -226,7 +315,7 @@ impl Network {
     /// Returns the same errors as [`Self::depth_scale`].
     #[doc(hidden)]
     pub fn colour(&self, display: &Display) -> Result<Option<usize>> {
-        Ok(self.display.serve(display)?.colour)
+        Ok(self.serve(display)?.colour)
     }
 
     /// Checks that the network supports `display`.
@@ -234,7 +323,7 @@ impl Network {
     /// # Errors
     /// Returns the same errors as [`Self::depth_scale`].
     pub fn check_display(&self, display: &Display) -> Result<()> {
-        match self.input {
+        match self.input() {
             InputKind::SeededColour => self.depth_scales_in_turn(display).map(|_| ()),
             _ => self.depth_scale(display).map(|_| ()),
         }
@@ -253,7 +342,7 @@ impl Network {
 
     /// Returns the number of planes of the sweep that a seeded network was trained to correct, if its file gives it.
     pub fn seed_planes(&self) -> Option<usize> {
-        self.seed_planes
+        self.of_chain().and_then(|of| of.seed_planes)
     }
 
     /// Plans like [`Self::plan`] for the depths and colours of `display`. For one laser, the network reads its
@@ -264,14 +353,14 @@ impl Network {
     /// Returns the same errors as [`Self::plan`] and [`Self::depth_scale`].
     #[doc(hidden)]
     pub fn plan_for(&self, size: Size, display: &Display) -> Result<NetworkPlan> {
-        if self.input == InputKind::SeededColour {
+        if self.input() == InputKind::SeededColour {
             self.check_display(display)?;
             return Ok(NetworkPlan {
                 colour: Some(0),
                 ..self.plan(size)?
             });
         }
-        let served = self.display.serve(display)?;
+        let served = self.serve(display)?;
         Ok(NetworkPlan {
             depth_scale: depth_scale(served),
             colour: served.colour,
@@ -288,8 +377,13 @@ impl Network {
     #[doc(hidden)]
     pub fn plan(&self, size: Size) -> Result<NetworkPlan> {
         Isa::of_variable().map_err(Error::Setting)?;
-        match FusedChain::new(&self.chain, None) {
-            Ok(chain) => self.fused_plan(size, chain),
+        let of = match &self.form {
+            Form::Chain(of) => of,
+            #[cfg(feature = "tract")]
+            Form::Own(own) => return self.own_plan(size, own),
+        };
+        match FusedChain::new(&of.chain, None) {
+            Ok(chain) => self.fused_plan(size, of, chain),
             #[cfg(feature = "tract")]
             Err(why) => {
                 let mut plan = self.plan_on_stock_tract(size)?;
@@ -310,22 +404,50 @@ impl Network {
     /// support it.
     #[doc(hidden)]
     pub fn plan_on(&self, isa: Isa, size: Size) -> Result<NetworkPlan> {
-        let chain = FusedChain::new(&self.chain, Some(isa));
-        self.fused_plan(size, chain.map_err(|why| Error::Setting(format!("network: {why}")))?)
+        let of = self.needed()?;
+        let chain = FusedChain::new(&of.chain, Some(isa));
+        self.fused_plan(
+            size,
+            of,
+            chain.map_err(|why| Error::Setting(format!("network: {why}")))?,
+        )
     }
 
-    fn fused_plan(&self, size: Size, chain: FusedChain) -> Result<NetworkPlan> {
+    /// Prepares a network of another form than a chain.
+    #[cfg(feature = "tract")]
+    fn own_plan(&self, size: Size, own: &own::OwnNetwork) -> Result<NetworkPlan> {
+        check_size(size, MAX_STOCK_PIXELS)?;
+        Ok(NetworkPlan {
+            input: InputKind::Rgbd,
+            depth_scale: 1.0,
+            colour: own.only_colour(),
+            z_m: self.display.offset_m,
+            height: size.height,
+            width: size.width,
+            path: Path::Own(own.plan(size)?),
+            engine: Engine {
+                name: "tract",
+                isa: None,
+                why: format!(
+                    "{} convolutions of another form than the kernels': tract runs them, on one thread and slowly",
+                    own.layers
+                ),
+            },
+        })
+    }
+
+    fn fused_plan(&self, size: Size, of: &OfChain, chain: FusedChain) -> Result<NetworkPlan> {
         let Size { width, height } = size;
         check_size(size, MAX_PIXELS)?;
-        let engine = self.fused_engine(&chain);
+        let engine = of.fused_engine(&chain);
         Ok(NetworkPlan {
-            input: self.input,
-            head: self.head,
+            input: of.input,
             depth_scale: 1.0,
             colour: None,
+            z_m: 0.0,
             height,
             width,
-            path: Path::Fused(chain),
+            path: Path::Fused(chain, of.head),
             engine,
         })
     }
@@ -338,20 +460,21 @@ impl Network {
     /// [`Error::Setting`] if a field is empty or too large.
     #[doc(hidden)]
     pub fn filter_plan(&self, size: Size) -> Result<FilterPlan> {
-        if !self.input.is_field() {
+        let of = self.needed()?;
+        if !of.input.is_field() {
             return Err(Error::Network(format!(
                 "a pre-filter takes 'field', this network '{}'",
-                self.input
+                of.input
             )));
         }
         let chain =
-            FusedChain::new(&self.chain, None).map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
+            FusedChain::new(&of.chain, None).map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
         check_size(size, MAX_PIXELS)?;
         Ok(FilterPlan {
-            engine: self.fused_engine(&chain),
+            engine: of.fused_engine(&chain),
             chain,
-            input: self.input,
-            head: self.head,
+            input: of.input,
+            head: of.head,
             colour: None,
             size,
         })
@@ -369,25 +492,6 @@ impl Network {
         })
     }
 
-    fn fused_engine(&self, chain: &FusedChain) -> Engine {
-        let isa = chain.isa();
-        Engine {
-            name: isa.name(),
-            isa: Some(isa),
-            why: format!(
-                "{} layers of {} filters in {}{}: one fused chain",
-                self.layers(),
-                self.filters(),
-                self.precision(),
-                if self.chain.halved {
-                    " at half the resolution"
-                } else {
-                    ""
-                }
-            ),
-        }
-    }
-
     /// Returns the network as a tract graph for any frame size, with its chain as one fused operator, for use in larger
     /// graphs. [`Network::plan`] runs the same kernels on the caller's memory, without tract's copies.
     ///
@@ -395,8 +499,9 @@ impl Network {
     /// Returns [`Error::Network`] if the kernels do not support the chain or tract rejects the graph.
     #[cfg(feature = "tract")]
     pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
-        let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
-        operator::model(&self.input.to_string(), chain, self.chain.inputs)
+        let of = self.needed()?;
+        let chain = FusedChain::new(&of.chain, None).map_err(Error::Network)?;
+        operator::model(&of.input.to_string(), chain, of.chain.inputs)
     }
 
     /// Prepares the network on stock tract even if the fast path supports it, as an independent check of that path.
@@ -406,27 +511,49 @@ impl Network {
     #[cfg(feature = "tract")]
     pub fn plan_on_stock_tract(&self, size: Size) -> Result<NetworkPlan> {
         let Size { width, height } = size;
+        let of = self.needed()?;
         check_size(size, MAX_STOCK_PIXELS)?;
-        if self.chain.halved && (height % 2 == 1 || width % 2 == 1) {
+        if of.chain.halved && (height % 2 == 1 || width % 2 == 1) {
             return Err(Error::Network(format!(
                 "a network at half the resolution takes frames of even sides on tract, not {width}×{height}"
             )));
         }
-        let plan = StockPlan::new(&self.onnx, [1, self.chain.inputs, height, width])?;
+        let plan = StockPlan::new(&of.onnx, [1, of.chain.inputs, height, width])?;
         Ok(NetworkPlan {
-            input: self.input,
-            head: self.head,
+            input: of.input,
             depth_scale: 1.0,
             colour: None,
+            z_m: 0.0,
             height,
             width,
-            path: Path::Stock(plan),
+            path: Path::Stock(plan, of.head),
             engine: Engine {
                 name: "tract",
                 isa: None,
                 why: "stock tract".into(),
             },
         })
+    }
+}
+
+impl OfChain {
+    fn fused_engine(&self, chain: &FusedChain) -> Engine {
+        let isa = chain.isa();
+        Engine {
+            name: isa.name(),
+            isa: Some(isa),
+            why: format!(
+                "{} layers of {} filters in {}{}: one fused chain",
+                self.chain.layers.len(),
+                self.chain.filters(),
+                self.chain.precision,
+                if self.chain.halved {
+                    " at half the resolution"
+                } else {
+                    ""
+                }
+            ),
+        }
     }
 }
 
@@ -461,19 +588,22 @@ pub struct Engine {
 }
 
 enum Path {
-    Fused(FusedChain),
+    Fused(FusedChain, Head),
     #[cfg(feature = "tract")]
-    Stock(StockPlan),
+    Stock(StockPlan, Head),
+    #[cfg(feature = "tract")]
+    Own(own::OwnPlan),
 }
 
 /// A network prepared for one frame size. It is immutable. Threads can share one plan, each with its own scratch.
 pub struct NetworkPlan {
     input: InputKind,
-    head: Head,
     /// The factor that stretches depths about the middle of the volume.
     depth_scale: f32,
     /// The output that is the field of a display with one laser.
     colour: Option<usize>,
+    /// The position of the field from the middle of the volume.
+    z_m: f64,
     height: usize,
     width: usize,
     path: Path,
@@ -526,6 +656,20 @@ impl NetworkPlan {
         (self.input.channels(), phasefront_kernels::OUTPUTS)
     }
 
+    /// Returns the position of the field in metres from the middle of the volume toward the viewer.
+    pub(crate) fn z_m(&self) -> f64 {
+        self.z_m
+    }
+
+    /// Returns whether the field is the modulator's phase.
+    pub(crate) fn gives_phase(&self) -> bool {
+        match &self.path {
+            #[cfg(feature = "tract")]
+            Path::Own(plan) => plan.gives_phase(),
+            _ => false,
+        }
+    }
+
     /// Returns the path that runs this plan and the reason for the choice.
     pub fn engine(&self) -> &Engine {
         &self.engine
@@ -544,12 +688,16 @@ impl NetworkPlan {
         self.check("input", input.len(), inputs)?;
         self.check("output", output.len(), outputs)?;
         match &self.path {
-            Path::Fused(chain) => {
+            Path::Fused(chain, _) => {
                 chain.run(input, output, self.size(), &scratch.fused);
                 Ok(())
             }
             #[cfg(feature = "tract")]
-            Path::Stock(plan) => plan.run(input, output),
+            Path::Stock(plan, _) => plan.run(input, output),
+            #[cfg(feature = "tract")]
+            Path::Own(_) => Err(Error::Network(
+                "it has a form of its own and makes fields; NetworkPlan::field is right".into(),
+            )),
         }
     }
 
@@ -587,17 +735,19 @@ impl NetworkPlan {
             depth_scale: self.depth_scale,
         };
         match &self.path {
-            Path::Fused(chain) => {
+            Path::Fused(chain, head) => {
                 let into = FieldOf {
                     kind: self.input,
-                    head: self.head,
+                    head: *head,
                     colours,
                 };
                 chain.field(source, into, field, size, &scratch.fused);
                 Ok(())
             }
             #[cfg(feature = "tract")]
-            Path::Stock(plan) => {
+            Path::Own(plan) => plan.field(source, &colours, field),
+            #[cfg(feature = "tract")]
+            Path::Stock(plan, head) => {
                 let area = size.height * size.width;
                 let (inputs, outputs) = self.channels();
                 let [input, output] = &mut scratch.planes;
@@ -607,7 +757,7 @@ impl NetworkPlan {
                     source.read(row / size.height, row % size.height, 0, into);
                 }
                 plan.run(input, output)?;
-                self.head.field_of(self.input, &colours, output, input, field)
+                head.field_of(self.input, &colours, output, input, field)
             }
         }
     }

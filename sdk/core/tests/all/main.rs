@@ -11,4 +11,5 @@ mod encode;
 mod natural;
 mod network;
 mod optics;
+mod own_networks;
 mod sweep;

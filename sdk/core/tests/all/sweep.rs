@@ -283,7 +283,7 @@ fn a_seeded_network_corrects_the_sweep() {
         let mut input: Vec<f32> = rgb.iter().chain(frame.depth()).map(|v| v - 0.5).collect();
         input.extend(seeds.iter().map(|u| 0.5 * (u.re - 0.5)));
         input.extend(seeds.iter().map(|u| 0.5 * u.im));
-        let output = network::reference::run(network.chain(), &input, Size { width, height });
+        let output = network::reference::run(network.chain().unwrap(), &input, Size { width, height });
         let (re, im) = output.split_at(seeds.len());
         let expected = (seeds.iter().zip(re).zip(im)).map(|((u, re), im)| u + Complex32::new(*re, *im));
         let first = network.colour(&display).unwrap().unwrap_or(0) * height * width;
@@ -325,7 +325,7 @@ fn a_network_takes_the_colours_in_turn() {
             input.extend(frame.depth().iter().map(|d| scale * (d - 0.5)));
             input.extend(seed.iter().map(|u| 0.5 * (u.re - 0.5)));
             input.extend(seed.iter().map(|u| 0.5 * u.im));
-            let output = network::reference::run(network.chain(), &input, size);
+            let output = network::reference::run(network.chain().unwrap(), &input, size);
             let (re, im) = (&output[..seed.len()], &output[3 * seed.len()..]);
             expected.extend(
                 seed.iter()

@@ -5,7 +5,7 @@ use super::blur::Blur;
 use crate::device::{Constants, Device, Dispatch};
 use crate::fft::{Convolution, Planes, quadrant};
 use crate::input::{Form, Packer, Source};
-use crate::method::chain::{ChainPlan, End};
+use crate::method::chain::{ChainPlan, End, chain_of};
 use crate::numbers::Numbers;
 use crate::{GpuError, Result};
 use phasefront_core::encode::Encoding;
@@ -130,11 +130,11 @@ impl Prefilter {
         } else {
             None
         };
-        let chain = network.chain();
+        let (chain, head) = chain_of(network)?;
         let numbers = Numbers::of(device, chain, job.chain.float)?;
         let (form, source) = (Form::Chain(chain, numbers, 1.0), Source::Field(job.field, kind));
         let packer = Packer::new(device, form, size, source, None)?;
-        let end = End::Field(network.head(), kind);
+        let end = End::Field(head, kind);
         let (input, fusion) = (&packer.input, job.chain.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
         Ok(Prefilter { blur, packer, chain })

@@ -13,6 +13,15 @@ use phasefront_core::runtime::clock::Instant;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// Returns the chain of `network` and the kind of its output.
+///
+/// # Errors
+/// Returns [`GpuError::Refused`] for a network of another form.
+pub(crate) fn chain_of(network: &Network) -> Result<(&Chain, Head)> {
+    (network.chain().zip(network.head()))
+        .ok_or_else(|| GpuError::Refused("a network of another form than a chain runs on the CPU only".into()))
+}
+
 /// The number of filters that a thread computes at a time.
 const BLOCK: usize = 8;
 /// The columns and rows of a workgroup of `layer` and `last`, in pixels.
@@ -550,7 +559,7 @@ impl GpuNetworkPlan {
     pub async fn new_async(device: &Arc<Device>, network: &Network, size: Size, options: ChainOptions) -> Result<Self> {
         phasefront_core::method::network::check_size(size, phasefront_core::method::network::MAX_PIXELS)?;
         let build = || {
-            let chain = network.chain();
+            let (chain, _) = chain_of(network)?;
             let numbers = Numbers::of(device, chain, options.float)?;
             let packer = Packer::new(device, Form::Chain(chain, numbers, 1.0), size, Source::Planes, None)?;
             let (input, fusion) = (&packer.input, options.fusion);

@@ -121,7 +121,7 @@ pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget
     let alone = network.filter(|_| name == "network");
     let mac_per_s = method_s
         .zip(alone)
-        .map(|(s, network)| network.chain().macs_per_pixel() as f64 * size.pixels() as f64 / s);
+        .and_then(|(s, network)| Some(network.chain()?.macs_per_pixel() as f64 * size.pixels() as f64 / s));
     Ok(GpuRow {
         method: name,
         layers: network.map_or(0, |network| network.layers()),

@@ -11,7 +11,7 @@ use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
 use phasefront_command::networks::{self, Precision};
 use phasefront_command::terminal::{self, progress_bar};
-use phasefront_core::method::network::{self, Isa};
+use phasefront_core::method::network::Isa;
 use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront_io::picture::plot::{self, Bar};
 use phasefront_io::{Error, Result, output};
@@ -230,7 +230,7 @@ impl Bench {
                 _ => None,
             };
             let floats = match network.map(|network| network.precision()) {
-                Some(network::Precision::F32) if device.has_half() => vec![Float::F16, Float::F32],
+                Some("f32") if device.has_half() => vec![Float::F16, Float::F32],
                 _ => vec![Float::F32],
             };
             // A sweep without a network has no layers.

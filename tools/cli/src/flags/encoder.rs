@@ -151,6 +151,23 @@ impl EncoderFlags {
         })
     }
 
+    /// Makes the encoder for a network that gives the modulator's phases, which are shown as they are.
+    fn phases(&self) -> Result<Encoder> {
+        let with = "a network that gives a wave; this one gives the modulator's phases";
+        check_used(&[
+            ("--encoder", self.encoder.is_some(), false, with),
+            ("--prefilter", self.prefilter.is_some(), false, with),
+            ("--dark-threshold", self.dark_threshold.is_some(), false, with),
+            ("--local-steps", self.local_steps.is_some(), false, with),
+            ("--midpoint-steps", self.midpoint_steps > 0, false, with),
+            ("--focus natural", self.is_natural(), false, with),
+        ])?;
+        Ok(Encoder {
+            options: Encoding::Phase.into(),
+            name: "phase",
+        })
+    }
+
     /// Checks whether --encoder deep is given.
     pub(crate) fn is_deep(&self) -> bool {
         self.encoder == Some(EncoderName::DEEP)
@@ -181,6 +198,12 @@ impl EncoderFlags {
                 networks::DEEP
             )));
         }
-        Ok((networks::network(network.unwrap_or("8"), precision)?, self.read()?))
+        let network = networks::network(network.unwrap_or("8"), precision)?;
+        let encoder = if network.gives_phase() {
+            self.phases()?
+        } else {
+            self.read()?
+        };
+        Ok((network, encoder))
     }
 }

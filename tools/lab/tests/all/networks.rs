@@ -48,8 +48,8 @@ fn input(kind: InputKind, size: Size) -> Vec<f32> {
 fn the_pair_is_for_its_offset_and_display() {
     for precision in PRECISIONS {
         let DeepPair { hologram, prefilter } = pair_for(&Display::default(), precision).unwrap();
-        assert_eq!(hologram.precision(), numbers(precision));
-        assert_eq!(prefilter.precision(), numbers(precision));
+        assert_eq!(hologram.precision(), numbers(precision).name());
+        assert_eq!(prefilter.precision(), numbers(precision).name());
         assert_eq!(prefilter.display().offset_m, 0.0);
         let plan = hologram.plan(Size { width: 64, height: 40 }).unwrap();
         assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
@@ -65,7 +65,7 @@ fn the_pair_is_for_its_offset_and_display() {
 
 /// Runs `network` on the fast path and on stock tract, at an odd size and an even one.
 fn assert_agrees_with_tract(name: &str, network: &Network, precision: Precision) {
-    assert_eq!(network.precision(), numbers(precision));
+    assert_eq!(network.precision(), numbers(precision).name());
     for (height, width) in [(61, 47), (40, 64)] {
         let input = input(network.input(), Size { width, height });
         let fast = network.plan(Size { width, height }).unwrap();

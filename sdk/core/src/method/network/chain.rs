@@ -21,12 +21,19 @@ pub enum Precision {
     Int8,
 }
 
-impl std::fmt::Display for Precision {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
+impl Precision {
+    /// Returns the name for reports.
+    pub fn name(self) -> &'static str {
+        match self {
             Precision::F32 => "f32",
             Precision::Int8 => "int8",
-        })
+        }
+    }
+}
+
+impl std::fmt::Display for Precision {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
     }
 }
 

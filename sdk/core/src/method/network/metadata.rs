@@ -225,6 +225,44 @@ impl TrainedDisplay {
         Ok(Served { scale, colour })
     }
 
+    /// Returns how a network of any form for this display serves `display`, which must have its pitch and its lasers,
+    /// one where `colours` is 1, and a volume that is not deeper. A network of three colours serves one laser of them.
+    ///
+    /// # Errors
+    /// Returns an error that names what differs, and if a network that `gives_phase` is for another offset.
+    #[cfg(feature = "tract")]
+    pub(super) fn serve_own(&self, colours: usize, gives_phase: bool, display: &Display) -> Result<Served> {
+        let refuse = |what: &str, trained: String, given: String| {
+            Err(Error::Network(format!(
+                "it was trained for {what} of {trained}, the display has {given}; a --display or a network of the same is right"
+            )))
+        };
+        let close = |trained: f64, given: f64| (trained - given).abs() <= RANGE_TOLERANCE * trained;
+        let [um, mm] = [1e6, 1e3].map(|unit| move |m: f64| format!("{:.3}", m * unit));
+        if !close(self.pitch_m, display.pitch_m()) {
+            return refuse("a pitch in µm", um(self.pitch_m), um(display.pitch_m()));
+        }
+        let given = display.wavelengths_m();
+        let trained = &self.wavelengths_m[..colours];
+        let colour = match given {
+            [one] => trained.iter().position(|m| close(*m, *one)),
+            _ => None,
+        };
+        let all = trained.len() == given.len() && trained.iter().zip(given).all(|(a, b)| close(*a, *b));
+        if !all && colour.is_none() {
+            let nm = |all: &[f64]| (all.iter().map(|m| format!("{:.0}", m * 1e9)).collect::<Vec<_>>()).join(", ");
+            return refuse("wavelengths in nm", nm(trained), nm(given));
+        }
+        let scale = display.volume_depth_m() / self.volume_depth_m;
+        if scale > 1.0 + RANGE_TOLERANCE {
+            return refuse("depths in mm", mm(self.volume_depth_m), mm(display.volume_depth_m()));
+        }
+        if gives_phase && (self.offset_m - display.offset_m()).abs() > OFFSET_TOLERANCE_M {
+            return refuse("an offset in mm", mm(self.offset_m), mm(display.offset_m()));
+        }
+        Ok(Served { scale, colour })
+    }
+
     /// Checks that a pre-filter for this display also suits `display`, for which λ·offset/p² must be the same.
     ///
     /// # Errors
@@ -269,6 +307,11 @@ pub(super) struct Description {
     pub(super) seed_planes: Option<usize>,
 }
 
+/// Returns whether the metadata declares a network of any form, which tract runs.
+pub(super) fn is_own(metadata: &[Entry]) -> bool {
+    found(metadata, "output").is_some()
+}
+
 /// Reads all required and optional metadata.
 pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
     let input = text(metadata, "input", INPUTS)?;
@@ -309,7 +352,7 @@ pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
     })
 }
 
-fn found<'a>(metadata: &'a [Entry], key: &str) -> Option<&'a str> {
+pub(super) fn found<'a>(metadata: &'a [Entry], key: &str) -> Option<&'a str> {
     metadata
         .iter()
         .find(|entry| entry.key.strip_prefix("phasefront.") == Some(key))
@@ -321,11 +364,11 @@ fn text<'a>(metadata: &'a [Entry], key: &str, right: &str) -> Result<&'a str> {
         .ok_or_else(|| Error::Network(format!("metadata 'phasefront.{key}' is missing; {right} is right")))
 }
 
-fn number(metadata: &[Entry], key: &str, right: &str, valid: impl Fn(&f64) -> bool) -> Result<f64> {
+pub(super) fn number(metadata: &[Entry], key: &str, right: &str, valid: impl Fn(&f64) -> bool) -> Result<f64> {
     numbers::<1>(metadata, key, right, valid).map(|[one]| one)
 }
 
-fn numbers<const N: usize>(
+pub(super) fn numbers<const N: usize>(
     metadata: &[Entry],
     key: &str,
     right: &str,
@@ -339,6 +382,6 @@ fn numbers<const N: usize>(
         .ok_or_else(|| wrong(key, value, right))
 }
 
-fn wrong(key: &str, value: &str, right: &str) -> Error {
+pub(super) fn wrong(key: &str, value: &str, right: &str) -> Error {
     Error::Network(format!("metadata 'phasefront.{key}' is '{value}'; {right} is right"))
 }

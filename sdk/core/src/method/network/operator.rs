@@ -23,7 +23,7 @@ pub(super) fn model(name: &str, chain: FusedChain, channels: usize) -> Result<Ty
         model.select_output_outlets(&output)?;
         model.into_optimized()
     };
-    build().map_err(|why| Error::Network(super::stock::one_line(&why)))
+    build().map_err(|why| Error::Network(super::graph::one_line(&why)))
 }
 
 /// A shared chain that is compared by identity: two packed chains are the same operator if they are the same memory.

@@ -1,5 +1,6 @@
 //! A chain on stock tract: the unmodified ONNX graph, in f32.
 
+use super::graph::one_line;
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;
 use std::sync::Arc;
@@ -37,8 +38,4 @@ impl StockPlan {
         };
         run().map_err(|why| Error::Network(one_line(&why)))
     }
-}
-
-pub(super) fn one_line(why: &TractError) -> String {
-    format!("{why:#}").split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,4 +1,4 @@
-//! Bounds on the memory and time that tract may spend on a depth network, checked in advance, because a file of a few
+//! Bounds on the memory and time that tract may spend on a graph, checked in advance, because a file of a few
 //! bytes may name a tensor of any size.
 
 use crate::method::network::bounds;
@@ -17,7 +17,7 @@ const MOST_TENSOR: u64 = 1 << 30;
 const MOST_LIVE: u64 = 1 << 32;
 /// The largest size in bytes of a node's constant inputs if tract learns the size of its output only by computing it.
 const MOST_UNKNOWN: u64 = 1 << 16;
-/// The largest number of products that are summed for one picture: some minutes of work.
+/// The largest number of products that are summed for one frame: some minutes of work.
 const MOST_PRODUCTS: u64 = 1 << 44;
 /// The largest number of passes over the sizes. Earlier nodes rarely need information from later ones, and then one
 /// more pass is enough.
@@ -34,15 +34,12 @@ pub(super) fn messages(file: &[u8], path: Option<&Path>) -> std::result::Result<
     let proto: ModelProto = prost_message(file)?;
     let graph = proto.graph.as_ref().ok_or("is no ONNX file: it holds no graph")?;
     if graph.node.len() > MOST_NODES {
-        return Err(format!(
-            "has {} nodes; {MOST_NODES} are the most for a depth network",
-            graph.node.len()
-        ));
+        return Err(format!("has {} nodes; {MOST_NODES} are the most", graph.node.len()));
     }
     for node in &graph.node {
         if node.attribute.iter().any(|a| a.g.is_some() || !a.graphs.is_empty()) {
             return Err(format!(
-                "holds a branch or a loop, node '{}' ({}); export it without, for a picture of a fixed size",
+                "holds a branch or a loop, node '{}' ({}); export it without, for a fixed size",
                 node.name, node.op_type
             ));
         }
@@ -248,7 +245,7 @@ fn bail(why: String) -> TractResult<()> {
 /// Checks the sizes of all tensors of `model`, the memory that is needed at one time, and the number of products.
 ///
 /// # Errors
-/// Returns an error if a bound is exceeded or a size depends on the picture.
+/// Returns an error if a bound is exceeded or a size depends on the values of the input.
 pub(super) fn check_sizes(model: &TypedModel) -> TractResult<()> {
     let order = model.eval_order()?;
     let mut last = vec![0; model.nodes().len()];
@@ -264,7 +261,7 @@ pub(super) fn check_sizes(model: &TypedModel) -> TractResult<()> {
         for output in &node.outputs {
             let name = format!("{} ({})", node.name, node.op.name());
             let Ok(bytes) = output.fact.mem_size().to_i64() else {
-                bail(format!("the size of node {name} depends on what the picture shows"))?;
+                bail(format!("the size of node {name} depends on the values of its input"))?;
                 continue;
             };
             let bytes = u64::try_from(bytes).unwrap_or(u64::MAX);
@@ -294,7 +291,7 @@ pub(super) fn check_sizes(model: &TypedModel) -> TractResult<()> {
             }
         }
         if products > MOST_PRODUCTS {
-            bail(format!("it sums over {MOST_PRODUCTS} products for one picture"))?;
+            bail(format!("it sums over {MOST_PRODUCTS} products for one frame"))?;
         }
     }
     Ok(())
