@@ -17,8 +17,8 @@ pub(crate) struct Linear {
     pub(crate) profile: ColorProfile,
 }
 
-/// Reads the picture at `path` if it is OpenEXR or Radiance. Light beyond white is clipped, with a warning; where a file
-/// has no number it is black.
+/// Reads the picture at `path` if it is OpenEXR or Radiance. Light beyond white is clipped, with a warning; where a
+/// file has no number, it is black.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, is broken or too large, or has no colours.
