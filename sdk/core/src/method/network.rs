@@ -377,11 +377,15 @@ impl Network {
     #[doc(hidden)]
     pub fn plan(&self, size: Size) -> Result<NetworkPlan> {
         Isa::of_variable().map_err(Error::Setting)?;
-        let of = match &self.form {
-            Form::Chain(of) => of,
+        match &self.form {
+            Form::Chain(of) => self.chain_plan(size, of),
             #[cfg(feature = "tract")]
-            Form::Own(own) => return self.own_plan(size, own),
-        };
+            Form::Own(own) => self.own_plan(size, own),
+        }
+    }
+
+    /// Prepares a chain on the kernels, or on tract if they do not support it.
+    fn chain_plan(&self, size: Size, of: &OfChain) -> Result<NetworkPlan> {
         match FusedChain::new(&of.chain, None) {
             Ok(chain) => self.fused_plan(size, of, chain),
             #[cfg(feature = "tract")]
