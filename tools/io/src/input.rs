@@ -3,7 +3,7 @@
 pub(crate) mod anymap;
 pub mod decode;
 mod jpeg;
-mod jpeg_end;
+pub(crate) mod jpeg_end;
 pub mod npy;
 pub(crate) mod npz;
 pub(crate) mod openexr;

@@ -132,6 +132,120 @@ fn dynamic_depth() -> Vec<u8> {
     [jpeg(&[app1(&xmp(&directory))]), image, vec![0; 3], other.to_vec()].concat()
 }
 
+/// Creates a portrait as Google's camera writes it: the directory in the extended XMP, its items in `rdf:value`, the
+/// pictures behind the photo, and the camera's own data behind them.
+fn google_portrait() -> Vec<u8> {
+    let original = encoded(colour(), ImageFormat::Jpeg);
+    let map = encoded(depth(), ImageFormat::Jpeg);
+    let confidence = encoded(
+        image::GrayImage::from_pixel(24, 16, image::Luma([255])),
+        ImageFormat::Jpeg,
+    );
+    let item = |uri: &str, length: usize| {
+        format!(
+            r#"<rdf:li rdf:parseType="Resource"><rdf:value rdf:parseType="Resource"><Item:Mime>image/jpeg</Item:Mime><Item:Length>{length}</Item:Length><Item:DataURI>{uri}</Item:DataURI></rdf:value></rdf:li>"#
+        )
+    };
+    let items = [
+        item("primary_image", 0),
+        item("android/original_image", original.len()),
+        item("android/depthmap", map.len()),
+        item("android/confidencemap", confidence.len()),
+    ]
+    .concat();
+    let text = format!(
+        r#"<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"><rdf:Description rdf:about="" xmlns:Device="http://ns.google.com/photos/dd/1.0/device/" xmlns:Container="http://ns.google.com/photos/dd/1.0/container/" xmlns:Item="http://ns.google.com/photos/dd/1.0/item/" xmlns:Camera="http://ns.google.com/photos/dd/1.0/camera/" xmlns:DepthMap="http://ns.google.com/photos/dd/1.0/depthmap/"><Device:Container rdf:parseType="Resource"><Container:Directory><rdf:Seq>{items}</rdf:Seq></Container:Directory></Device:Container><Device:Cameras><rdf:Seq><rdf:li rdf:parseType="Resource"><rdf:value rdf:parseType="Resource"><Camera:DepthMap rdf:parseType="Resource"><DepthMap:Format>RangeInverse</DepthMap:Format><DepthMap:Near>0.3</DepthMap:Near><DepthMap:Far>6.5</DepthMap:Far><DepthMap:Units>Meters</DepthMap:Units><DepthMap:DepthURI>android/depthmap</DepthMap:DepthURI><DepthMap:ConfidenceURI>android/confidencemap</DepthMap:ConfidenceURI></Camera:DepthMap></rdf:value></rdf:li></rdf:Seq></Device:Cameras></rdf:Description></rdf:RDF></x:xmpmeta>"#
+    );
+    let main = xmp(&format!(
+        r#"<rdf:Description rdf:about="" xmlns:xmpNote="http://ns.adobe.com/xmp/note/" xmlns:GCamera="http://ns.google.com/photos/1.0/camera/" GCamera:BurstPrimary="1" xmpNote:HasExtendedXMP="{GUID}"/>"#
+    ));
+    let photo = jpeg(&[&[app1(&main)], &extended(text.as_bytes(), 60_000)[..]].concat());
+    [&photo[..], &original, &map, &confidence, b"aecDebug camera data"].concat()
+}
+
+#[test]
+fn a_portrait_of_googles_camera_gives_its_depth() {
+    let folder = Folder::new();
+    let whole = google_portrait();
+    let data = b"aecDebug camera data".len();
+    // Phones that write no data of their own behind the pictures, and those that write it before them.
+    let plain = whole[..whole.len() - data].to_vec();
+    let photo = plain.windows(2).position(|mark| mark == [0xFF, 0xD9]).unwrap() + 2;
+    let before = [&plain[..photo], b"aecDebug", &plain[photo..]].concat();
+    for (name, bytes) in [("behind.jpg", &whole), ("plain.jpg", &plain), ("before.jpg", &before)] {
+        fs::write(folder.path(name), bytes).unwrap();
+        let read = photo::read(&folder.path(name), None).unwrap();
+        assert_eq!((read.range, read.range_m), (Range::Inverse, Some((0.3, 6.5))), "{name}");
+        for (x, y, value) in depth().enumerate_pixels() {
+            let d = read.depth[(y as usize, x as usize)];
+            assert!((d - f32::from(value.0[0]) / 255.0).abs() < 0.05, "{name} {x} {y}: {d}");
+        }
+    }
+    // Cut as a messenger cuts it: the directory is there, and the pictures are not.
+    fs::write(folder.path("sent.jpg"), &whole[..photo]).unwrap();
+    let refused = photo::read(&folder.path("sent.jpg"), None).unwrap_err().to_string();
+    assert!(
+        refused.contains("take the original") && refused.lines().count() == 1,
+        "{refused}"
+    );
+}
+
+/// Appends Samsung's trailer of blocks, each of a kind, a name and data, as exiftool's documentation describes it.
+fn with_samsung_trailer(mut file: Vec<u8>, blocks: &[(u16, &str, &[u8])]) -> Vec<u8> {
+    let block = |(kind, name, data): &(u16, &str, &[u8])| {
+        let head = [0u16.to_le_bytes(), kind.to_le_bytes()].concat();
+        [&head[..], &(name.len() as u32).to_le_bytes(), name.as_bytes(), data].concat()
+    };
+    let written: Vec<Vec<u8>> = blocks.iter().map(block).collect();
+    let mut back: usize = written.iter().map(Vec::len).sum();
+    let mut directory = [
+        &b"SEFH"[..],
+        &107u32.to_le_bytes(),
+        &(blocks.len() as u32).to_le_bytes(),
+    ]
+    .concat();
+    for ((kind, ..), block) in blocks.iter().zip(&written) {
+        directory.extend([0u16.to_le_bytes(), kind.to_le_bytes()].concat());
+        directory.extend([(back as u32).to_le_bytes(), (block.len() as u32).to_le_bytes()].concat());
+        back -= block.len();
+    }
+    file.extend(written.concat());
+    let length = (directory.len() as u32).to_le_bytes();
+    file.extend([&directory[..], &length, b"SEFT"].concat());
+    file
+}
+
+#[test]
+fn samsungs_depth_is_refused_by_its_name() {
+    let folder = Folder::new();
+    let map = [9u8; 300];
+    for (kind, depth, tag) in [
+        (0x0AB1, "DualShot_DepthMap_1", "-DepthMapTiff"),
+        (0x0B41, "SingeShot_DepthMap_1", "-SingleShotDepthMapTiff"),
+    ] {
+        let utc: (u16, &str, &[u8]) = (0x0A01, "Image_UTC_Data", b"1700000000000");
+        // Samsung's camera writes XMP of its own, which says nothing of depth.
+        let photo = jpeg(&[app1(&xmp("<rdf:Description/>"))]);
+        fs::write(
+            folder.path("s.jpg"),
+            with_samsung_trailer(photo.clone(), &[utc, (kind, depth, &map)]),
+        )
+        .unwrap();
+        refuses(
+            &folder,
+            &["hologram", "--photo", "s.jpg", "-o", "n.png"],
+            &["s.jpg", depth, "exiftool", tag],
+        );
+        // Another trailer of Samsung's holds no depth.
+        fs::write(folder.path("utc.jpg"), with_samsung_trailer(photo, &[utc])).unwrap();
+        refuses(
+            &folder,
+            &["hologram", "--photo", "utc.jpg", "-o", "n.png"],
+            &["neither GDepth nor"],
+        );
+    }
+}
+
 #[test]
 fn each_kind_of_photo_gives_its_depth_and_becomes_a_hologram() {
     let folder = Folder::new();
@@ -477,7 +591,7 @@ fn a_photo_without_depth_takes_that_of_a_network() {
     refuses(
         &folder,
         &["hologram", "--photo", "plain.jpg", "-o", "n.png"],
-        &["--depth-network", "--depth flat"],
+        &["--depth-network (docs/depth.md", "--depth flat"],
     );
 }
 
@@ -571,4 +685,96 @@ fn a_heic_portrait_becomes_a_hologram() {
             "{errors}"
         );
     }
+}
+
+/// Returns a HEIC of [`write_heic`] with a transformation of both its pictures in the place of their `pixi`, which only
+/// informs: `irot` in quarter turns anticlockwise, or `imir` with 1 to exchange left and right.
+#[cfg(not(windows))]
+fn transformed(folder: &Folder, name: &str, kind: &[u8; 4], value: u8) -> Vec<u8> {
+    let mut bytes = fs::read(folder.path(name)).unwrap();
+    let places: Vec<usize> = (0..bytes.len() - 5)
+        .filter(|at| &bytes[*at..*at + 4] == b"pixi")
+        .collect();
+    assert_eq!(places.len(), 2, "one of each picture");
+    for at in places {
+        bytes[at..at + 4].copy_from_slice(kind);
+        bytes[at + 4] = value;
+    }
+    bytes
+}
+
+/// Returns `file` with Apple's XMP for depth among its data.
+#[cfg(not(windows))]
+fn with_apple_xmp(mut file: Vec<u8>, format: &[u8; 4], accuracy: &str) -> Vec<u8> {
+    let format = u32::from_be_bytes(*format);
+    let packet = format!(
+        r#"<x:xmpmeta xmlns:x="adobe:ns:meta/" x:xmptk="XMP Core 6.0.0"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"><rdf:Description rdf:about="" xmlns:apdi="http://ns.apple.com/pixeldatainfo/1.0/" xmlns:depthData="http://ns.apple.com/depthData/1.0/"><apdi:IntMinValue>0</apdi:IntMinValue><apdi:IntMaxValue>255</apdi:IntMaxValue><apdi:StoredFormat>1278226488</apdi:StoredFormat><apdi:NativeFormat>{format}</apdi:NativeFormat><apdi:FloatMinValue>0.5</apdi:FloatMinValue><apdi:FloatMaxValue>4</apdi:FloatMaxValue><depthData:Accuracy>{accuracy}</depthData:Accuracy></rdf:Description></rdf:RDF></x:xmpmeta>"#
+    );
+    file.extend((packet.len() as u32 + 8).to_be_bytes());
+    file.extend(b"mdat");
+    file.extend(packet.as_bytes());
+    file
+}
+
+/// A portrait that the container turns or mirrors, and one whose depth is distance.
+#[cfg(not(windows))]
+#[test]
+fn a_heic_portrait_is_upright_and_its_depth_is_what_the_file_says() {
+    let folder = Folder::new();
+    let rgba = image::RgbaImage::from_fn(96, 64, |x, y| match x < 40 && y < 20 {
+        true => image::Rgba([230, 120, 60, 240]),
+        false => image::Rgba([40, 90, 200, 30]),
+    });
+    write_heic(&folder, "stored", &rgba, 2);
+    for (name, kind, value, shape, near) in [
+        // The near corner, at the top left, comes to the bottom left, the bottom right and the top right.
+        ("turned.heic", b"irot", 1, (96, 64), (90, 5)),
+        ("half.heic", b"irot", 2, (64, 96), (60, 90)),
+        ("mirrored.heic", b"imir", 1, (64, 96), (5, 90)),
+    ] {
+        fs::write(folder.path(name), transformed(&folder, "stored.heic", kind, value)).unwrap();
+        let read = photo::read(&folder.path(name), None).unwrap();
+        assert_eq!(read.depth.dim(), shape, "{name}");
+        assert_eq!(read.colours.rgb.dim(), (3, shape.0, shape.1), "{name}");
+        let (y, x) = near;
+        let opposite = (shape.0 - 1 - y, shape.1 - 1 - x);
+        assert!(read.depth[near] < 0.1 && read.depth[opposite] > 0.8, "{name}");
+        assert!(read.colours.rgb[(0, y, x)] > 0.8, "{name}");
+        assert!(read.colours.rgb[(0, opposite.0, opposite.1)] < 0.3, "{name}");
+    }
+    let stored = fs::read(folder.path("stored.heic")).unwrap();
+    for (format, accuracy, range, range_m) in [
+        (b"hdis", "absolute", Range::Inverse, Some((0.25, 2.0))),
+        (b"hdis", "relative", Range::Inverse, None),
+        (b"fdep", "absolute", Range::Linear, Some((0.5, 4.0))),
+    ] {
+        fs::write(
+            folder.path("said.heic"),
+            with_apple_xmp(stored.clone(), format, accuracy),
+        )
+        .unwrap();
+        let read = photo::read(&folder.path("said.heic"), None).unwrap();
+        assert_eq!((read.range, read.range_m), (range, range_m));
+        // Level 240 of 255 lies at 3.794/m, which is 0.264 m, or at 3.794 m.
+        let level = 240.0 / 255.0;
+        let d = if range == Range::Linear { level } else { 1.0 - level };
+        assert!((read.depth[(5, 5)] - d).abs() < 0.02, "{}", read.depth[(5, 5)]);
+        if let Some(metres) = read.metres() {
+            let want = if range == Range::Linear { 3.794 } else { 1.0 / 3.794 };
+            assert!((metres[(5, 5)] / want - 1.0).abs() < 0.03, "{} {want}", metres[(5, 5)]);
+        }
+    }
+    folder.succeeds(&[
+        "hologram",
+        "--photo",
+        "said.heic",
+        "--near",
+        "1",
+        "--far",
+        "4",
+        "--fit",
+        "centre",
+        "-o",
+        "h.png",
+    ]);
 }

@@ -14,8 +14,10 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
+/// The supported formats of pictures with whole numbers, for messages.
+const PICTURE_FORMATS: &str = "PNG, JPEG, WebP, TIFF or BMP, of 8 or 16 bits";
 /// The supported colour formats, for messages.
-pub const COLOUR_FORMATS: &str = "PNG, JPEG, WebP, TIFF or BMP, of 8 or 16 bits";
+pub const COLOUR_FORMATS: &str = "PNG, JPEG, WebP, TIFF or BMP of 8 or 16 bits, OpenEXR, Radiance (.hdr) or HEIC";
 /// The supported depth formats, for messages.
 pub const DEPTH_FORMATS: &str =
     "grey PNG, TIFF, WebP, JPEG, BMP or PGM of 8 or 16 bits, TIFF, OpenEXR or PFM of floating point, .npy or .npz";
@@ -151,7 +153,7 @@ fn picture(decoded: Decoded) -> Said<(DynamicImage, Orientation)> {
     match decoded.pixels {
         Pixels::Image(image) => Ok((image, decoded.orientation)),
         Pixels::Plane(_) => Err(format!(
-            "holds numbers of 32 bits or floating point, which are read as depth alone here; a picture is {COLOUR_FORMATS}"
+            "holds numbers of 32 bits or floating point, which are read as depth alone here; a picture is {PICTURE_FORMATS}"
         )),
     }
 }
@@ -194,7 +196,7 @@ fn kind(head: &[u8]) -> Said<Kind> {
         // BigTIFF has another version number.
         _ if head.starts_with(b"II\x2b\0") || head.starts_with(b"MM\0\x2b") => Ok(Kind::Tiff),
         _ => Err(format!(
-            "is not a picture of a kind that is read: {COLOUR_FORMATS}; depth also as OpenEXR, PGM, PFM, .npy or .npz"
+            "is not a picture of a kind that is read: {COLOUR_FORMATS}; depth also as PGM, PFM, .npy or .npz"
         )),
     }
 }
@@ -227,7 +229,7 @@ fn image<R: BufRead + Seek>(mut from: R, format: ImageFormat, how: Reading) -> S
             from.rewind().map_err(unread)?;
             let mut bytes = Vec::new();
             from.read_to_end(&mut bytes).map_err(unread)?;
-            if !jpeg_end::is_whole(&bytes) {
+            if jpeg_end::end(&bytes).is_none() {
                 return Err(broken(&"its JPEG is cut short, without a mark of its end"));
             }
             from.rewind().map_err(unread)?;

@@ -1,24 +1,20 @@
-//! A check that a JPEG is whole. Its decoder fills what is missing with grey, without an error.
+//! The end of a JPEG, which tells whether it is whole: its decoder fills what is missing with grey, without an error.
 
 const END_OF_IMAGE: u8 = 0xD9;
 const START_OF_SCAN: u8 = 0xDA;
 
-/// Checks whether the first picture of `file` has its end: the mark EOI after its last scan. Pictures inside segments,
-/// such as thumbnails, and pictures behind the first one do not count.
-pub(crate) fn is_whole(file: &[u8]) -> bool {
+/// Returns where the first picture of `file` ends, behind the mark EOI after its last scan, or `None` if it is cut short.
+/// Pictures inside segments, such as thumbnails, and pictures behind the first one do not count.
+pub(crate) fn end(file: &[u8]) -> Option<usize> {
     let mut rest = file.get(2..).unwrap_or_default();
     while let Some((marker, after)) = next_marker(rest) {
         rest = match marker {
-            END_OF_IMAGE => return true,
+            END_OF_IMAGE => return Some(file.len() - after.len()),
             // Marks without a segment.
             0x01 | 0xD0..=0xD8 => after,
             _ => {
-                let Some((length, _)) = after.split_first_chunk() else {
-                    return false;
-                };
-                let Some(behind) = after.get(usize::from(u16::from_be_bytes(*length))..) else {
-                    return false;
-                };
+                let (length, _) = after.split_first_chunk()?;
+                let behind = after.get(usize::from(u16::from_be_bytes(*length))..)?;
                 if marker == START_OF_SCAN {
                     behind_scan(behind)
                 } else {
@@ -27,7 +23,7 @@ pub(crate) fn is_whole(file: &[u8]) -> bool {
             }
         };
     }
-    false
+    None
 }
 
 /// Finds the next mark, and returns it and what follows. Any number of 0xFF may precede a mark.
@@ -66,14 +62,14 @@ mod tests {
     #[test]
     fn a_cut_picture_is_found_wherever_it_ends() {
         let whole = jpeg(Size { width: 40, height: 30 });
-        assert!(is_whole(&whole));
-        for end in 0..whole.len() {
-            assert!(!is_whole(&whole[..end]), "{end}");
+        assert_eq!(end(&whole), Some(whole.len()));
+        for cut in 0..whole.len() {
+            assert_eq!(end(&whole[..cut]), None, "{cut}");
         }
         // Some programs fill up the missing part with zeros.
         let mut filled = whole[..whole.len() / 2].to_vec();
         filled.resize(whole.len(), 0);
-        assert!(!is_whole(&filled));
+        assert_eq!(end(&filled), None);
     }
 
     #[test]
@@ -81,10 +77,10 @@ mod tests {
         let (whole, thumbnail) = (jpeg(Size { width: 40, height: 30 }), jpeg(Size { width: 8, height: 8 }));
         let length = (thumbnail.len() as u16 + 2).to_be_bytes();
         let with = [&whole[..2], &[0xFF, 0xE1], &length, &thumbnail, &whole[2..]].concat();
-        assert!(is_whole(&with));
-        assert!(!is_whole(&with[..with.len() - 40]));
+        assert_eq!(end(&with), Some(with.len()));
+        assert_eq!(end(&with[..with.len() - 40]), None);
         // A second picture, as phones append, or any data.
-        assert!(is_whole(&[&with[..], &thumbnail].concat()));
-        assert!(is_whole(&[&with[..], &[0; 99]].concat()));
+        assert_eq!(end(&[&with[..], &thumbnail].concat()), Some(with.len()));
+        assert_eq!(end(&[&with[..], &[0; 99]].concat()), Some(with.len()));
     }
 }

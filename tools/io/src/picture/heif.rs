@@ -89,11 +89,11 @@ impl Decoded {
         colours::of_bytes(image, &bytes, &self.path.display().to_string(), asked).map_err(refuse)
     }
 
-    /// Returns the disparity of a portrait, (h, w) in 0..=1, larger where nearer, or `None` if the file holds none.
+    /// Returns the levels of a portrait's depth, (h, w) in 0..=1, or `None` if the file holds none.
     ///
     /// # Errors
     /// Returns an error if it is no depth map.
-    pub(crate) fn disparity(&self) -> Result<Option<Array2<f32>>> {
+    pub(crate) fn depth(&self) -> Result<Option<Array2<f32>>> {
         let Some(depth) = self.picture("-depth") else {
             return Ok(None);
         };

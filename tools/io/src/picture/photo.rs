@@ -1,5 +1,5 @@
 //! Photos with embedded depth from phones: JPEGs with XMP of GDepth or Dynamic Depth 1.0, and HEIC with an auxiliary
-//! picture of disparity (`heif`).
+//! picture of disparity or distance (`heif`).
 //!
 //! * GDepth (`developers.google.com/depthmap-metadata`): the XMP itself contains the depth image in base64. An image
 //!   too long for one segment is in extended XMP (Adobe's XMP specification, part 3).
@@ -7,6 +7,10 @@
 //!
 //! A depth image holds d_n from 0, near, to 1, far. `RangeLinear`: d = near + d_n·(far − near). `RangeInverse`, which
 //! portrait modes use: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
+
+mod apple;
+mod dynamic_depth;
+mod samsung;
 
 use crate::frame::{Doubt, before_enlarging, check_aspect};
 use crate::input::decode::{self, Reading};
@@ -37,6 +41,9 @@ const MOST_DEPTH_PIXELS: u64 = 1 << 24;
 /// The maximum number of marks (`<`, `"`, `'`) in XMP. Elements and attributes take far more memory than their
 /// characters.
 const MOST_MARKS: usize = 1 << 15;
+
+/// Advice for a photo without depth.
+const ADVICE: &str = "Phones store depth in portraits; for other photos there is --depth-network (docs/depth.md says how to make one), and --rgb with --depth flat";
 
 /// The meaning of the depth values of a photo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,31 +89,36 @@ impl Photo {
 pub fn read(path: &Path, asked: Option<RgbEncoding>) -> Result<Photo> {
     let bytes = input::bytes(path, MOST_PHOTO)?;
     if decode::is_heic(&bytes) {
-        return of_heic(path, asked);
+        return of_heic(path, &bytes, asked);
     }
     of_bytes(&bytes, &path.display().to_string(), asked).map_err(|why| Error::file(path, why))
 }
 
-/// Reads a portrait in HEIC, whose depth is disparity.
-fn of_heic(path: &Path, asked: Option<RgbEncoding>) -> Result<Photo> {
+/// Reads a portrait in HEIC. Its depth is disparity unless the file says that it is distance.
+fn of_heic(path: &Path, file: &[u8], asked: Option<RgbEncoding>) -> Result<Photo> {
     let decoded = heif::decode(path)?;
     let colours = decoded.colours(asked)?;
-    let Some(disparity) = decoded.disparity()? else {
-        return Err(Error::file(
-            path,
-            "holds no depth, which phones store in portraits; for other photos there is --depth-network, and --rgb with --depth flat",
-        ));
+    let Some(numbers) = decoded.depth()? else {
+        return Err(Error::file(path, format!("holds no depth. {ADVICE}")));
     };
-    check_aspect(Size::from_shape(disparity.dim()), colours.size()).map_err(|why| Error::file(path, why))?;
-    let (depth, enlarged) = before_enlarging(disparity.mapv(|d| 1.0 - d), colours.size());
+    check_aspect(Size::from_shape(numbers.dim()), colours.size()).map_err(|why| Error::file(path, why))?;
+    let meaning = apple::meaning(file).unwrap_or(apple::Meaning {
+        range: Range::Inverse,
+        range_m: None,
+    });
+    let depth = match meaning.range {
+        Range::Linear => numbers,
+        Range::Inverse => numbers.mapv(|d| 1.0 - d),
+    };
+    let (depth, enlarged) = before_enlarging(depth, colours.size());
     if let Some(enlarged) = enlarged {
         log::warn!("{}: its depth {}", path.display(), Doubt::Enlarged(enlarged));
     }
     Ok(Photo {
         colours,
         depth,
-        range: Range::Inverse,
-        range_m: None,
+        range: meaning.range,
+        range_m: meaning.range_m,
     })
 }
 
@@ -118,7 +130,12 @@ fn of_bytes(bytes: &[u8], name: &str, asked: Option<RgbEncoding>) -> std::result
         return Err("is no JPEG; --photo takes a JPEG with depth inside, or with --depth-network any picture; other pictures go to --rgb with --depth".into());
     }
     let (colour, orientation) = decode::picture_of(bytes, Reading::UPRIGHT)?;
-    let found = Xmp::read(bytes)?.depth(bytes)?;
+    let found = Xmp::read(bytes).and_then(|xmp| xmp.depth(bytes)).map_err(|why| match samsung::depth(bytes) {
+        Some((depth, tag)) => format!(
+            "holds Samsung's {depth}, whose form Samsung does not publish; `exiftool -b -{tag} PHOTO > depth.tif` takes it out for --rgb and --depth, with --invert if white is near"
+        ),
+        None => why,
+    })?;
     // The depth image has the orientation of the stored photo, whatever its own metadata say.
     let how = Reading {
         most_pixels: MOST_DEPTH_PIXELS,
@@ -168,9 +185,7 @@ impl Xmp {
                 parts.push(part);
             }
         }
-        let main = main.ok_or(
-            "holds no depth: it has no XMP. Phones store depth in portraits; for other photos there is --depth-network, and --rgb with --depth flat",
-        )?;
+        let main = main.ok_or_else(|| format!("holds no depth: it has no XMP. {ADVICE}"))?;
         let main = String::from_utf8(main.to_vec()).map_err(|_| "its XMP is no UTF-8")?;
         let extended = if parts.is_empty() {
             None
@@ -204,10 +219,12 @@ impl Xmp {
             );
         }
         if let Some(uri) = value(DEPTH_MAP, "DepthURI") {
-            let image = item(&main, jpeg, uri)?.to_vec();
+            let image = dynamic_depth::item(&documents, jpeg, uri)?.to_vec();
             return Found::new(image, |name| value(DEPTH_MAP, name));
         }
-        Err("holds no depth: its XMP has neither GDepth nor Dynamic Depth. Phones store depth in portraits; for other photos there is --depth-network, and --rgb with --depth flat".into())
+        Err(format!(
+            "holds no depth: its XMP has neither GDepth nor Dynamic Depth. {ADVICE}"
+        ))
     }
 }
 
@@ -303,27 +320,4 @@ fn property<'a>(node: Node<'a, '_>, space: &str, name: &str) -> Option<&'a str> 
         let element = node.has_tag_name((space, name)).then(|| node.text()).flatten();
         node.attribute((space, name)).or(element)
     })
-}
-
-/// Returns the bytes of the Dynamic Depth item called `uri`. The items lie at the end of the file, in the order of the
-/// directory, each followed by padding. The first item is the photo itself.
-fn item<'a>(xml: &Document<'_>, jpeg: &'a [u8], uri: &str) -> std::result::Result<&'a [u8], String> {
-    let items: Vec<_> = (xml.descendants())
-        .filter(|node| node.tag_name().name() == "Item" && property(*node, ITEM, "Mime").is_some())
-        .collect();
-    let number = |node: &Node<'_, '_>, name| property(*node, ITEM, name).and_then(|text| text.parse::<usize>().ok());
-    let mut end = jpeg.len();
-    for node in items.iter().skip(1).rev() {
-        let length = number(node, "Length").ok_or("an item of its Dynamic Depth has no length")?;
-        let padding = number(node, "Padding").unwrap_or(0);
-        let start = (end.checked_sub(padding)).and_then(|behind| Some((behind.checked_sub(length)?, behind)));
-        let (start, behind) = start.ok_or("the items of its Dynamic Depth are longer than the file; it was cut")?;
-        if property(*node, ITEM, "DataURI") == Some(uri) {
-            return Ok(&jpeg[start..behind]);
-        }
-        end = start;
-    }
-    Err(format!(
-        "its Dynamic Depth names {uri}, but no such item is in the file"
-    ))
 }
