@@ -380,7 +380,7 @@ impl FrameFlags {
         let (_, height, width) = rgb.dim();
         let (Some(path), Some(network)) = (self.seen.network(), self.seen.open(Size { width, height })?) else {
             return Err(Error::Input(
-                "--rgb needs --depth, --depth-network that estimates it, or --depth flat for a picture on one plane"
+                "--rgb needs --depth, --depth-network that estimates it (docs/depth.md says how to make one), or --depth flat for a picture on one plane"
                     .into(),
             ));
         };
