@@ -40,6 +40,28 @@ const DISPARITY_PFM: &str = "UGYKNCAyCi0xCgAAAEMAAIBCAAAAAAAAAEEAAIBCAAAAQgAAgEE
 const KITTI_PNG: &str = "iVBORw0KGgoAAAANSUhEUgAAAAQAAAACEAAAAAAKU/78AAAAGklEQVQIHWNkZGBk+MfAxcCYwjC34T8DQyMAG2wEDoIZRWsAAAAA\
     SUVORK5CYII=";
 
+/// The units of [`KITTI_PNG`] with 65535 in the place of 1, by netpbm 11's pngtopnm, and as text by pnmtoplainpnm.
+const WORDS_PGM: &str = "UDUKNCAyCjY1NTM1CgEAAgAAAAoAZAABgACA//8=";
+const PLAIN_PGM: &str = "UDIKNCAyCjY1NTM1CjI1NiA1MTIgMCAyNTYwIAoyNTYwMCAzODQgMTI4IDY1NTM1IAo=";
+/// The same modulo 251, by pngtopnm.
+const BYTES_PGM: &str = "UDUKNCAyCjI1NQoFCgAy+YWAGA==";
+/// 1.5 2.25 0 3, NaN 0.5 4 2 as depth beside an array rgb, by numpy.savez_compressed 2.4.
+const COMPRESSED_NPZ: &str = "UEsDBC0AAAAIAAAAIQCrsNC3//////////8JABQAZGVwdGgubnB5AQAQAKAAAAAAAAAAXQAAAAAAAACb7BfqGxDJyFDGUK2eklqcXKRu\
+    paBuk2airqOgnpZfVFKUmBefX5SSChJ3S8wpTgWKF2ckFqQC+RpGOgommjoKtQpkAy4GhgP2DAwCDgxg4ACkD9QDGUCxBpCYAwBQSwME\
+    LQAAAAgAAAAhAHsore3//////////wcAFAByZ2IubnB5AQAQAJgAAAAAAAAATAAAAAAAAACb7BfqGxDJyFDGUK2eklqcXKRupaBeU2qo\
+    rqOgnpZfVFKUmBefX5SSChJ3S8wpTgWKF2ckFqQC+RpGOgomOgrGmjoKtQrkAS4GHAAAUEsBAi0DLQAAAAgAAAAhAKuw0LddAAAAoAAA\
+    AAkAAAAAAAAAAAAAAIABAAAAAGRlcHRoLm5weVBLAQItAy0AAAAIAAAAIQB7KK3tTAAAAJgAAAAHAAAAAAAAAAAAAACAAZgAAAByZ2Iu\
+    bnB5UEsFBgAAAAACAAIAbAAAAB0BAAAAAA==";
+/// The same in 64 bits, without a name, by numpy.savez 2.4.
+const LONE_NPZ: &str = "UEsDBC0AAAAAAAAAIQDPBrtj//////////8JABQAYXJyXzAubnB5AQAQAMAAAAAAAAAAwAAAAAAAAACTTlVNUFkBAHYAeydkZXNjcic6\
+    ICc8ZjgnLCAnZm9ydHJhbl9vcmRlcic6IEZhbHNlLCAnc2hhcGUnOiAoMiwgNCksIH0gICAgICAgICAgICAgICAgICAgICAgICAgICAg\
+    ICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgCgAAAAAAAPg/AAAAAAAAAkAAAAAAAAAAAAAAAAAAAAhAAAAAAAAA+H8AAAAAAADg\
+    PwAAAAAAABBAAAAAAAAAAEBQSwECLQMtAAAAAAAAACEAzwa7Y8AAAADAAAAACQAAAAAAAAAAAAAAgAEAAAAAYXJyXzAubnB5UEsFBgAA\
+    AAABAAEANwAAAPsAAAAAAA==";
+/// The same in 16 bits as (1, 1, 2, 4), as networks give it, by numpy.save 2.4.
+const NETWORK_NPY: &str = "k05VTVBZAQB2AHsnZGVzY3InOiAnPGYyJywgJ2ZvcnRyYW5fb3JkZXInOiBGYWxzZSwgJ3NoYXBlJzogKDEsIDEsIDIsIDQpLCB9ICAg\
+    ICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgICAgIAoAPoBAAAAAQgB+ADgARABA";
+
 /// The pixels of the pictures, (3, 2, 4): linear light.
 fn light() -> Array3<f32> {
     let pixels: [[f32; 3]; 8] = [
@@ -212,4 +234,65 @@ fn middleburys_calibration_makes_pixels_distances() {
     // Another file of this name is none of it, and the numbers are inverse metres.
     std::fs::write(folder.path("calib.txt"), "K: 1 0 0\n").unwrap();
     assert_ne!(read(&folder).unwrap().depth[(0, 0)], found[(0, 0)]);
+}
+
+#[test]
+fn depth_of_netpbm_and_numpy_is_read() {
+    let folder = Folder::new();
+    let none = f32::NAN;
+    let words = array![[256.0, 512.0, 0.0, 2560.0], [25600.0, 384.0, 128.0, none]];
+    let bytes = array![[5.0, 10.0, 0.0, 50.0], [249.0, 133.0, 128.0, 24.0]];
+    let metres = array![[1.5, 2.25, 0.0, 3.0], [none, 0.5, 4.0, 2.0]];
+    for (name, file, want) in [
+        ("words.pgm", WORDS_PGM, &words),
+        ("plain.pgm", PLAIN_PGM, &words),
+        ("bytes.pgm", BYTES_PGM, &bytes),
+        ("compressed.npz", COMPRESSED_NPZ, &metres),
+        ("lone.npz", LONE_NPZ, &metres),
+        ("network.npy", NETWORK_NPY, &metres),
+    ] {
+        written(&folder, name, file);
+        let found = depth_map::read_depth(&folder.path(name), false).unwrap();
+        assert_eq!(found.dim(), want.dim(), "{name}");
+        for (found, want) in found.iter().zip(want) {
+            assert!(
+                found == want || found.is_nan() && want.is_nan(),
+                "{name}: {found} {want}"
+            );
+        }
+    }
+}
+
+/// Folders of `hologram` and `video` take the colour that a single picture may have.
+#[test]
+fn folders_hold_linear_colour() {
+    let folder = Folder::new();
+    for name in ["rgb", "depth", "scan"] {
+        std::fs::create_dir(folder.path(name)).unwrap();
+    }
+    let depth = image::ImageBuffer::from_fn(4, 2, |x, y| image::Luma([(4000 * (1 + x) + 9000 * y) as u16]));
+    for (name, ending, file) in [("a", "exr", COLOUR_EXR), ("b", "hdr", COLOUR_HDR)] {
+        written(&folder, &format!("rgb/{name}.{ending}"), file);
+        depth.save(folder.path(&format!("depth/{name}.png"))).unwrap();
+        folder.succeeds(&[
+            "hologram",
+            "--rgb",
+            &format!("rgb/{name}.{ending}"),
+            "--depth",
+            &format!("depth/{name}.png"),
+            "-o",
+            &format!("{name}.png"),
+        ]);
+    }
+    folder.succeeds(&["hologram", "--rgb", "rgb", "--depth", "depth", "-o", "made"]);
+    let pixels = |name: &str| image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
+    for name in ["a.png", "b.png"] {
+        assert_eq!(pixels(&format!("made/{name}")), pixels(name), "{name}");
+    }
+    for index in 0..2 {
+        written(&folder, &format!("scan/color_{index}.exr"), COLOUR_EXR);
+        depth.save(folder.path(&format!("scan/depth_{index}.png"))).unwrap();
+    }
+    folder.succeeds(&["video", "scan", "-o", "frames"]);
+    assert!(folder.path("frames/phase_000001.png").is_file());
 }

@@ -16,7 +16,7 @@ const COLOUR_FOLDERS: [&str; 3] = ["rgb", "color", "image"];
 /// The file extensions of pictures.
 const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff"];
 /// The further file extensions of colour.
-const PHOTOS: [&str; 2] = ["heic", "heif"];
+const COLOURS: [&str; 4] = ["heic", "heif", "exr", "hdr"];
 /// The further file extensions of depth.
 const NUMBERS: [&str; 5] = ["exr", "npy", "npz", "pgm", "pfm"];
 
@@ -33,7 +33,7 @@ impl Shows {
     /// Checks whether the file at `path` may show this. Hidden files do not.
     fn is_by(self, path: &Path) -> bool {
         let more: &[&str] = match self {
-            Shows::Colour => &PHOTOS,
+            Shows::Colour => &COLOURS,
             Shows::Depth => &NUMBERS,
         };
         let hidden = path
