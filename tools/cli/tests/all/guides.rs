@@ -1,4 +1,4 @@
-//! Runs the commands of README and of a guide as a reader pastes them: in a clone, after `samples/run`.
+//! Runs the commands of README and of guides as a reader pastes them: in a clone, after `samples/run`.
 use crate::folder::Folder;
 use std::path::Path;
 
@@ -14,6 +14,18 @@ fn commands(document: &str) -> Vec<Vec<String>> {
         .filter_map(|line| line.strip_prefix("phasefront "))
         .map(|line| line.split_whitespace().map(str::to_owned).collect())
         .collect()
+}
+
+/// Returns the paths of the files in `folder` and in `out`, and their sizes in bytes.
+fn files(folder: &Folder) -> impl Iterator<Item = (String, u64)> {
+    let of = |name: &'static str, before: &'static str| {
+        let entries = std::fs::read_dir(folder.path(name)).unwrap().map(Result::unwrap);
+        entries.map(move |entry| {
+            let name = entry.file_name().into_string().unwrap();
+            (format!("{before}{name}"), entry.metadata().unwrap().len())
+        })
+    };
+    of(".", "").chain(of("out", "out/"))
 }
 
 /// Runs the commands of `document` in a folder that has the samples, and what `samples/run` makes of them.
@@ -38,8 +50,17 @@ fn runs(document: &str, least: usize) {
     for command in &commands {
         let command: Vec<_> = command.iter().map(String::as_str).collect();
         folder.succeeds(&command);
-        let output = command.iter().position(|flag| *flag == "-o").unwrap();
-        assert!(std::fs::metadata(folder.path(command[output + 1])).unwrap().len() > 10_000);
+        let is_output = |pair: &&[&str]| ["-o", "--packed", "--complex"].contains(&pair[0]);
+        for output in command.windows(2).filter(is_output) {
+            // A modulator that takes one colour after another has a file for each.
+            let (stem, ending) = output[1].split_once('.').unwrap();
+            let made = files(&folder).filter(|(name, _)| name.starts_with(stem) && name.ends_with(ending));
+            let made: Vec<_> = made.collect();
+            assert!(
+                !made.is_empty() && made.iter().all(|(_, bytes)| *bytes > 10_000),
+                "{command:?} {made:?}"
+            );
+        }
     }
 }
 
@@ -52,4 +73,12 @@ fn the_first_commands_run_as_they_stand() {
 #[ignore = "slow: minutes of a core"]
 fn the_commands_of_the_guide_to_pages_run_as_they_stand() {
     runs("docs/view.md", 6);
+}
+
+#[test]
+#[ignore = "slow: minutes of a core"]
+fn the_commands_of_the_reference_pages_run_as_they_stand() {
+    for (page, least) in [("docs/command.md", 2), ("docs/devices.md", 3), ("docs/focus.md", 1)] {
+        runs(page, least);
+    }
 }
