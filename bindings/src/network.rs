@@ -64,7 +64,8 @@ pub struct NetworkInfo {
     pub layers: usize,
     /// The number of filters of each hidden layer.
     pub filters: usize,
-    /// The number format of the layers.
+    /// The number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in the
+    /// formats that its file names.
     pub precision: String,
     /// The distance between neighbouring pixels, in µm.
     pub pitch_um: f64,

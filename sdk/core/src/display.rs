@@ -3,6 +3,7 @@
 //! Lengths are in metres (`_m`). The TOML form uses mm, µm and nm, and its keys name the unit.
 
 pub mod illumination;
+pub mod lens;
 pub mod levels;
 pub mod model;
 pub mod panel;

@@ -9,6 +9,7 @@ mod dark_threshold;
 pub mod double_phase;
 mod encoder;
 mod encoding;
+pub mod focal_plane;
 pub mod local;
 pub mod midpoint;
 pub mod modelled;

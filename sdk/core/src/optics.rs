@@ -12,3 +12,4 @@ pub mod metrics;
 pub mod reference;
 pub mod sub_hologram;
 pub mod zernike;
+pub mod zoom;

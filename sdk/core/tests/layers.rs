@@ -21,6 +21,7 @@ const LAYERS: &[&str] = &[
     "display::illumination",
     "display::panel",
     "display::registration",
+    "display::lens",
     "display::model",
     "display::target",
     "frame",

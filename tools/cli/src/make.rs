@@ -6,9 +6,11 @@ pub(crate) mod field;
 mod gpu;
 mod judged;
 mod layers;
+mod lens;
 mod request;
 
 pub(crate) use judged::{Judged, judge};
+pub(crate) use lens::{FOURIER, judge_in_focus};
 pub(crate) use request::{HologramRequest, Image, ImageFlags, Method};
 
 use crate::flags::encoder::Encoder;
@@ -27,6 +29,17 @@ use std::time::Duration;
 impl HologramRequest {
     /// Makes the hologram of `image` for `display`.
     pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<HologramResult> {
+        if let Some(lens) = &display.lens {
+            let Image::Rgbd(frame) = image else {
+                return Err(Error::Input(
+                    "the focal plane of a lens takes --rgb with --depth, no layered depth image".into(),
+                ));
+            };
+            return Ok(HologramResult {
+                view_colours: self.view_colours(&display.target.display, image),
+                ..self.in_focal_plane(lens, frame, display)?
+            });
+        }
         let method = self.method();
         let is_of_rgbd = matches!((method, image), (Method::Core(_), Image::Rgbd(_)));
         self.hologram.encoder.check_focus(is_of_rgbd)?;

@@ -49,7 +49,15 @@ impl DisplayFlags {
     /// # Errors
     /// Returns the errors of [`Self::read`].
     pub fn read_for_colours(&self) -> Result<DisplayFile> {
-        let file = self.read()?;
+        without_lens(self.read_for_colours_with_lens()?)
+    }
+
+    /// Works like [`Self::read_for_colours`] for a command that also supports the focal plane of a lens.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Self::read_with_lens`].
+    pub fn read_for_colours_with_lens(&self) -> Result<DisplayFile> {
+        let file = self.read_with_lens()?;
         let display = &file.target.display;
         let modulator = self.name().filter(|name| display::display_path(name).is_none());
         let is_unknown = display.colours() == 3 && *display.balance() == Balance::Unknown;
@@ -95,8 +103,13 @@ impl DisplayFlags {
 
     /// Reads the display for a command that does not need one. Returns `None` if no display is given.
     pub fn read_if_given(&self) -> Result<Option<DisplayFile>> {
+        self.read_if_given_with_lens()?.map(without_lens).transpose()
+    }
+
+    /// Works like [`Self::read_if_given`] for a command that also supports the focal plane of a lens.
+    pub fn read_if_given_with_lens(&self) -> Result<Option<DisplayFile>> {
         match (&self.display, self.offset_mm) {
-            (Some(_), _) => Ok(Some(self.read()?)),
+            (Some(_), _) => Ok(Some(self.read_with_lens()?)),
             (None, None) => Ok(None),
             (None, Some(_)) => Err(Error::Input(
                 "--offset-mm goes with --display; a hologram file says its own offset".into(),
@@ -107,13 +120,28 @@ impl DisplayFlags {
     /// Reads the display, or takes the default one, and applies the given offset.
     ///
     /// # Errors
-    /// Returns an error if the display cannot be read or the offset is too large.
+    /// Returns an error if the display cannot be read, the offset is too large, or the picture lies in the focal plane
+    /// of a lens.
     pub fn read(&self) -> Result<DisplayFile> {
+        without_lens(self.read_with_lens()?)
+    }
+
+    /// Works like [`Self::read`] for a command that also supports the focal plane of a lens.
+    ///
+    /// # Errors
+    /// Returns an error if the display cannot be read or the offset is too large.
+    pub fn read_with_lens(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(name) => display::find_display(name)?,
             None => Display::default().into(),
         };
         if let Some(mm) = self.offset_mm {
+            if file.lens.is_some() {
+                return Err(Error::Input(
+                    "--offset-mm is for pictures about the modulator, and this display's lies in the focal plane of a lens"
+                        .into(),
+                ));
+            }
             file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
             file.device.display = file.target.display.clone();
         }
@@ -132,6 +160,17 @@ impl DisplayFlags {
             );
         }
         Ok(file)
+    }
+}
+
+/// Refuses a display whose picture lies in the focal plane of a lens.
+fn without_lens(file: DisplayFile) -> Result<DisplayFile> {
+    match file.lens {
+        None => Ok(file),
+        Some(_) => Err(Error::Input(
+            "the display's picture lies in the focal plane of a lens, plane = \"fourier\"; hologram, refocus, view, judge, pack, unpack, show, pattern and devices know it, this command does not"
+                .into(),
+        )),
     }
 }
 

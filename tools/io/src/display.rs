@@ -1,6 +1,7 @@
 //! Display files: the TOML file of a display and the files that it refers to.
 
 pub mod calibration;
+pub(crate) mod lens;
 mod lut;
 mod panel;
 pub mod spatial;
@@ -11,6 +12,7 @@ use crate::{Error, Result, input};
 use phasefront::output::ModulatorSpec;
 use phasefront::target::Response;
 use phasefront::{Display, Target};
+use phasefront_core::display::lens::Lens;
 use phasefront_core::runtime::keys;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,6 +28,8 @@ pub struct DisplayFile {
     pub lut: Option<[u8; 256]>,
     /// The correction of the display's aberrations.
     pub aberration: Option<AberrationFile>,
+    /// The lens in whose focal plane the picture lies. Otherwise it lies about the modulator.
+    pub lens: Option<Lens>,
 }
 
 impl From<Display> for DisplayFile {
@@ -35,6 +39,7 @@ impl From<Display> for DisplayFile {
             device: display.into(),
             lut: None,
             aberration: None,
+            lens: None,
         }
     }
 }
@@ -74,6 +79,7 @@ impl DisplayFile {
                 "carrier_mrad, lens_mm or flatness",
                 phase_only && self.target.panel.adds(),
             ),
+            (lens::PLANE, self.lens.is_some()),
         ];
         let there = keys.into_iter().filter(|(_, there)| *there);
         there.map(|(key, _)| key.to_owned()).collect()
@@ -96,6 +102,7 @@ pub fn find_display(name: &str) -> Result<DisplayFile> {
         device,
         lut: None,
         aberration: None,
+        lens: None,
     })
 }
 
@@ -188,7 +195,7 @@ fn one_for_all(table: &toml::Table) -> Vec<&'static str> {
 
 /// Checks the keys in the `table` of the display file at `path`.
 fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
-    let known = [&keys::DISPLAY[..], &keys::DEVICE, &NAMED, &panel::KEYS].concat();
+    let known = [&keys::DISPLAY[..], &keys::DEVICE, &NAMED, &panel::KEYS, &lens::KEYS].concat();
     keys::check(table, &known).map_err(|e| Error::file(path, one_line_of(&e)))?;
     let phases: Vec<_> = PHASES.into_iter().filter(|key| table.contains_key(*key)).collect();
     match phases[..] {
@@ -204,8 +211,8 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 }
 
 /// Reads a display's TOML file. The keys `lut`, `per_pixel`, `laser`, `aberration` and `model` name files relative to
-/// it: `crate::display::lut` describes `lut`, and [`crate::display::calibration`] the others. [`ModulatorSpec`] and
-/// `crate::display::panel` describe the remaining keys.
+/// it: `crate::display::lut` describes `lut`, and [`crate::display::calibration`] the others. [`ModulatorSpec`],
+/// `crate::display::panel` and `crate::display::lens` describe the remaining keys.
 ///
 /// # Errors
 /// Returns an error if a file is missing or has invalid contents.
@@ -221,7 +228,8 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     };
     let per_pixel_path = named("per_pixel")?;
     let (laser_path, aberration_path, model_path) = (named("laser")?, named("aberration")?, named("model")?);
-    let panel = panel::take(path, &mut table)?;
+    let mut panel = panel::take(path, &mut table)?;
+    let focal_m = lens::take(path, &mut table)?;
     let device = ModulatorSpec::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
     let display = &device.display;
     let (lut, of_lasers) = match luts {
@@ -256,6 +264,9 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
         target.response = response;
     }
     target.illumination = laser_path.map(|p| calibration::read_laser(&p)).transpose()?;
+    if focal_m.is_some() {
+        panel.carry_by_default(Lens::default_carrier_rad(&target.display));
+    }
     panel.onto(path, &mut target)?;
     if let Some(path) = model_path {
         target.model = Some(calibration::read_model(&path)?.into());
@@ -277,11 +288,14 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
             target.display.colours()
         );
     }
+    let lens = focal_m.map(|focal_m| lens::of(focal_m, &target, aberration.is_some()));
+    let lens = lens.transpose().map_err(|e| Error::file(path, one_line_of(&e)))?;
     Ok(DisplayFile {
         target,
         device,
         lut,
         aberration,
+        lens,
     })
 }
 

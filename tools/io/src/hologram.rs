@@ -8,7 +8,7 @@ pub use phase_map::{levels_of_phases, read_for};
 use phasefront::Size;
 pub use views::{AberratedOptics, check_z};
 
-use crate::display::{DisplayFile, lut_of};
+use crate::display::{DisplayFile, lens, lut_of};
 use crate::input::decode::{self, Reading};
 use crate::input::{self, MOST_PICTURE, npy};
 use crate::output::{self, Pending, has_extension};
@@ -99,6 +99,11 @@ impl HologramInfo {
             calibrated: display.calibrated(true),
             ..Self::new(display.target.display.clone())
         }
+    }
+
+    /// Returns whether the picture lies in the focal plane of a lens.
+    pub fn is_in_focal_plane(&self) -> bool {
+        self.calibrated.iter().any(|key| key == lens::PLANE)
     }
 
     /// Returns the PNG text chunk for `levels` with this info.
@@ -197,6 +202,7 @@ impl HologramInfo {
             device,
             lut,
             aberration: None,
+            lens: None,
         })
     }
 }

@@ -7,7 +7,10 @@ export interface NetworkInfo {
   readonly layers: number;
   /** The number of filters in each hidden layer. */
   readonly filters: number;
-  /** The number format that the network computes in. */
+  /**
+   * The number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in the formats
+   * that its file names.
+   */
   readonly precision: string;
   /** The pixel pitch that the network was trained for, in µm. */
   readonly pitchUm: number;

@@ -8,6 +8,7 @@ mod network_models;
 mod reference;
 
 mod encode;
+mod lens;
 mod natural;
 mod network;
 mod optics;

@@ -43,23 +43,66 @@ fn planes_of(name: &str, channels: i64) -> ValueInfoProto {
     }
 }
 
+fn kernel(name: &str, dims: [i64; 4], values: Vec<f32>) -> TensorProto {
+    TensorProto {
+        name: name.into(),
+        data_type: tensor_proto::DataType::Float as i32,
+        dims: dims.to_vec(),
+        float_data: values,
+        ..TensorProto::default()
+    }
+}
+
+fn node(op_type: &str, input: &[&str], output: &str) -> NodeProto {
+    NodeProto {
+        op_type: op_type.into(),
+        name: op_type.to_lowercase(),
+        input: input.iter().map(|name| (*name).into()).collect(),
+        output: vec![output.into()],
+        ..NodeProto::default()
+    }
+}
+
 /// Returns a 1×1 convolution from the planes of `weights`' columns to those of its rows, with `metadata`.
 fn file(weights: &[&[f32]], metadata: &[(&str, &str)]) -> Vec<u8> {
     let (outputs, inputs) = (weights.len() as i64, weights[0].len() as i64);
-    let kernel = TensorProto {
-        name: "kernel".into(),
-        data_type: tensor_proto::DataType::Float as i32,
-        dims: vec![outputs, inputs, 1, 1],
-        float_data: weights.concat(),
-        ..TensorProto::default()
+    let kernels = vec![kernel("kernel", [outputs, inputs, 1, 1], weights.concat())];
+    let nodes = vec![node("Conv", &["frame", "kernel"], "wave")];
+    graph(nodes, kernels, [inputs, outputs], metadata)
+}
+
+/// Returns a U-Net that makes planes four times smaller and larger again, for frames whose sides are multiples of 4.
+fn u_net(metadata: &[(&str, &str)]) -> Vec<u8> {
+    let by_four = |mut node: NodeProto| {
+        for name in ["kernel_shape", "strides"] {
+            node.attribute.push(AttributeProto {
+                name: name.into(),
+                r#type: attribute_proto::AttributeType::Ints as i32,
+                ints: vec![4, 4],
+                ..AttributeProto::default()
+            });
+        }
+        node
     };
-    let node = NodeProto {
-        op_type: "Conv".into(),
-        name: "conv".into(),
-        input: vec!["frame".into(), "kernel".into()],
-        output: vec!["wave".into()],
-        ..NodeProto::default()
-    };
+    let nodes = vec![
+        by_four(node("AveragePool", &["frame"], "small")),
+        by_four(node("ConvTranspose", &["small", "up"], "large")),
+        node("Conv", &["frame", "beside"], "skip"),
+        node("Add", &["large", "skip"], "wave"),
+    ];
+    let kernels = vec![
+        kernel("up", [4, 6, 4, 4], vec![0.01; 384]),
+        kernel("beside", [6, 4, 1, 1], vec![0.2; 24]),
+    ];
+    graph(nodes, kernels, [4, 6], metadata)
+}
+
+fn graph(
+    node: Vec<NodeProto>,
+    initializer: Vec<TensorProto>,
+    [inputs, outputs]: [i64; 2],
+    metadata: &[(&str, &str)],
+) -> Vec<u8> {
     let base = [
         ("pitch_um", "8"),
         ("wavelengths_nm", "638,520,450"),
@@ -85,8 +128,8 @@ fn file(weights: &[&[f32]], metadata: &[(&str, &str)]) -> Vec<u8> {
             name: "own".into(),
             input: vec![planes_of("frame", inputs)],
             output: vec![planes_of("wave", outputs)],
-            node: vec![node],
-            initializer: vec![kernel],
+            node,
+            initializer,
             ..GraphProto::default()
         }),
         ..ModelProto::default()
@@ -252,4 +295,40 @@ fn what_does_not_fit_is_refused() {
             .to_string();
         assert!(why.contains(words) && !why.contains('\n'), "no {words:?} in {why}");
     }
+}
+
+#[test]
+fn a_u_net_that_does_not_say_its_multiple_is_told_the_key() {
+    let metadata = [("output", "real-imaginary"), ("planes", "red,green,blue,depth")];
+    let network = Network::from_onnx(&u_net(&metadata)).unwrap();
+    let why = network.plan(SIZE).err().unwrap().to_string();
+    let right = "multiples of 4; add the metadata 'phasefront.multiple' with the value '4'";
+    assert!(why.contains(right) && !why.contains('\n'), "{why}");
+    let said = [&metadata[..], &[("multiple", "4")]].concat();
+    Network::from_onnx(&u_net(&said)).unwrap().plan(SIZE).unwrap();
+    let wrong = [&metadata[..], &[("multiple", "2")]].concat();
+    let why = Network::from_onnx(&u_net(&wrong))
+        .unwrap()
+        .plan(Size { width: 6, height: 10 });
+    let why = why.err().unwrap().to_string();
+    assert!(!why.contains('\n'), "{why}");
+}
+
+/// Checks the file that tests of the bindings and of the GPU read. With `PHASEFRONT_BLESS`, writes it.
+#[test]
+fn the_own_network_of_other_tests_is_this_one() {
+    let part = |row: usize| -> [f32; 4] {
+        std::array::from_fn(|at| if at == row % 3 { 0.5 + row as f32 * 0.1 } else { 0.05 })
+    };
+    let rows: Vec<[f32; 4]> = (0..6).map(part).collect();
+    let rows: Vec<&[f32]> = rows.iter().map(|row| &row[..]).collect();
+    let made = file(
+        &rows,
+        &[("output", "real-imaginary"), ("planes", "red,green,blue,depth")],
+    );
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../bindings/tests/own-network.onnx");
+    if std::env::var_os("PHASEFRONT_BLESS").is_some() {
+        std::fs::write(path, &made).unwrap();
+    }
+    assert!(std::fs::read(path).unwrap() == made, "{path}");
 }

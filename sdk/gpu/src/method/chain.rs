@@ -623,3 +623,17 @@ impl GpuNetworkPlan {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_network_of_another_form_is_refused_in_one_line() {
+        let own = include_bytes!("../../../../bindings/tests/own-network.onnx");
+        let network = Network::from_onnx(own).map_err(|why| why.to_string());
+        let why = network.map(|network| chain_of(&network).err().map(|why| why.to_string()));
+        let right = "the GPU refuses: a network of another form than a chain runs on the CPU only";
+        assert_eq!(why, Ok(Some(right.to_owned())));
+    }
+}

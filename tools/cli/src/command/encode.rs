@@ -103,7 +103,7 @@ impl Encode {
             ),
             ..encoding.of(field, stage)
         };
-        self.outputs.finish(&self.output, &display, &made, None, json)
+        self.outputs.finish(&self.output, &display, &made, None, None, json)
     }
 
     /// Returns what the `.json` beside the field says, as `--complex` writes it for a field at the modulator.

@@ -31,7 +31,7 @@ pub(crate) struct Pack {
 
 impl Pack {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        let display = self.display.read()?;
+        let display = self.display.read_with_lens()?;
         match &self.colour {
             None => packed::declare(&self.output, &display)?,
             Some(_) => output::file(&self.output, &["png"])?,
@@ -117,7 +117,7 @@ pub(crate) struct Unpack {
 impl Unpack {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         output::file(&self.output, &["png"])?;
-        let display = self.display.read()?;
+        let display = self.display.read_with_lens()?;
         let modulator = &display.target.display;
         let size = self.size.unwrap_or(modulator.size());
         let images = self.frames.iter().map(|path| packed::Image::read(path));

@@ -72,7 +72,7 @@ impl Pattern {
         | Pattern::Lens { to, .. }
         | Pattern::Vortex { to, .. }) = &self;
         output::file(&to.output, &["png"])?;
-        let file = to.display.read()?;
+        let file = to.display.read_with_lens()?;
         let display = &file.target.display;
         self.check(display)?;
         let size @ Size { width, height } = display.size();

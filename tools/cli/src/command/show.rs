@@ -62,7 +62,7 @@ impl Show {
     }
 
     fn images(&self) -> Result<Vec<packed::Image>> {
-        let display = self.display.read_if_given()?;
+        let display = self.display.read_if_given_with_lens()?;
         let paths = self.frames.iter().map(|path| images_of(path));
         let mut images = Vec::new();
         for path in paths.collect::<Result<Vec<_>>>()?.concat() {

@@ -188,7 +188,7 @@ impl View {
         let (image, shown_depth) = self.request.image(&file)?;
         self.request.keeps_field = true;
         let made = self.request.make(&file, &image)?;
-        let judged = judge(&file, &made)?;
+        let judged = judge(&file, &made, image.picture())?;
         let (levels, field) = infos(&file, &made);
         let z_m = self.z_m(&file.target.display, STILL_VIEWS);
         let bar = progress_bar(2 * z_m.len() as u64, "views");
@@ -213,7 +213,10 @@ impl View {
             .map_or("hologram".into(), |path| self.title(path));
         let phase = Some(Phase::new(made.levels.upper(file.target.display.bits()).view())?);
         let shown = made.hologram(levels);
-        let wave = Hologram::Complex(made.field.expect("kept for this"), field);
+        let field = match made.field {
+            Some(values) => views(&Hologram::Complex(values, field), &file, &z_m, &bar)?,
+            None => Vec::new(),
+        };
         let parts = Parts {
             title,
             phase,
@@ -223,7 +226,7 @@ impl View {
             }),
             size: shown.size(),
             shown: vec![views(&shown, &file, &z_m, &bar)?],
-            field: views(&wave, &file, &z_m, &bar)?,
+            field,
             z_m,
             figures,
         };
@@ -232,14 +235,14 @@ impl View {
 
     /// Returns the display that a hologram file was made for.
     fn display_of(&self, info: &HologramInfo) -> Result<DisplayFile> {
-        match self.request.hologram.display.read_if_given()? {
+        match self.request.hologram.display.read_if_given_with_lens()? {
             Some(display) => Ok(display),
             None => info.display_file(),
         }
     }
 
     fn of_hologram(&self, path: &Path) -> Result<Parts> {
-        let given = self.request.hologram.display.read_if_given()?;
+        let given = self.request.hologram.display.read_if_given_with_lens()?;
         let hologram = hologram::read_for(path, given.as_ref())?;
         let file = given.map_or_else(|| hologram.info().display_file(), Ok)?;
         let z_m = self.z_m(&hologram.info().display, STILL_VIEWS);
@@ -364,7 +367,10 @@ fn figures(info: &HologramInfo, Size { width, height }: Size) -> Vec<(String, St
         ("Volume", format!("{:.2} mm deep", display.volume_depth_m() * 1e3)),
         (
             "Modulator",
-            format!("{:+.2} mm from the middle of the volume", display.offset_m() * 1e3),
+            match info.is_in_focal_plane() {
+                true => "in the front focal plane of a lens, the picture in the back one".into(),
+                false => format!("{:+.2} mm from the middle of the volume", display.offset_m() * 1e3),
+            },
         ),
     ];
     if let Some(encoder) = &info.encoder {
@@ -378,18 +384,23 @@ fn figures(info: &HologramInfo, Size { width, height }: Size) -> Vec<(String, St
 
 fn judged_figures(judged: &Judged) -> Vec<(String, String)> {
     let near = |psnr: f64, ssim: f64| format!("{psnr:.2} dB, SSIM {ssim:.3}");
-    vec![
-        (
-            "Shown against the field, at the middle".into(),
+    let mut figures = match &judged.stack {
+        Some(stack) => vec![
+            (
+                "Shown against the field, at the middle".into(),
+                near(judged.psnr_db, judged.ssim),
+            ),
+            (
+                "Shown against the field, over depths".into(),
+                near(stack.psnr_db, stack.ssim),
+            ),
+        ],
+        None => vec![(
+            "Shown against the picture, in focus".into(),
             near(judged.psnr_db, judged.ssim),
-        ),
-        (
-            "Shown against the field, over depths".into(),
-            near(judged.stack_psnr_db, judged.stack_ssim),
-        ),
-        (
-            "Brightness shown".into(),
-            format!("{:.2} of the field\'s", judged.brightness),
-        ),
-    ]
+        )],
+    };
+    let of = if judged.stack.is_some() { "field" } else { "picture" };
+    figures.extend((judged.brightness).map(|shown| ("Brightness shown".into(), format!("{shown:.2} of the {of}\'s"))));
+    figures
 }

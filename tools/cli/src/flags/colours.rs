@@ -58,6 +58,14 @@ impl ColourFlags {
         }
     }
 
+    /// Works like [`Self::display`] for a command that also supports the focal plane of a lens.
+    pub(crate) fn display_with_lens(self, flags: &DisplayFlags) -> Result<DisplayFile> {
+        match self.rgb_encoding {
+            EncodingName::Amplitude => flags.read_with_lens(),
+            _ => flags.read_for_colours_with_lens(),
+        }
+    }
+
     /// Returns an encoding whose views are those of the pictures: light in sRGB, or amplitudes.
     pub(crate) fn viewed(self) -> RgbEncoding {
         self.asked().unwrap_or(RgbEncoding::Srgb)

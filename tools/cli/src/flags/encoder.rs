@@ -57,7 +57,18 @@ pub(crate) struct Encoder {
 }
 
 impl Encoder {
+    /// Returns the encoder that shows phases as they are.
+    pub(crate) fn of_phases() -> Self {
+        Encoder {
+            options: Encoding::Phase.into(),
+            name: "phase",
+        }
+    }
+
     pub(crate) fn describe(&self) -> String {
+        if matches!(self.options.encoding, Encoding::Phase) {
+            return self.name.to_owned();
+        }
         let EncoderOptions {
             dark_threshold,
             local_steps,
@@ -153,7 +164,12 @@ impl EncoderFlags {
 
     /// Makes the encoder for a network that gives the modulator's phases, which are shown as they are.
     fn phases(&self) -> Result<Encoder> {
-        let with = "a network that gives a wave; this one gives the modulator's phases";
+        self.unused("a network that gives a wave; this one gives the modulator's phases")?;
+        Ok(Encoder::of_phases())
+    }
+
+    /// Refuses all of these flags. They go `with` something else.
+    pub(crate) fn unused(&self, with: &str) -> Result<()> {
         check_used(&[
             ("--encoder", self.encoder.is_some(), false, with),
             ("--prefilter", self.prefilter.is_some(), false, with),
@@ -161,11 +177,7 @@ impl EncoderFlags {
             ("--local-steps", self.local_steps.is_some(), false, with),
             ("--midpoint-steps", self.midpoint_steps > 0, false, with),
             ("--focus natural", self.is_natural(), false, with),
-        ])?;
-        Ok(Encoder {
-            options: Encoding::Phase.into(),
-            name: "phase",
-        })
+        ])
     }
 
     /// Checks whether --encoder deep is given.

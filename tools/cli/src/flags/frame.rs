@@ -313,6 +313,11 @@ impl FrameFlags {
         Ok((frame.decoded(encoding, display), distances))
     }
 
+    /// Shows the whole picture as large as the modulator if the command line does not place it.
+    pub(crate) fn contain_by_default(&mut self) {
+        self.fit.get_or_insert(FitName::Contain);
+    }
+
     fn placement(&self, picture: Size, display: &Display) -> Placement {
         let modulator = display.size();
         let is_larger = picture.width > modulator.width && picture.height > modulator.height;

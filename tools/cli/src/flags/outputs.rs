@@ -1,14 +1,15 @@
 //! The files that are made of a hologram beside its levels.
 
 use crate::flags::frame::{shown_json, shown_text};
+use crate::limits::share_of_light;
 use crate::make::{HologramResult, Judged, infos, judge};
 use clap::Args;
-use phasefront::Encoding;
+use phasefront::{Encoding, RgbdFrame};
 use phasefront_command::terminal;
-use phasefront_io::Result;
 use phasefront_io::display::DisplayFile;
 use phasefront_io::frame::ShownDepth;
 use phasefront_io::hologram::{self, packed};
+use phasefront_io::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -20,7 +21,8 @@ pub(crate) struct OutputFlags {
     /// Also write the complex field at the modulator, with a .json beside it
     #[arg(long, value_name = "FILE.npy")]
     complex: Option<PathBuf>,
-    /// Compare the displayed image with the hologram's own wave, at the midpoint and over a stack of depths
+    /// Compare the displayed image with the hologram's own wave, at the midpoint and over a stack of depths; in the
+    /// focal plane of a lens with the picture, in focus
     #[arg(long)]
     judge: bool,
     /// Also write what the modulator's input takes: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
@@ -30,6 +32,8 @@ pub(crate) struct OutputFlags {
 
 /// What is reported of a hologram beside its levels.
 struct Reported<'a> {
+    /// The share of the panel's light that is in the picture, if it is known.
+    light: Option<f64>,
     /// The files of --packed.
     packed: &'a [PathBuf],
     /// The distances that depth shows.
@@ -46,24 +50,33 @@ impl OutputFlags {
     /// Declares the files.
     pub(crate) fn declare(&self, display: &DisplayFile) -> Result<()> {
         if let Some(path) = &self.complex {
+            if display.lens.is_some() {
+                return Err(Error::Input(
+                    "--complex is for pictures about the modulator; in the focal plane of a lens phases are searched, and there is no field"
+                        .into(),
+                ));
+            }
             hologram::declare_complex(path)?;
         }
         self.packed.iter().try_for_each(|path| packed::declare(path, display))
     }
 
-    /// Writes the levels of `made` to `output`, and the other files, and reports them and the distances that depth
-    /// shows.
+    /// Writes the levels of `made`, which is that of `picture`, to `output`, and the other files, and reports them and
+    /// the distances that depth shows.
     pub(crate) fn finish(
         &self,
         output: &Path,
         display: &DisplayFile,
         made: &HologramResult,
+        picture: Option<&RgbdFrame>,
         depth: Option<ShownDepth>,
         json: bool,
     ) -> Result<()> {
         let packed = self.write(output, display, made)?;
-        let judged = self.judge.then(|| judge(display, made)).transpose()?;
+        let judged = self.judge.then(|| judge(display, made, picture)).transpose()?;
+        let light = picture.map(|picture| share_of_light(picture.rgb().iter().copied(), made.scale));
         let reported = Reported {
+            light,
             packed: &packed,
             depth,
             judged: judged.as_ref(),
@@ -94,7 +107,12 @@ impl OutputFlags {
     }
 
     fn report(&self, output: &Path, made: &HologramResult, reported: Reported<'_>, json: bool) {
-        let Reported { packed, depth, judged } = reported;
+        let Reported {
+            light,
+            packed,
+            depth,
+            judged,
+        } = reported;
         let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
         let stages: serde_json::Map<_, _> = (made.stages.iter())
             .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
@@ -111,14 +129,18 @@ impl OutputFlags {
                 "width": width, "height": height,
                 "method": made.method, "encoder": made.encoder.name, "dark_threshold": made.encoder.options.dark_threshold,
                 "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
-                "stage_ms": stages, "total_ms": ms(&total), "depth": shown_json(depth), "shown": judged,
+                "light": light, "stage_ms": stages, "total_ms": ms(&total), "depth": shown_json(depth), "shown": judged,
             }),
             format!(
-                "{}: {width}×{height} by {}; {}: {}{}{}",
+                "{}: {width}×{height} by {}; {}: {}{}{}{}",
                 terminal::name(output),
                 made.method,
                 made.encoder.describe(),
                 list.join(", "),
+                light.map_or(String::new(), |share| format!(
+                    "; {:.0} % of the light is in the picture",
+                    100.0 * share
+                )),
                 shown_text(depth),
                 judged.map_or(String::new(), Judged::describe)
             ),

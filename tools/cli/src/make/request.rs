@@ -29,12 +29,17 @@ pub(crate) struct ImageFlags {
 }
 
 impl ImageFlags {
-    /// Reads the display on which the image is shown. A layered depth image has amplitudes, no colours.
-    pub(crate) fn display(&self, flags: &DisplayFlags) -> Result<DisplayFile> {
-        match self.ldi {
-            Some(_) => flags.read(),
-            None => self.frame.colours.display(flags),
+    /// Reads the display on which the image is shown. A layered depth image has amplitudes, no colours. In the focal
+    /// plane of a lens the image is as large as the modulator.
+    pub(crate) fn display(&mut self, flags: &DisplayFlags) -> Result<DisplayFile> {
+        if self.ldi.is_some() {
+            return flags.read();
         }
+        let file = self.frame.colours.display_with_lens(flags)?;
+        if file.lens.is_some() {
+            self.frame.contain_by_default();
+        }
+        Ok(file)
     }
 
     /// Returns the file of the image.
@@ -128,6 +133,16 @@ pub(crate) enum Image {
     Layers(Ldi),
 }
 
+impl Image {
+    /// Returns the RGB-D image, if it is one.
+    pub(crate) fn picture(&self) -> Option<&RgbdFrame> {
+        match self {
+            Image::Rgbd(frame) => Some(frame),
+            Image::Layers(_) => None,
+        }
+    }
+}
+
 impl HologramRequest {
     /// Returns how views of the holograms of `image` become pictures. Layered depth images have amplitudes.
     pub(crate) fn view_colours(&self, display: &phasefront::Display, image: &Image) -> ViewColours {
@@ -138,7 +153,7 @@ impl HologramRequest {
     }
 
     /// Reads the display on which the image is shown.
-    pub(crate) fn display(&self) -> Result<DisplayFile> {
+    pub(crate) fn display(&mut self) -> Result<DisplayFile> {
         self.image.display(&self.hologram.display)
     }
 

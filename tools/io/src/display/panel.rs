@@ -65,6 +65,11 @@ pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
 }
 
 impl PanelToml {
+    /// Takes `carrier_rad` if the file sets no carrier.
+    pub(crate) fn carry_by_default(&mut self, carrier_rad: [f64; 2]) {
+        self.carrier_mrad.get_or_insert(carrier_rad.map(|angle| angle * 1e3));
+    }
+
     /// Applies the settings from the file at `path` to `target`.
     pub(crate) fn onto(self, path: &Path, target: &mut Target) -> Result<()> {
         let panel = &mut target.panel;

@@ -4,11 +4,12 @@ use crate::display::DisplayFile;
 use crate::display::calibration::AberrationFile;
 use crate::hologram::{Hologram, HologramInfo};
 use crate::{Error, Result};
-use ndarray::Array3;
+use ndarray::{Array3, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::Size;
 use phasefront::target::Aberration;
+use phasefront_core::display::lens::{Lens, LensPlan};
 use phasefront_core::optics::aperture::Opening;
 use phasefront_core::optics::asm::Propagator;
 use phasefront_core::view::refocus::{Refocus, shown_field};
@@ -91,12 +92,30 @@ impl Hologram {
             .filter_map(|(differs, theirs, ours)| differs.then_some((theirs, ours)))
             .unzip();
         if theirs.is_empty() {
-            return Ok(());
+            return self.check_plane(file);
         }
         Err(Error::Input(format!(
             "the hologram is for {}, the display has {}; make it with this --display, or give the display and the --offset-mm that it was made for",
             theirs.join(", "),
             ours.join(", ")
+        )))
+    }
+
+    /// Checks that the hologram's picture lies in the focal plane of a lens if that of the display of `file` does.
+    fn check_plane(&self, file: &DisplayFile) -> Result<()> {
+        let plane = |is_fourier: bool| match is_fourier {
+            true => "in the focal plane of a lens",
+            false => "about the modulator",
+        };
+        let theirs = self.info().is_in_focal_plane();
+        let ours = file.lens.is_some();
+        if theirs == ours {
+            return Ok(());
+        }
+        Err(Error::Input(format!(
+            "the hologram's picture lies {}, that of the display {}; give the display that it was made for, or make it with this --display",
+            plane(theirs),
+            plane(ours)
         )))
     }
 
@@ -121,6 +140,9 @@ impl Hologram {
         let info = self.info();
         self.check_display(file)?;
         z_m.iter().try_for_each(|z| check_z(&info.display, *z))?;
+        if let Some(lens) = &file.lens {
+            return self.views_in_focal_plane(file, lens, z_m);
+        }
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             Hologram::Levels(levels, _) => {
@@ -149,6 +171,36 @@ impl Hologram {
                     .expect("a view of the hologram's shape")
             })
             .collect())
+    }
+
+    /// Computes the amplitudes, (C, H, W), at each of `z_m` from the focal plane of `lens`.
+    fn views_in_focal_plane(&self, file: &DisplayFile, lens: &Lens, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
+        let Hologram::Levels(levels, info) = self else {
+            return Err(Error::Input(
+                "a complex field has no view in the focal plane of a lens; give levels".into(),
+            ));
+        };
+        let display = &file.target.display;
+        if self.size() != display.size() {
+            return Err(Error::Input(format!(
+                "the hologram is {}, the modulator {}; for the focal plane of a lens both must be of one size",
+                self.size(),
+                display.size()
+            )));
+        }
+        let light = shown_field(levels.view(), info.scale.unwrap_or(1.0), &file.target, self.size())?;
+        let light = Array3::from_shape_vec(levels.dim(), light).expect("a value for each level");
+        let mut views = vec![Array3::zeros(light.dim()); z_m.len()];
+        for (colour, light) in light.outer_iter().enumerate() {
+            let plan = LensPlan::new(lens, display, colour);
+            for (view, z_m) in views.iter_mut().zip(z_m) {
+                let mut plane = light.to_owned();
+                plan.to_picture(plane.as_slice_mut().expect("standard layout"), *z_m);
+                view.index_axis_mut(Axis(0), colour)
+                    .assign(&plane.mapv(|value| value.norm()));
+            }
+        }
+        Ok(views)
     }
 }
 

@@ -18,6 +18,9 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::infer::Factoid;
 use tract_onnx::tract_hir::internal::DimLike;
 
+/// The numbers of halvings of a U-Net that [`OwnNetwork::missing_multiple`] tries.
+const HALVINGS: std::ops::RangeInclusive<u32> = 1..=7;
+
 /// A graph and what its metadata says of it.
 pub(super) struct OwnNetwork {
     model: InferenceModel,
@@ -122,13 +125,12 @@ impl OwnNetwork {
                 )));
             }
         }
-        let facts = self.inputs.iter().map(|input| {
-            let shape = [1, input.channels, padded.height, padded.width];
-            InferenceFact::dt_shape(input.kind, shape)
-        });
-        let outputs = self.model.outputs.len();
-        let model = graph::plan(self.model.clone(), facts.collect(), outputs)?;
-        let planes = flat(caught(|| output_planes(&model, padded)))?;
+        let (model, planes) = self.model_for(padded).map_err(|why| match self.missing_multiple() {
+            Some(n) => Error::Network(format!(
+                "it does not run frames of {size}, but those whose sides are multiples of {n}; add the metadata 'phasefront.multiple' with the value '{n}'"
+            )),
+            None => why,
+        })?;
         let (needed, why) = self.contract.output.needs(self.contract.colours);
         if planes != needed {
             return Err(Error::Network(format!(
@@ -142,6 +144,36 @@ impl OwnNetwork {
             inputs: self.inputs.clone(),
             size,
             padded,
+        })
+    }
+}
+
+impl OwnNetwork {
+    /// Plans the graph for planes of `size`, and returns the number of planes that it gives.
+    fn model_for(&self, size: Size) -> Result<(Arc<TypedRunnableModel>, usize)> {
+        let facts = self.inputs.iter().map(|input| {
+            let shape = [1, input.channels, size.height, size.width];
+            InferenceFact::dt_shape(input.kind, shape)
+        });
+        let outputs = self.model.outputs.len();
+        let model = graph::plan(self.model.clone(), facts.collect(), outputs)?;
+        let planes = flat(caught(|| output_planes(&model, size)))?;
+        Ok((model, planes))
+    }
+
+    /// Returns the power of two that sides must be multiples of, if the file does not say one and one helps. Odd
+    /// multiples of it are tried, which no smaller number would do for.
+    fn missing_multiple(&self) -> Option<usize> {
+        let is_open = |input: &Input| input.fixed == [None; 2];
+        if self.contract.multiple > 1 || !self.inputs.iter().all(is_open) {
+            return None;
+        }
+        HALVINGS.map(|halvings| 1 << halvings).find(|n| {
+            let odd = Size {
+                width: 5 * n,
+                height: 3 * n,
+            };
+            self.model_for(odd).is_ok()
         })
     }
 }
