@@ -3,6 +3,7 @@
 mod command;
 mod flags;
 mod given;
+mod limits;
 mod make;
 mod record;
 

@@ -1,8 +1,8 @@
 //! Phases whose picture lies in the focal plane of a lens ([`crate::display::lens`]), by alternating projections
 //! (Gerchberg and Saxton, 1972).
 //!
-//! Let T_z be the way of the light to the picture at z, A the amplitudes of the frame over the scale, and M_z the pixels
-//! whose surface lies at z. A step takes one plane after another:
+//! Let T_z be the way of the light to the picture at z, A the amplitudes of the frame over the scale, and M_z the
+//! pixels whose surface lies at z. A step takes one plane after another:
 //!
 //!   U = T_z·u,  u ← u + γ·T_zᴴ·M_z·(A − |U|)·U/|U|,  u ← u/|u|.
 //!

@@ -1,12 +1,14 @@
 //! `phasefront devices`: lists the modulators that are known by name, or describes one with all that its file sets.
 
+use crate::limits::{Limits, share_of_light};
 use clap::Args;
-use phasefront::Display;
 use phasefront::output::Layout;
 use phasefront::output::{ModulatorSpec, Packing};
+use phasefront::{Display, Size};
 use phasefront_command::terminal;
+use phasefront_core::display::lens::Lens;
 use phasefront_io::display::DisplayFile;
-use phasefront_io::{Result, display};
+use phasefront_io::{Error, Result, display};
 use serde_json::json;
 use std::path::Path;
 
@@ -16,13 +18,23 @@ pub(crate) struct Devices {
     /// Name or file of a modulator to describe, with all that its file sets and the sources of its figures
     #[arg(value_name = "NAME|FILE")]
     device: Option<String>,
+    /// Also tell what is left of details at this z, mm from the middle of the volume, positive toward the viewer
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, requires = "device")]
+    z_mm: Option<f64>,
 }
 
 impl Devices {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if let Some(name) = &self.device {
             let file = display::find_display(name)?;
-            terminal::print(json, &object_of_file(name, &file), describe(&file));
+            if self.z_mm.is_some() && file.lens.is_some() {
+                return Err(Error::Input(
+                    "--z-mm is for pictures about the modulator, and this display's lies in the focal plane of a lens"
+                        .into(),
+                ));
+            }
+            let value = object_of_file(name, &file, self.z_mm);
+            terminal::print(json, &value, describe(&file, self.z_mm));
             return Ok(());
         }
         let own: Vec<String> = (display::own_devices().iter())
@@ -96,65 +108,125 @@ fn calibrated(file: &DisplayFile) -> Vec<&'static str> {
         .collect()
 }
 
-/// What a display can show at most, by its geometry.
-struct Limits {
-    /// The size of the finest detail that the aperture passes, half a period, in µm.
-    detail_um: f64,
-    /// The largest angle of each laser's light, in degrees.
-    angle_deg: Vec<f64>,
-    /// The distance from the modulator up to which the middle of the frame has the finest detail, in mm. Farther away,
-    /// light of the largest angle comes from beyond the panel's edge.
-    reach_mm: f64,
-}
+/// The scale that gives pictures more light, of which the documents have the cost in quality.
+const BRIGHTER: f32 = 0.7;
 
-impl Limits {
-    fn of(display: &Display) -> Self {
-        let finest_m = display.pitch_m() / display.aperture_radius();
-        let angle = |wavelength_m: &f64| (wavelength_m / (2.0 * finest_m)).min(1.0).asin();
-        let size = display.size();
-        let half_m = size.width.min(size.height) as f64 * display.pitch_m() / 2.0;
-        Limits {
-            detail_um: finest_m * 1e6,
-            angle_deg: display.wavelengths_m().iter().map(|l| angle(l).to_degrees()).collect(),
-            reach_mm: half_m / angle(&display.longest_wavelength_m()).tan() * 1e3,
-        }
+/// Describes what `display` can show at most, and at `z_mm` if it is given.
+fn describe_limits(display: &Display, z_mm: Option<f64>) -> String {
+    let limits = Limits::of(display);
+    let angles: Vec<_> = (limits.angle_rad.iter())
+        .map(|angle| format!("{:.2}", angle.to_degrees()))
+        .collect();
+    let mut text = format!("\n{:12} {:.1} um", "detail", limits.detail_m * 1e6);
+    text += &format!("\n{:12} {}° to each side", "angle", angles.join(", "));
+    let Size { width, height } = display.size();
+    let side_mm = |pixels: usize| pixels as f64 * display.pitch_m() * 1e3;
+    text += &format!("\n{:12} {:.1} x {:.1} mm", "size", side_mm(width), side_mm(height));
+    text += &format!(
+        "\n{:12} {:.0} mm from the modulator with this detail",
+        "reach",
+        limits.reach_m * 1e3
+    );
+    let [least_mm, most_mm] = limits.range_m().map(|z_m| z_m * 1e3);
+    text += &format!(", from z = {least_mm:.1} to {most_mm:.1} mm");
+    let farthest_m = limits.farthest_m(display);
+    if let Some(lost) = limits.lost_at(farthest_m) {
+        text += &format!("\n{:12} z = {:.1} mm: {lost}", "too far", farthest_m * 1e3);
     }
-
-    fn describe(&self, display: &Display) -> String {
-        let angles: Vec<_> = self.angle_deg.iter().map(|angle| format!("{angle:.2}")).collect();
-        let mut text = format!("\n{:12} {:.1} um", "detail", self.detail_um);
-        text += &format!("\n{:12} {}° to each side", "angle", angles.join(", "));
+    let [even, brighter] = [1.0, BRIGHTER].map(|scale| 100.0 * share_of_light(even_amplitudes(), scale));
+    text += &format!(
+        "\n{:12} {even:.0} % in a picture whose amplitudes spread evenly from 0 to 1; {brighter:.0} % with --scale {BRIGHTER}, which clips brighter ones",
+        "light"
+    );
+    if let Some(z_mm) = z_mm {
+        let [width_m, height_m] = limits.sharp_part_m(z_mm / 1e3);
         text += &format!(
-            "\n{:12} {:.0} mm from the modulator with this detail",
-            "reach", self.reach_mm
+            "\n{:12} {:.1} um in the middle, and {:.1} um in the middle {:.1} x {:.1} mm",
+            format!("z = {z_mm} mm"),
+            limits.detail_at_m(z_mm / 1e3) * 1e6,
+            limits.detail_m * 1e6,
+            width_m * 1e3,
+            height_m * 1e3
         );
-        let farthest_mm = (display.offset_m().abs() + display.volume_depth_m() / 2.0) * 1e3;
-        if farthest_mm > self.reach_mm {
-            text += &format!("; the volume reaches {farthest_mm:.0} mm and is coarser there");
+        let half_mm = display.volume_depth_m() * 500.0;
+        if z_mm.abs() > half_mm {
+            text += &format!("; outside the volume, from {:.1} to {half_mm:.1} mm", -half_mm);
         }
-        text
     }
+    text
 }
 
-fn describe(file: &DisplayFile) -> String {
+/// Returns amplitudes that spread evenly from 0 to 1.
+fn even_amplitudes() -> impl Iterator<Item = f32> {
+    (0..1000).map(|step| (step as f32 + 0.5) / 1000.0)
+}
+
+/// Describes where the picture lies in the focal plane of `lens`.
+fn describe_lens(lens: &Lens, display: &Display) -> String {
+    let (Size { width, height }, pixel_m) = (display.size(), lens.pixel_m());
+    let fields_m = || display.wavelengths_m().iter().map(|l| lens.field_m(*l, display));
+    let fields: Vec<_> = fields_m().map(|field_m| format!("{:.1}", field_m * 1e3)).collect();
+    let details = fields_m().map(|field_m| (field_m / width as f64 * 1e6, field_m / height as f64 * 1e6));
+    let details: Vec<_> = details.map(|(x, y)| format!("{x:.1} x {y:.1}")).collect();
+    let places = [("left of", "right of"), ("above", "below")]
+        .into_iter()
+        .zip(lens.centre_m());
+    let places = places
+        .filter(|(_, centre_m)| *centre_m != 0.0)
+        .map(|((less, more), centre_m)| {
+            // The middle of the picture lies at the centre, so that the zero order lies the other way.
+            let way = if centre_m > 0.0 { less } else { more };
+            format!("{:.1} mm {way}", centre_m.abs() * 1e3)
+        });
+    let places: Vec<_> = places.collect();
+    let zero_order = match places.is_empty() {
+        true => "in the middle of the picture: block it, or move the picture by carrier_mrad".to_owned(),
+        false => format!("{} the middle of the picture", places.join(" and ")),
+    };
+    let mut text = format!(
+        "\n{:12} {:.1} x {:.1} mm in the focal plane of a lens of {} mm, pixels of {:.1} um",
+        "picture",
+        width as f64 * pixel_m * 1e3,
+        height as f64 * pixel_m * 1e3,
+        rounded(lens.focal_m() * 1e3),
+        pixel_m * 1e6
+    );
+    text += &format!(
+        "\n{:12} {} mm for each laser, around the zero order",
+        "field",
+        fields.join(", ")
+    );
+    text += &format!("\n{:12} {} um", "detail", details.join(", "));
+    text + &format!("\n{:12} {zero_order}", "zero order")
+}
+
+fn describe(file: &DisplayFile, z_mm: Option<f64>) -> String {
     let (device, display) = (&file.device, &file.target.display);
     let lasers: Vec<_> = (display.wavelengths_m().iter())
         .map(|wavelength| format!("{:.0}", wavelength * 1e9))
         .collect();
     let mut text = row(&device.name, device);
     text += &format!("\n{:12} {} nm", "lasers", lasers.join(", "));
-    text += &format!(
-        "\n{:12} {} mm deep, its middle {} mm from the modulator",
-        "volume",
-        rounded(display.volume_depth_m() * 1e3),
-        rounded(display.offset_m() * 1e3),
-    );
-    text += &format!(
-        "\n{:12} {} of the Nyquist frequency",
-        "aperture",
-        rounded(display.aperture_radius())
-    );
-    text += &Limits::of(display).describe(display);
+    let volume_mm = rounded(display.volume_depth_m() * 1e3);
+    match &file.lens {
+        Some(lens) => {
+            text += &format!("\n{:12} {volume_mm} mm deep, its middle in the focal plane", "volume");
+            text += &describe_lens(lens, display);
+        }
+        None => {
+            text += &format!(
+                "\n{:12} {volume_mm} mm deep, its middle {} mm from the modulator",
+                "volume",
+                rounded(display.offset_m() * 1e3),
+            );
+            text += &format!(
+                "\n{:12} {} of the Nyquist frequency",
+                "aperture",
+                rounded(display.aperture_radius())
+            );
+            text += &describe_limits(display, z_mm);
+        }
+    }
     if let Some(turns) = device.levels_turns.as_ref().and_then(|turns| turns.last()) {
         text += &format!("\n{:12} {} turns at the last level", "range", rounded(*turns));
     }
@@ -200,7 +272,7 @@ fn object(name: &str, device: &ModulatorSpec) -> serde_json::Value {
 }
 
 /// Returns [`object`] with what only a file sets.
-fn object_of_file(name: &str, file: &DisplayFile) -> serde_json::Value {
+fn object_of_file(name: &str, file: &DisplayFile, z_mm: Option<f64>) -> serde_json::Value {
     let display = &file.target.display;
     let mut told = object(name, &file.device);
     told["wavelengths_nm"] = (display.wavelengths_m().iter())
@@ -209,10 +281,31 @@ fn object_of_file(name: &str, file: &DisplayFile) -> serde_json::Value {
     told["volume_mm"] = rounded(display.volume_depth_m() * 1e3).into();
     told["offset_mm"] = rounded(display.offset_m() * 1e3).into();
     told["aperture"] = display.aperture_radius().into();
-    let limits = Limits::of(display);
-    told["detail_um"] = rounded(limits.detail_um).into();
-    told["angle_deg"] = limits.angle_deg.into_iter().map(rounded).collect();
-    told["reach_mm"] = rounded(limits.reach_mm).into();
     told["calibrated"] = calibrated(file).into();
+    if let Some(lens) = &file.lens {
+        told["focal_mm"] = rounded(lens.focal_m() * 1e3).into();
+        told["picture_pixel_um"] = rounded(lens.pixel_m() * 1e6).into();
+        told["picture_middle_mm"] = lens.centre_m().map(|centre_m| rounded(centre_m * 1e3)).to_vec().into();
+        let fields = display
+            .wavelengths_m()
+            .iter()
+            .map(|l| rounded(lens.field_m(*l, display) * 1e3));
+        told["field_mm"] = fields.collect();
+        return told;
+    }
+    let limits = Limits::of(display);
+    told["detail_um"] = rounded(limits.detail_m * 1e6).into();
+    told["angle_deg"] = (limits.angle_rad.iter())
+        .map(|angle| rounded(angle.to_degrees()))
+        .collect();
+    told["reach_mm"] = rounded(limits.reach_m * 1e3).into();
+    told["range_mm"] = limits.range_m().map(|z_m| rounded(z_m * 1e3)).to_vec().into();
+    let [even, brighter] = [1.0, BRIGHTER].map(|scale| rounded(share_of_light(even_amplitudes(), scale)));
+    told["light"] = json!({"even": even, "even_scale_0.7": brighter});
+    if let Some(z_mm) = z_mm {
+        let part_mm = limits.sharp_part_m(z_mm / 1e3).map(|side_m| rounded(side_m * 1e3));
+        told["at_z"] =
+            json!({"z_mm": z_mm, "detail_um": rounded(limits.detail_at_m(z_mm / 1e3) * 1e6), "sharp_mm": part_mm});
+    }
     told
 }

@@ -5,6 +5,7 @@ mod stills;
 use crate::flags::frame::Picture;
 use crate::flags::outputs::OutputFlags;
 use crate::given::{self, Flag};
+use crate::limits;
 use crate::make::HologramRequest;
 use crate::record::{Before, RunRecord};
 use clap::Args;
@@ -61,7 +62,12 @@ impl Hologram {
         self.request.keeps_field = self.outputs.need_field();
         let (image, shown) = self.request.image(&display)?;
         let made = self.request.make(&display, &image)?;
-        self.outputs.finish(&self.output, &display, &made, shown, json)
+        self.outputs
+            .finish(&self.output, &display, &made, image.picture(), shown, json)?;
+        if display.lens.is_none() {
+            limits::warn_of_volume(&display.target.display);
+        }
+        Ok(())
     }
 
     fn stills(self, json: bool, pictures: Vec<Picture>, flags: &[Flag]) -> Result<()> {

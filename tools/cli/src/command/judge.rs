@@ -1,11 +1,13 @@
-//! `phasefront judge`: compares methods and encoders on an image and a display.
+//! `phasefront judge`: compares methods, encoders and holograms of files on an image and a display.
+
+mod focal_plane;
 
 use crate::flags::colours::ColourFlags;
 use crate::flags::encoder::{EncoderFlags, FocusName};
 use crate::flags::frame::{shown_json, shown_text};
 use crate::flags::method::{CoreMethod, HologramFlags};
 use crate::make::{HologramRequest, HologramResult, Image, ImageFlags, Method, infos};
-use clap::Args;
+use clap::{Args, ValueHint};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::EncoderOptions;
@@ -19,25 +21,30 @@ use phasefront_core::view::colours::ViewColours;
 use phasefront_exact::incoherent::{self, Natural, Pupil};
 use phasefront_exact::truth::{self, Figures};
 use phasefront_io::display::DisplayFile;
-use phasefront_io::hologram::{Hologram, HologramInfo};
+use phasefront_io::hologram::{self, Hologram, HologramInfo};
 use phasefront_io::ldi::Ldi;
 use phasefront_io::picture::difference;
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Compare methods and encoders on an image and a display: quality of the displayed image, and time
+/// Compare methods, encoders and holograms of files on an image and a display: quality of the displayed image, and time
 ///
 /// There are two references. The first is coherent: for a layered depth image its exact wave. An RGB-D image has no
 /// exact wave. If its depth is clean, the reference is the exact wave of what is visible and of the hidden surfaces
 /// that the sweep finds; otherwise it is the wave of the largest network. The answer names the reference. The second is
-/// natural: what incoherent light, as in the world, shows of the same surfaces through the display's aperture.
+/// natural: what incoherent light, as in the world, shows of the same surfaces through the display's aperture. In the
+/// focal plane of a lens the reference is the picture, in focus.
 #[derive(Args)]
 #[command(mut_arg("ldi", |ldi| ldi.help("Folder of a layered depth image")))]
 pub(crate) struct Judge {
     #[command(flatten)]
     image: ImageFlags,
+    /// A hologram of this image to judge too: a PNG of levels, or a phase map of other software, as `refocus` takes
+    /// them; repeat the flag for several
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Input")]
+    hologram: Vec<PathBuf>,
     /// Methods [default: sweep, and network if one was trained for the display]
     #[arg(long, value_enum, value_delimiter = ',', help_heading = "Method")]
     method: Vec<CoreMethod>,
@@ -75,25 +82,47 @@ struct Combination {
     network: Option<&'static str>,
 }
 
-/// The result of a combination.
-struct Row {
+/// A hologram of a combination, or of a file.
+struct Judged {
     method: &'static str,
+    /// The encoder, or the file's name.
     encoder: String,
+    /// The times of the wave and of the encoder, if it was made here.
+    times: Option<[Duration; 2]>,
+    hologram: Hologram,
+}
+
+/// What holograms are compared with.
+struct References<'a> {
+    file: &'a DisplayFile,
+    z_m: Vec<f64>,
+    /// The views of the wave at `z_m`.
+    wanted: Vec<Array3<f32>>,
+    colours: ViewColours,
+    natural: incoherent::Judge,
+    margin: usize,
+}
+
+/// The result of a hologram.
+struct Row {
+    judged: Judged,
     figures: Figures,
     natural: Natural,
     /// The mean CIEDE2000 of the view at the middle from that of the reference, unless pictures hold amplitudes.
     ciede2000: Option<f64>,
-    wave: Duration,
-    encode: Duration,
-    made: HologramResult,
+    /// The mean amplitude over that of the reference, if the hologram says what amplitude its light stands for.
+    brightness: Option<f64>,
 }
 
 impl Judge {
-    pub(crate) fn run(self, json: bool) -> Result<()> {
+    pub(crate) fn run(mut self, json: bool) -> Result<()> {
         if let Some(path) = &self.output {
             output::file(path, &["html"])?;
         }
         let file = self.image.display(&self.display)?;
+        if file.lens.is_some() {
+            return self.in_focal_plane(&file, json);
+        }
         let display = &file.target.display;
         let layers = self.image.ldi.as_deref().map(Ldi::read).transpose()?;
         let (frame, depth_shown) = match &layers {
@@ -116,42 +145,26 @@ impl Judge {
         let image = Image::Rgbd(frame);
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean)?;
         let z_m = truth::judged_z_m(display);
-        let wanted = truth.views_on(&file, &z_m)?;
-        let natural = incoherent::Judge::of(&surfaces, display, Pupil::of_aperture(display))?;
-        let natural_z_m = incoherent::Judge::z_m(display);
+        let references = References {
+            wanted: truth.views_on(&file, &z_m)?,
+            z_m,
+            colours: ViewColours::new(self.colours().viewed(), display),
+            natural: incoherent::Judge::of(&surfaces, display, Pupil::of_aperture(display))?,
+            file: &file,
+            margin: self.margin,
+        };
+        let of_files = (self.hologram.iter())
+            .map(|path| given(path, &references, Size { width, height }))
+            .collect::<Result<Vec<_>>>()?;
         let combinations = self.combinations(display);
-        let bar = progress_bar(combinations.len() as u64, "combinations");
+        let bar = progress_bar((combinations.len() + of_files.len()) as u64, "holograms");
         let mut rows = Vec::new();
         for combination in combinations {
-            let made = self
-                .request(
-                    Method::Core(combination.method),
-                    HologramFlags {
-                        network: combination.network.map(str::to_owned),
-                        encoder: combination.encoder,
-                        ..HologramFlags::default()
-                    },
-                )
-                .make(&file, &image)?;
-            let (info, _) = infos(&file, &made);
-            let hologram = made.hologram(info);
-            let shown = hologram.views_on(&file, &z_m)?;
-            let shown_naturally = hologram.views_on(&file, &natural_z_m)?;
-            let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
-            rows.push(Row {
-                method: if combination.network.is_some() {
-                    "pair"
-                } else {
-                    combination.method.name()
-                },
-                encoder: made.encoder.describe(),
-                figures: truth::judge(&shown, &wanted, self.margin)?,
-                natural: natural.judge(&shown_naturally, self.margin)?,
-                ciede2000: colour_difference(&shown[0], &wanted[0], &made.view_colours),
-                wave: times[..times.len() - 1].iter().sum(),
-                encode: times[times.len() - 1],
-                made,
-            });
+            rows.push(references.row(self.made(combination, &file, &image)?)?);
+            bar.inc(1);
+        }
+        for judged in of_files {
+            rows.push(references.row(judged)?);
             bar.inc(1);
         }
         bar.finish_and_clear();
@@ -164,6 +177,23 @@ impl Judge {
         });
         terminal::print(json, &value, table(&rows, &what) + &shown_text(depth_shown));
         Ok(())
+    }
+
+    /// Makes the hologram of `combination`.
+    fn made(&self, combination: Combination, file: &DisplayFile, image: &Image) -> Result<Judged> {
+        let method = match combination.network {
+            Some(_) => "pair",
+            None => combination.method.name(),
+        };
+        let flags = HologramFlags {
+            network: combination.network.map(str::to_owned),
+            encoder: combination.encoder,
+            ..HologramFlags::default()
+        };
+        let made = self
+            .request(Method::Core(combination.method), flags)
+            .make(file, image)?;
+        Ok(Judged::made(method, made, file))
     }
 
     /// Makes the reference for all combinations: a field at the modulator, and its description.
@@ -288,18 +318,96 @@ impl Judge {
     }
 }
 
-impl Row {
+/// Reads a hologram of an image of `size` from `path`. A phase map of other software does not say what amplitude its
+/// light stands for: it takes the one that brings its views nearest to those of the wave.
+fn given(path: &Path, references: &References<'_>, size: Size) -> Result<Judged> {
+    let refuse = |e: Error| Error::file(path, e);
+    let mut hologram = hologram::read_for(path, Some(references.file))?;
+    if hologram.size() != size {
+        return Err(Error::file(
+            path,
+            format!(
+                "is {}, the image {size}; both must be of one size, and --fit brings the image to the modulator's",
+                hologram.size()
+            ),
+        ));
+    }
+    if hologram.info().encoder.is_none() {
+        let views = hologram.views_on(references.file, &references.z_m).map_err(refuse)?;
+        let pairs = || views.iter().flatten().zip(references.wanted.iter().flatten());
+        let of_both: f64 = pairs().map(|(seen, wanted)| f64::from(seen * wanted)).sum();
+        let of_seen: f64 = pairs().map(|(seen, _)| f64::from(seen * seen)).sum();
+        if let Hologram::Levels(_, info) = &mut hologram {
+            info.scale = Some((of_both / of_seen) as f32);
+            info.srgb_of_light = HologramInfo::light_rows(&references.colours, info.display.colours());
+        }
+    }
+    Ok(Judged::of_file(path, hologram))
+}
+
+impl Judged {
+    /// Returns the hologram that `method` made.
+    fn made(method: &'static str, made: HologramResult, file: &DisplayFile) -> Self {
+        let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
+        let (info, _) = infos(file, &made);
+        Judged {
+            method,
+            encoder: made.encoder.describe(),
+            times: Some([times[..times.len() - 1].iter().sum(), times[times.len() - 1]]),
+            hologram: made.hologram(info),
+        }
+    }
+
+    /// Returns the hologram of the file at `path`.
+    fn of_file(path: &Path, hologram: Hologram) -> Self {
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Judged {
+            method: "file",
+            encoder: name.to_string_lossy().into_owned(),
+            times: None,
+            hologram,
+        }
+    }
+
     fn name(&self) -> String {
         format!("{}, {}", self.method, self.encoder)
     }
 
-    fn json(&self) -> serde_json::Value {
+    /// Returns the times in milliseconds.
+    fn ms(&self) -> [Option<f64>; 2] {
         let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        match self.times {
+            Some(times) => times.map(|time| Some(ms(time))),
+            None => [None; 2],
+        }
+    }
+}
+
+impl References<'_> {
+    /// Compares a hologram with the references.
+    fn row(&self, judged: Judged) -> Result<Row> {
+        let shown = judged.hologram.views_on(self.file, &self.z_m)?;
+        let shown_naturally =
+            (judged.hologram).views_on(self.file, &incoherent::Judge::z_m(&self.file.target.display))?;
+        let figures = truth::judge(&shown, &self.wanted, self.margin)?;
+        Ok(Row {
+            natural: self.natural.judge(&shown_naturally, self.margin)?,
+            ciede2000: colour_difference(&shown[0], &self.wanted[0], &self.colours),
+            brightness: judged.hologram.info().encoder.is_some().then_some(figures.brightness),
+            figures,
+            judged,
+        })
+    }
+}
+
+impl Row {
+    fn json(&self) -> serde_json::Value {
+        let [wave_ms, encode_ms] = self.judged.ms();
         json!({
-            "method": self.method, "encoder": self.encoder, "psnr_db": self.figures.amplitude_psnr,
+            "method": self.judged.method, "encoder": self.judged.encoder, "psnr_db": self.figures.amplitude_psnr,
             "ssim": self.figures.amplitude_ssim, "stack_psnr_db": self.figures.focal_psnr,
-            "stack_ssim": self.figures.focal_ssim, "natural": self.natural, "ciede2000": self.ciede2000, "brightness": self.figures.brightness,
-            "wave_ms": ms(self.wave), "encode_ms": ms(self.encode),
+            "stack_ssim": self.figures.focal_ssim, "natural": self.natural, "ciede2000": self.ciede2000, "brightness": self.brightness,
+            "wave_ms": wave_ms, "encode_ms": encode_ms,
         })
     }
 }
@@ -307,7 +415,7 @@ impl Row {
 fn table(rows: &[Row], what: &str) -> String {
     let wide = rows
         .iter()
-        .map(|row| row.encoder.chars().count())
+        .map(|row| row.judged.encoder.chars().count())
         .max()
         .unwrap_or(0)
         .max(7);
@@ -321,20 +429,23 @@ fn table(rows: &[Row], what: &str) -> String {
             amplitude_ssim,
             focal_psnr,
             focal_ssim,
-            brightness,
             ..
         } = row.figures;
+        let [wave_ms, encode_ms] = row.judged.ms().map(|ms| ms.map(|ms| format!("{ms:.1}")));
+        let none = || "–".to_owned();
         text += &format!(
-            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {:10.2}  {:>8}  {:>12}  {:12.3}  {:>9}  {brightness:10.3}  {:7.1}  {:9.1}",
-            row.method,
-            row.encoder,
+            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {:10.2}  {:>8}  {:>12}  {:12.3}  {:>9}  {:>10}  {:>7}  {:>9}",
+            row.judged.method,
+            row.judged.encoder,
             row.natural.psnr,
             figure(row.natural.in_focus_psnr),
             figure(row.natural.out_of_focus_psnr),
             row.natural.ssim,
             figure(row.ciede2000),
-            1e3 * row.wave.as_secs_f64(),
-            1e3 * row.encode.as_secs_f64(),
+            row.brightness
+                .map_or_else(none, |brightness| format!("{brightness:.3}")),
+            wave_ms.unwrap_or_else(none),
+            encode_ms.unwrap_or_else(none),
         );
     }
     text + &format!(
@@ -355,7 +466,7 @@ fn figure(figure: Option<f64>) -> String {
 
 /// Writes a page that shows the displayed images of each combination and the reference.
 fn write_page(
-    path: &std::path::Path,
+    path: &Path,
     file: &DisplayFile,
     truth: &Hologram,
     what: &str,
@@ -396,10 +507,9 @@ fn write_page(
         let Figures {
             amplitude_psnr,
             amplitude_ssim,
-            brightness,
             ..
         } = row.figures;
-        let figures = vec![
+        let mut figures = vec![
             (
                 "At the middle".into(),
                 format!("{amplitude_psnr:.2} dB, SSIM {amplitude_ssim:.3}"),
@@ -418,10 +528,12 @@ fn write_page(
                     row.natural.ssim
                 ),
             ),
-            ("Brightness".into(), format!("{brightness:.3} of what it is judged by")),
         ];
-        let (info, _) = infos(file, &row.made);
-        scenes.push(scene(row.name(), &row.made.hologram(info), figures)?);
+        figures.extend(
+            row.brightness
+                .map(|brightness| ("Brightness".into(), format!("{brightness:.3} of what it is judged by"))),
+        );
+        scenes.push(scene(row.judged.name(), &row.judged.hologram, figures)?);
     }
     viewer::write(path, &scenes).map(|_| ())
 }

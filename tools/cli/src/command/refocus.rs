@@ -1,6 +1,8 @@
 //! `phasefront refocus`: writes the view of a hologram file that an eye focused at z sees.
 
+use crate::limits::Limits;
 use clap::Args;
+use phasefront::Display;
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag};
 use phasefront_command::terminal;
 use phasefront_io::picture::export;
@@ -45,7 +47,7 @@ pub(crate) struct Refocus {
 impl Refocus {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         self.check_output()?;
-        let display = self.display.read_if_given()?;
+        let display = self.display.read_if_given_with_lens()?;
         let hologram = hologram::read_for(&self.hologram, display.as_ref())?;
         let z_mm: Vec<f64> = match (self.z_mm, self.stack) {
             (Some(z), _) => vec![z],
@@ -62,6 +64,9 @@ impl Refocus {
             Some(display) => hologram.views_on(&display, &z_m),
         }
         .map_err(|e| Error::file(&self.hologram, e))?;
+        if !hologram.info().is_in_focal_plane() {
+            self.warn(&hologram.info().display);
+        }
         let colours = hologram.info().view_colours();
         let views: Vec<_> = (views.iter())
             .map(|view| export::of_view(view.view(), &colours))
@@ -86,6 +91,14 @@ impl Refocus {
         let text: Vec<_> = written.iter().map(|path| terminal::name(path)).collect();
         terminal::print(json, &json!({"z_mm": z_mm, "files": names}), text.join("\n"));
         Ok(())
+    }
+
+    /// Warns if the display keeps no details at --z-mm.
+    fn warn(&self, display: &Display) {
+        let lost = self.z_mm.map(|z_mm| (z_mm, Limits::of(display).lost_at(z_mm / 1e3)));
+        if let Some((z_mm, Some(lost))) = lost {
+            log::warn!("z = {z_mm:.1} mm: {lost}");
+        }
     }
 
     fn check_output(&self) -> Result<()> {

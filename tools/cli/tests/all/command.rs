@@ -241,7 +241,7 @@ fn a_hologram_of_another_size_than_its_modulator_is_told_of() {
         depth.save(folder.path(&format!("{name}-depth.png"))).unwrap();
     }
     fs::write(folder.path("pitch.toml"), "pitch_um = 8").unwrap();
-    fs::write(folder.path("same.toml"), "width = 96\nheight = 8").unwrap();
+    fs::write(folder.path("same.toml"), "width = 96\nheight = 8\nvolume_depth_mm = 1").unwrap();
     let told = |name: &str, more: &[&str]| {
         let (rgb, depth) = (format!("{name}.png"), format!("{name}-depth.png"));
         let sweep = ["--method", "sweep", "--planes", "3"];
@@ -1128,7 +1128,11 @@ fn a_calibrated_display_is_packed_for_an_app() {
 #[test]
 fn a_picture_larger_than_the_modulator_is_fitted_and_told_of() {
     let folder = Folder::new().with_frame();
-    fs::write(folder.path("display.toml"), "width = 24\nheight = 24").unwrap();
+    fs::write(
+        folder.path("display.toml"),
+        "width = 24\nheight = 24\nvolume_depth_mm = 4",
+    )
+    .unwrap();
     let output = folder.run(&made(&["--display", "display.toml"]));
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && said.lines().count() == 1, "{said}");

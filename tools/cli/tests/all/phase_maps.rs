@@ -176,3 +176,59 @@ fn what_is_no_phase_map_is_told_in_one_line() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && said.contains("as of exp(iφ)"), "{said}");
 }
+
+#[test]
+fn judge_takes_phase_maps_of_the_image() {
+    let folder = Folder::new();
+    let map = made(&folder, "[532]");
+    let grey = image::GrayImage::from_raw(W, H, map.clone()).unwrap();
+    grey.save(folder.path("grey.png")).unwrap();
+    image::imageops::flip_horizontal(&grey)
+        .save(folder.path("turned.png"))
+        .unwrap();
+    let radians = Array2::from_shape_vec((H as usize, W as usize), map).unwrap();
+    let radians = radians.mapv(|level| f32::from(level) / 256.0 * TAU);
+    ndarray_npy::write_npy(folder.path("radians.npy"), &radians).unwrap();
+    let judge = [
+        "judge",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "depth.png",
+        "--method",
+        "sweep",
+        "--display",
+        "d.toml",
+    ];
+    let files = ["h.png", "grey.png", "radians.npy", "turned.png"];
+    let more: Vec<&str> = files.iter().flat_map(|file| ["--hologram", file]).collect();
+    let told = folder.succeeds(&[&judge[..], &more, &["--json", "-o", "page.html"]].concat());
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let rows = told["rows"].as_array().unwrap();
+    let [of_file @ .., turned] = &rows[rows.len() - 4..] else {
+        panic!("a row for each file");
+    };
+    let db = |row: &serde_json::Value, key: &str| row[key].as_f64().unwrap();
+    for (row, name) in of_file.iter().zip(files) {
+        assert_eq!((&row["method"], &row["encoder"]), (&"file".into(), &name.into()));
+        assert!(
+            row["wave_ms"].is_null() && row["brightness"].is_null() == (name != "h.png"),
+            "{row}"
+        );
+        // The same levels are judged as the same light, but for the scale, which the hologram's own file says.
+        let natural = |row: &serde_json::Value| row["natural"]["psnr"].as_f64().unwrap();
+        assert!((natural(row) - natural(&of_file[0])).abs() < 1e-3, "{row}");
+        assert!(db(row, "psnr_db") > db(&of_file[0], "psnr_db") - 1.0, "{row}");
+        assert!(db(row, "psnr_db") > db(turned, "psnr_db") + 6.0, "{row}");
+    }
+    assert_eq!(of_file[1]["psnr_db"], of_file[2]["psnr_db"]);
+    let page = fs::read_to_string(folder.path("page.html")).unwrap();
+    assert!(page.contains("file, turned.png"));
+    let table = folder.succeeds(&[&judge[..], &more].concat());
+    assert!(table.contains("grey.png") && table.contains('–'), "{table}");
+    image::imageops::resize(&grey, 32, 24, image::imageops::FilterType::Nearest)
+        .save(folder.path("small.png"))
+        .unwrap();
+    let said = folder.fails(&[&judge[..], &["--hologram", "small.png"]].concat(), 1);
+    assert!(said.contains("is 32×24, the image 64×48"), "{said}");
+}
