@@ -548,7 +548,7 @@ class NetworkInfo:
     Fields:
         layers: The number of convolutions.
         filters: The number of filters of each hidden layer.
-        precision: The number format of the layers.
+        precision: The number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in the formats that its file names.
         pitch_um: The distance between neighbouring pixels, in µm.
         volume_depth_mm: The depth of the volume, in mm.
     """

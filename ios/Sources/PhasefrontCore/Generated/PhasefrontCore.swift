@@ -4673,7 +4673,8 @@ public struct NetworkInfo: Equatable, Hashable {
      */
     public var filters: Int
     /**
-     * The number format of the layers.
+     * The number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in the
+     * formats that its file names.
      */
     public var precision: String
     /**
@@ -4695,7 +4696,8 @@ public struct NetworkInfo: Equatable, Hashable {
          * The number of filters of each hidden layer.
          */filters: Int, 
         /**
-         * The number format of the layers.
+         * The number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in the
+         * formats that its file names.
          */precision: String, 
         /**
          * The distance between neighbouring pixels, in µm.
