@@ -4,6 +4,7 @@
 use crate::frame::Past;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
+use rayon::prelude::*;
 use std::time::Duration;
 
 /// The rule that chooses the scale of a frame.
@@ -74,13 +75,17 @@ pub fn looked_at(len: usize) -> (usize, u32) {
 /// at least [`LEAST`].
 #[derive(Debug)]
 pub struct Percentile {
-    histogram: Vec<u32>,
+    /// The histograms of [`PARTS`] parts of the field, (PARTS, BINS).
+    histograms: Vec<u32>,
 }
+
+/// The number of parts of a field that threads count.
+const PARTS: usize = 16;
 
 impl Default for Percentile {
     fn default() -> Self {
         Percentile {
-            histogram: vec![0; BINS],
+            histograms: vec![0; PARTS * BINS],
         }
     }
 }
@@ -89,13 +94,22 @@ impl Percentile {
     /// Returns the percentile of `field`. If `past` is given, the result moves from the previous scale toward it.
     /// Allocates nothing.
     pub fn scale(&mut self, field: &[Complex32], past: Option<Past>) -> f32 {
-        self.histogram.fill(0);
-        for value in field.iter().step_by(STEP) {
-            let bin = value.norm() * (BINS as f32 / MOST);
-            self.histogram[(bin as usize).min(BINS - 1)] += 1;
+        self.histograms.fill(0);
+        let (count, mut over) = looked_at(field.len());
+        let part = (count.div_ceil(PARTS) * STEP).max(1);
+        (self.histograms.par_chunks_exact_mut(BINS))
+            .zip(field.par_chunks(part))
+            .for_each(|(histogram, field)| {
+                for value in field.iter().step_by(STEP) {
+                    let bin = value.norm_sqr().sqrt() * (BINS as f32 / MOST);
+                    histogram[(bin as usize).min(BINS - 1)] += 1;
+                }
+            });
+        let (histogram, rest) = self.histograms.split_at_mut(BINS);
+        for part in rest.chunks_exact(BINS) {
+            histogram.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
         }
-        let (_, mut over) = looked_at(field.len());
-        let last = (self.histogram.iter().rposition(|n| {
+        let last = (histogram.iter().rposition(|n| {
             let is = *n > over;
             over = over.saturating_sub(*n);
             is
