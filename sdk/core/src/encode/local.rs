@@ -84,7 +84,7 @@ pub(super) struct Wanted<'a> {
 pub(super) struct LocalScratch {
     /// The rows of g − L·e of each step in a ring, with REACH empty columns on either side.
     rings: Vec<Complex32>,
-    /// Sums of the rows 0, 1, 2 and 3 above and below, for some columns.
+    /// Sums down some columns, for the taps at 0, 1, 2 and 3 columns to the left and right.
     sums: Vec<Complex32>,
     /// A row of the starting field or of a step.
     row: Vec<Complex32>,
@@ -202,36 +202,51 @@ impl LocalFilter {
         out: &mut [Complex32],
     ) {
         let padded = own.len();
+        let own = floats(own);
+        let [[a1, b1], [a2, b2], [a3, b3]] = around.map(|rows| rows.map(|row| &floats(row)[..2 * padded]));
+        // Sums down each column, for the taps at 0, 1, 2 and 3 columns to the left and right.
         let sums: &mut [f32] = bytemuck::cast_slice_mut(sums);
-        let (copy, rest) = sums.split_at_mut(2 * padded);
-        copy.copy_from_slice(bytemuck::cast_slice(own));
-        for (sum, [above, below]) in rest.chunks_exact_mut(2 * padded).zip(around) {
-            let above: &[f32] = bytemuck::cast_slice(above);
-            let below: &[f32] = bytemuck::cast_slice(below);
-            for ((sum, above), below) in sum.iter_mut().zip(above).zip(below) {
-                *sum = above + below;
-            }
+        let (c0, rest) = sums.split_at_mut(2 * padded);
+        let (c1, rest) = rest.split_at_mut(2 * padded);
+        let (c2, c3) = rest.split_at_mut(2 * padded);
+        let c3 = &mut c3[..2 * padded];
+        let taps = &self.taps;
+        for i in 0..2 * padded {
+            let rows = [own[i], a1[i] + b1[i], a2[i] + b2[i], a3[i] + b3[i]];
+            let down = |x: usize| {
+                (rows[0] * taps[0][x] + rows[1] * taps[1][x]) + (rows[2] * taps[2][x] + rows[3] * taps[3][x])
+            };
+            (c0[i], c1[i], c2[i], c3[i]) = (down(0), down(1), down(2), down(3));
         }
-        let goal: &[f32] = bytemuck::cast_slice(goal);
+        let goal = floats(goal);
         let out: &mut [f32] = bytemuck::cast_slice_mut(out);
         let n = out.len();
-        let own = &copy[2 * REACH..][..n];
-        for ((out, goal), own) in out.iter_mut().zip(goal).zip(own) {
-            *out = goal * per_scale - own;
-        }
-        for (row, taps) in [&*copy].into_iter().chain(rest.chunks_exact(2 * padded)).zip(self.taps) {
-            // Runs at 0, 1, 2, 3 columns to the left and to the right.
-            let left = |i: usize| &row[2 * (REACH - i)..][..n];
-            let right = |i: usize| &row[2 * (REACH + i)..][..n];
-            let (l1, r1, l2, r2) = (left(1), right(1), left(2), right(2));
-            let (middle, l3, r3) = (left(0), left(3), right(3));
-            for (i, out) in out.iter_mut().enumerate() {
-                let near = middle[i] * taps[0] + (l1[i] + r1[i]) * taps[1];
-                let far = (l2[i] + r2[i]) * taps[2] + (l3[i] + r3[i]) * taps[3];
-                *out += near + far;
-            }
+        let (own, c0) = (part(own, REACH, n), part(c0, REACH, n));
+        let (l1, r1, l2, r2, l3, r3) = (
+            part(c1, REACH - 1, n),
+            part(c1, REACH + 1, n),
+            part(c2, REACH - 2, n),
+            part(c2, REACH + 2, n),
+            part(c3, REACH - 3, n),
+            part(c3, REACH + 3, n),
+        );
+        for i in 0..n {
+            let sum = (c0[i] + (l1[i] + r1[i])) + ((l2[i] + r2[i]) + (l3[i] + r3[i]));
+            out[i] = goal[i] * per_scale - own[i] + sum;
         }
     }
+}
+
+/// Returns the real and imaginary parts of a row.
+#[inline(always)]
+fn floats(row: &[Complex32]) -> &[f32] {
+    bytemuck::cast_slice(row)
+}
+
+/// Returns the `n` parts of a row from pixel `from` on.
+#[inline(always)]
+fn part(row: &[f32], from: usize, n: usize) -> &[f32] {
+    &row[2 * from..][..n]
 }
 
 /// Returns the pixel of `count` for position `at`, mirrored about the first and last pixel if it is outside.
