@@ -20,6 +20,7 @@ use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::clock::Instant;
 use phasefront_core::runtime::error::Result;
 use phasefront_core::runtime::stage::stage;
+use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -83,9 +84,13 @@ impl LevelPlan {
         let size = self.frame.size();
         if !self.engine.takes_readings() {
             let mut map = pool.take(size.pixels());
-            for (to, d) in map.values.iter_mut().zip(self.frame.depth()) {
-                *to = to_word(*d);
-            }
+            const PART: usize = 1 << 14;
+            let parts = (map.values.par_chunks_mut(PART)).zip(self.frame.values().1.par_chunks(PART));
+            parts.for_each(|(words, depth)| {
+                for (word, d) in words.iter_mut().zip(depth) {
+                    *word = to_word(*d);
+                }
+            });
             return (map, size);
         }
         let readings = self.depth.readings();

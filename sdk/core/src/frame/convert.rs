@@ -243,20 +243,25 @@ impl Channel<'_> {
     fn row(&self, y: usize, orientation: Orientation, row: &mut [f32], out: &mut [f32]) {
         let view = orientation.view(&self.plane, self.sensor);
         let needed = self.axes.x.needed();
-        let row = &mut row[..needed.len()];
-        row.fill(0.0);
+        let is_kept = self.axes.x.is_kept();
+        let sums = if is_kept { &mut *out } else { &mut row[..needed.len()] };
+        sums.fill(0.0);
         for (source, weight) in self.axes.y.taps(y) {
             if weight > 0.0 {
                 let first = view.at(needed.start, source) + self.byte;
-                add_samples(self.plane.bytes, first, view.step_x, weight, row);
+                wide!(add_samples(self.plane.bytes, first, view.step_x, weight, sums));
             }
         }
-        self.axes.x.apply(row, needed.start, out);
+        if !is_kept {
+            self.axes.x.apply(row, needed.start, out);
+        }
     }
 }
 
 /// Adds `weight` times the bytes from `first` on, `step` apart, to `sum`.
+#[inline(always)]
 fn add_samples(bytes: &[u8], first: usize, step: isize, weight: f32, sum: &mut [f32]) {
+    #[inline(always)]
     fn apart<const N: usize>(bytes: &[u8], weight: f32, sum: &mut [f32]) {
         let (last, sum) = match sum.split_last_mut() {
             Some(split) => split,

@@ -58,6 +58,7 @@ pub struct Axis {
     /// The weights of each output sample: `taps` weights that sum to 1.
     weights: Vec<f32>,
     taps: usize,
+    is_kept: bool,
 }
 
 impl Axis {
@@ -100,6 +101,7 @@ impl Axis {
             start: Vec::with_capacity(out),
             weights: vec![0.0; out * taps],
             taps,
+            is_kept: false,
         };
         for (o, (first, weights)) in rows.into_iter().enumerate() {
             // All output samples have the same number of taps, so the last ones start earlier.
@@ -109,6 +111,7 @@ impl Axis {
                 axis.weights[o * taps + first - start + k] = weight as f32;
             }
         }
+        axis.is_kept = taps == 1 && axis.start.is_sorted_by(|a, b| a + 1 == *b);
         axis
     }
 
@@ -131,6 +134,11 @@ impl Axis {
         let first = self.start.iter().min().copied().unwrap_or(0);
         let last = self.start.iter().max().copied().unwrap_or(0);
         first as usize..last as usize + self.taps
+    }
+
+    /// Returns whether the output samples are neighbouring input samples as they are.
+    pub fn is_kept(&self) -> bool {
+        self.is_kept
     }
 
     /// Resamples `row`, which begins with input sample `first`, to `out`.
