@@ -19,8 +19,10 @@
 mod filters;
 mod fit;
 pub mod hidden;
+mod points;
 pub mod reference;
 mod shares;
+mod spans;
 mod tile;
 mod workers;
 
@@ -279,7 +281,7 @@ impl SweepPlan {
             slots: vec![0; size],
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
-            tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers + 1)),
+            tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
             cancel: Cancel::default(),
         }
     }

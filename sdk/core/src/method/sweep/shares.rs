@@ -50,6 +50,20 @@ pub(super) fn share(position: f32, k: f32) -> f32 {
     least(if share > 0.0 { share } else { 0.0 }, 1.0)
 }
 
+/// Returns a share in units of 2⁻¹⁵.
+#[inline(always)]
+pub(super) fn in_units(share: f32) -> i32 {
+    round(share * 32768.0)
+}
+
+/// Rounds a value of 0 to 2¹⁶ to the nearest integer.
+#[inline(always)]
+pub(super) fn round(value: f32) -> i32 {
+    // With this addend, the integer is in the lower bits of the sum. A conversion would not be vectorised as well.
+    const ADDEND: f32 = (3 << 22) as f32;
+    (value + ADDEND).to_bits().cast_signed() - ADDEND.to_bits().cast_signed()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,8 +7,9 @@
 
 use super::Sweep;
 use super::filters::{Filters, Optics};
-use super::hidden::NOTHING;
-use super::shares::{Slot, share};
+use super::points::Points;
+use super::shares::{Slot, in_units, round, share};
+use super::spans::{NOWHERE, Span, join, widen, widen_down};
 use crate::Size;
 use num_complex::Complex32;
 use phasefront_kernels::fir::{Fir, Pixel, RUN, Taps};
@@ -21,14 +22,6 @@ pub const MARGIN: usize = 10;
 
 /// The units of a wave of amplitude 1. Parts of more than 2 saturate.
 const UNIT: f32 = 8192.0;
-
-/// A half-open range of pixels in a row. It is empty if the second bound is not greater than the first.
-type Span = [usize; 2];
-const NOWHERE: Span = [usize::MAX, 0];
-
-fn join(a: Span, b: Span) -> Span {
-    [a[0].min(b[0]), a[1].max(b[1])]
-}
 
 /// The surfaces of a frame: the positions and colours of the points of each pixel.
 #[derive(Clone, Copy)]
@@ -51,10 +44,12 @@ pub(super) struct Layout {
     /// The distance around the tile within which the points of each plane matter, for each colour.
     halos: Vec<Vec<usize>>,
     /// The same for any colour.
-    widest: Vec<usize>,
+    pub(super) widest: Vec<usize>,
+    /// The first plane whose points matter at each distance from the tile.
+    first_planes: Vec<usize>,
     /// The distance from the edge of the buffer to the tile.
     border: usize,
-    stride: usize,
+    pub(super) stride: usize,
     longest: usize,
     /// The spread of light over each number of planes, for each colour.
     spread: Vec<Vec<usize>>,
@@ -83,9 +78,12 @@ impl Layout {
             height: side(size.height),
         };
         let spread = |optics: &Optics| (0..planes).map(|k| optics.reach(k as f64 * optics.step_m)).collect();
+        let first_plane = |away: usize| widest.partition_point(|halo| *halo < away);
+        let first_planes = (0..=widest[planes - 1]).map(first_plane).collect();
         Layout {
             tile,
             halos,
+            first_planes,
             widest,
             border,
             stride: tile.width + 2 * border + RUN,
@@ -100,8 +98,14 @@ impl Layout {
         (height.div_ceil(self.tile.height), width.div_ceil(self.tile.width))
     }
 
+    /// Returns the first plane whose points matter `away` pixels from the tile, or the number of planes.
+    #[inline(always)]
+    pub(super) fn first_plane(&self, away: usize) -> usize {
+        self.first_planes.get(away).copied().unwrap_or(self.widest.len())
+    }
+
     /// Returns the number of rows of the buffer.
-    fn rows(&self) -> usize {
+    pub(super) fn rows(&self) -> usize {
         self.tile.height + 2 * self.border
     }
 }
@@ -112,16 +116,11 @@ pub(super) struct TileScratch {
     field: Aligned,
     /// The last rows filtered along x, in rows of `stride`.
     ring: Aligned,
-    /// The start of each plane's points, and the end.
-    starts: Vec<u32>,
-    found: Vec<(u16, Points)>,
-    /// The index in `found` of the latest points of each plane.
-    latest: Vec<u32>,
-    points: Vec<Points>,
-    /// The span of each plane's points in each row.
-    point_spans: Vec<Span>,
+    points: Points,
     /// The span of possible light in each row of the field.
     lit: Vec<Span>,
+    /// The registers that hold `lit`.
+    filtered: Vec<Span>,
     wider: Vec<Span>,
 }
 
@@ -142,33 +141,22 @@ impl Aligned {
 }
 
 impl TileScratch {
-    /// Creates working memory for the tiles of frames of `pixels` pixels in `layers` layers.
-    pub(super) fn new(layout: &Layout, pixels: usize, layers: usize) -> Self {
-        let (rows, stride, planes) = (layout.rows(), layout.stride, layout.widest.len());
-        // Each point can be on two planes. Most of a small frame's buffer lies outside the frame.
-        let points = 2 * layers * pixels.min(rows * stride);
+    /// Creates working memory for the tiles of frames of `pixels` pixels with `hidden_layers`.
+    pub(super) fn new(layout: &Layout, pixels: usize, hidden_layers: usize) -> Self {
+        let (rows, stride) = (layout.rows(), layout.stride);
+        let spread = layout.spread.iter().flatten().copied().max().unwrap_or(0);
+        let rows_and_more = rows + 2 * layout.longest.max(spread);
+        let mut lit = Vec::with_capacity(rows_and_more);
+        lit.resize(rows, NOWHERE);
         TileScratch {
             field: Aligned::new(rows * stride),
             ring: Aligned::new((2 * layout.longest + 2) * stride),
-            starts: vec![0; planes + 1],
-            found: Vec::with_capacity(points),
-            latest: vec![0; planes],
-            points: Vec::with_capacity(points),
-            point_spans: vec![NOWHERE; planes * rows],
-            lit: vec![NOWHERE; rows],
-            wider: vec![NOWHERE; rows],
+            points: Points::new(layout, pixels, hidden_layers),
+            lit,
+            filtered: vec![NOWHERE; rows],
+            wider: Vec::with_capacity(rows_and_more),
         }
     }
-}
-
-/// Neighbouring points in a row, some of which are on a plane.
-#[derive(Clone, Copy, Default)]
-struct Points {
-    /// The position of the first point in the field.
-    at: u32,
-    /// The index of the first point's colour and position in the frame. Those of the others follow it.
-    from: u32,
-    count: u32,
 }
 
 /// A tile of a frame.
@@ -195,141 +183,37 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Sorts the points that the tile needs by plane. Within a plane, hidden layers come first, so that the front is
-    /// written last.
-    pub(super) fn gather(&self, scratch: &mut TileScratch) {
-        scratch.starts.fill(0);
-        scratch.found.clear();
-        scratch.latest.fill(u32::MAX);
-        scratch.point_spans.fill(NOWHERE);
-        let Surfaces { slots, hidden, .. } = self.surfaces;
-        let layers = hidden.len() / slots.len();
-        for layer in (0..=layers).rev() {
-            self.find(layer, scratch);
-        }
-        let TileScratch {
-            starts, found, points, ..
-        } = scratch;
-        for k in 1..starts.len() {
-            starts[k] += starts[k - 1];
-        }
-        points.resize(found.len(), Points::default());
-        // Each start advances to its plane's end, which is the next plane's start. The starts are shifted back
-        // afterwards.
-        for (plane, found) in found {
-            let start = &mut starts[usize::from(*plane)];
-            points[*start as usize] = *found;
-            *start += 1;
-        }
-        starts.copy_within(0..self.layout.widest.len(), 1);
-        starts[0] = 0;
-    }
-
-    /// Finds the points of a layer, where 0 is the front.
-    fn find(&self, layer: usize, scratch: &mut TileScratch) {
-        let Surfaces {
-            slots,
-            hidden,
-            size: Size { width, height },
-            ..
-        } = self.surfaces;
+    /// Returns the rows and columns of the frame whose points may matter.
+    pub(super) fn around(&self) -> (Range<usize>, Range<usize>) {
         let widest = self.layout.widest.last().copied().unwrap_or(0);
         let around =
             |side: &Range<usize>, size: usize| side.start.saturating_sub(widest)..(side.end + widest).min(size);
-        let columns = around(&self.columns, width);
-        for y in around(&self.rows, height) {
-            let row = y * width;
-            if layer == 0 {
-                // Runs of whole registers cost less than runs of the points that are on one plane.
-                let slots = &slots[row..][..width];
-                let planes = |x: usize| match slots[x..].first_chunk::<RUN>() {
-                    Some(run) => range(run),
-                    None => range(&slots[x..]),
-                };
-                let mut x = columns.start / RUN * RUN;
-                while x < columns.end {
-                    let of = planes(x);
-                    let more = (x + RUN..columns.end).step_by(RUN).take_while(|x| planes(*x) == of);
-                    let end = (x + RUN + more.count() * RUN).min(width);
-                    let run = &slots[x..end];
-                    if of[1] - of[0] <= 2 {
-                        self.add(of, (y, x), row + x, run.len(), scratch);
-                    } else {
-                        for slot in run.chunk_by(|a, b| a == b) {
-                            self.add([slot[0]; 2], (y, x), row + x, run.len(), scratch);
-                        }
-                    }
-                    x = end;
-                }
-            } else {
-                let sources = &hidden[(layer - 1) * slots.len() + row..][..width];
-                for (x, source) in sources[columns.clone()]
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, s)| **s != NOTHING)
-                {
-                    let source = *source as usize;
-                    self.add([slots[source]; 2], (y, columns.start + x), source, 1, scratch);
-                }
-            }
-        }
+        let Size { width, height } = self.surfaces.size;
+        (around(&self.rows, height), around(&self.columns, width))
     }
 
-    /// Adds `count` points from pixel (y, x) of the frame on to the planes from the least to the most of two slots. The
-    /// colour and position of the first point are at `from`.
-    fn add(
-        &self,
-        [least, most]: [Slot; 2],
-        (y, x): (usize, usize),
-        from: usize,
-        count: usize,
-        scratch: &mut TileScratch,
-    ) {
-        let &Layout { border, stride, .. } = self.layout;
-        for k in least as usize / 2..=(most as usize).div_ceil(2) {
-            let halo = self.layout.widest[k];
-            if y + halo < self.rows.start
-                || y >= self.rows.end + halo
-                || x + count + halo <= self.columns.start
-                || x >= self.columns.end + halo
-            {
-                continue;
-            }
-            let (y, x) = (y + border - self.rows.start, x + border - self.columns.start);
-            let points = Points {
-                at: (y * stride + x) as u32,
-                from: from as u32,
-                count: count as u32,
-            };
-            let span = &mut scratch.point_spans[k * self.layout.rows() + y];
-            *span = join(*span, [x, x + count]);
-            if let Some((on, latest)) = scratch.found.get_mut(scratch.latest[k] as usize)
-                && *on == k as u16
-                && points.at.wrapping_sub(latest.at) == points.from.wrapping_sub(latest.from)
-                && points.at - latest.at <= latest.count
-            {
-                latest.count = points.at - latest.at + points.count;
-                continue;
-            }
-            scratch.latest[k] = scratch.found.len() as u32;
-            scratch.found.push((k as u16, points));
-            scratch.starts[k + 1] += 1;
-        }
+    /// Returns the row and column of the field of pixel (y, x) of the frame.
+    #[inline(always)]
+    pub(super) fn place(&self, y: usize, x: usize) -> (usize, usize) {
+        let border = self.layout.border;
+        (y + border - self.rows.start, x + border - self.columns.start)
+    }
+
+    /// Finds the points that the tile needs.
+    pub(super) fn gather(&self, scratch: &mut TileScratch) {
+        scratch.points.gather(self);
     }
 
     /// Sweeps one colour over the gathered points. [`Tile::store`] reads the result.
     pub(super) fn sweep(&self, colour: usize, filters: &Filters, scratch: &mut TileScratch) {
         scratch.field.pixels().fill(Pixel::ZERO);
         scratch.lit.fill(NOWHERE);
-        let occupied = |starts: &[u32], k: usize| starts[k] < starts[k + 1];
-        let Some(mut at) = (0..self.layout.widest.len())
-            .rev()
-            .find(|k| occupied(&scratch.starts, *k))
-        else {
+        let planes = self.layout.widest.len();
+        let Some(mut at) = (0..planes).rev().find(|k| scratch.points.are_on(*k)) else {
             return;
         };
         self.scatter(colour, at, scratch);
-        while let Some(next) = (0..at).rev().find(|k| occupied(&scratch.starts, *k)) {
+        while let Some(next) = (0..at).rev().find(|k| scratch.points.are_on(*k)) {
             at = self.cross(colour, [at, next], filters, scratch);
             self.scatter(colour, at, scratch);
         }
@@ -345,7 +229,8 @@ impl<'a> Tile<'a> {
         while at > to {
             let (taps, steps) = filters.part(at - to);
             at -= steps;
-            widen(&mut scratch.lit, &mut scratch.wider, self.layout.spread[colour][steps]);
+            widen(&scratch.lit, &mut scratch.wider, self.layout.spread[colour][steps]);
+            std::mem::swap(&mut scratch.lit, &mut scratch.wider);
             self.filter(taps, self.layout.halos[colour][at], scratch);
         }
         at
@@ -354,27 +239,26 @@ impl<'a> Tile<'a> {
     /// Replaces the field's share with the points of plane `k` where they are (Eq. 3 and 4): they emit light with phase
     /// 0 and block the light from behind.
     fn scatter(&self, colour: usize, k: usize, scratch: &mut TileScratch) {
+        let TileScratch { field, points, lit, .. } = scratch;
+        for (lit, around) in lit.iter_mut().zip(points.around(k)) {
+            *lit = join(*lit, *around);
+        }
         let size = self.surfaces.slots.len();
         let rgb = &self.surfaces.rgb[colour * size..][..size];
-        let points = scratch.starts[k] as usize..scratch.starts[k + 1] as usize;
-        let rows = self.layout.rows();
-        let spans = &scratch.point_spans[k * rows..][..rows];
-        for (y, span) in spans.iter().enumerate().filter(|(_, span)| span[0] < span[1]) {
-            let around = [span[0] - MARGIN.min(span[0]), span[1] + MARGIN];
-            for lit in &mut scratch.lit[y - MARGIN.min(y)..(y + MARGIN + 1).min(rows)] {
-                *lit = join(*lit, around);
-            }
-        }
-        let field = scratch.field.pixels();
         let positions = self.surfaces.positions;
+        let field = field.pixels();
+        for point in points.hidden(k) {
+            let pixel = &mut field[point.at as usize];
+            *pixel = blend(*pixel, light(rgb[point.from as usize]), point.share);
+        }
         wide!({
-            for points in &scratch.points[points] {
-                let (at, from) = (points.at as usize, points.from as usize);
-                let count = points.count as usize;
+            for run in points.front(k) {
+                let (at, from) = (run.at as usize, run.from as usize);
+                let count = run.count as usize;
                 let field = &mut field[at..at + count];
                 let points = rgb[from..from + count].iter().zip(&positions[from..from + count]);
-                for (pixel, (light, position)) in field.iter_mut().zip(points) {
-                    *pixel = blend(*pixel, round(light * UNIT), share(*position, k as f32));
+                for (pixel, (amplitude, position)) in field.iter_mut().zip(points) {
+                    *pixel = blend(*pixel, light(*amplitude), in_units(share(*position, k as f32)));
                 }
             }
         });
@@ -386,23 +270,37 @@ impl<'a> Tile<'a> {
     /// the field.
     fn filter(&self, taps: &Taps, halo: usize, scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
+        let TileScratch {
+            field,
+            ring,
+            lit,
+            filtered,
+            wider,
+            ..
+        } = scratch;
         let radius = taps.radius();
         let rows = border - halo..border + self.rows.len() + halo;
         let (left, right) = (border - halo, border + self.columns.len() + halo);
-        for (y, span) in scratch.lit.iter_mut().enumerate() {
-            let [from, to] = [span[0].max(left), span[1].min(right)];
-            // Rounding to whole lines is free because they are as fast as partial ones.
-            *span = match rows.contains(&y) && from < to {
+        for (y, (lit, filtered)) in lit.iter().zip(&mut *filtered).enumerate() {
+            let [from, to] = [lit[0].max(left), lit[1].min(right)];
+            // Rounding to whole lines is free because they are as fast as partial ones. The light itself is not
+            // rounded, or it would spread by a line in each step.
+            *filtered = match rows.contains(&y) && from < to {
                 true => [from / RUN * RUN, to.next_multiple_of(RUN)],
                 false => NOWHERE,
             };
         }
+        // Two rows are filtered together, so both take the pixels of either.
+        for pair in filtered[rows.clone()].chunks_mut(2) {
+            let both = pair.iter().fold(NOWHERE, |both, span| join(both, *span));
+            pair.fill(both);
+        }
         // Rows filtered along x are also needed by the rows around them.
-        widen_down(&scratch.lit, &mut scratch.wider, radius);
-        let (field, ring) = (scratch.field.pixels(), scratch.ring.pixels());
+        widen_down(filtered, wider, radius);
+        let (field, ring) = (field.pixels(), ring.pixels());
         let slots = 2 * radius + 2;
         for row in rows.start - radius..rows.end + radius {
-            let [from, to] = scratch.wider[row];
+            let [from, to] = wider[row];
             if from < to {
                 let slot = &mut ring[row % slots * stride..][..stride];
                 let source = &field[row * stride + from - radius..row * stride + to + radius];
@@ -417,20 +315,18 @@ impl<'a> Tile<'a> {
                 // It is filtered with the next row.
                 continue;
             }
-            let first = row - usize::from(is_second);
-            let [from, to] = scratch.lit[first];
-            if is_second && from < to && scratch.lit[row] == scratch.lit[first] {
+            let [from, to] = filtered[row];
+            if from >= to {
+                continue;
+            }
+            if is_second {
+                let first = row - 1;
                 let (first_out, out) = field[first * stride..].split_at_mut(stride);
                 let out = [&mut first_out[from..to], &mut out[from..to]];
                 self.fir.down_two(taps, ring, stride, first % slots, from, out);
-                continue;
-            }
-            for row in first..=row {
-                let [from, to] = scratch.lit[row];
-                if from < to {
-                    let out = &mut field[row * stride..][from..to];
-                    self.fir.down(taps, ring, stride, row % slots, from, out);
-                }
+            } else {
+                let out = &mut field[row * stride..][from..to];
+                self.fir.down(taps, ring, stride, row % slots, from, out);
             }
         }
     }
@@ -449,46 +345,15 @@ impl<'a> Tile<'a> {
     }
 }
 
-/// Returns the least and the most of slots.
+/// Returns an amplitude in units of [`UNIT`].
 #[inline(always)]
-fn range(slots: &[Slot]) -> [Slot; 2] {
-    let least = slots.iter().fold(Slot::MAX, |least, slot| least.min(*slot));
-    let most = slots.iter().fold(0, |most, slot| most.max(*slot));
-    [least, most]
+fn light(amplitude: f32) -> i32 {
+    round(amplitude * UNIT)
 }
 
-/// Rounds a value of 0 to 2¹⁶ to the nearest integer.
+/// Replaces a share of `pixel`, in units of [`in_units`], with the same share of `light`.
 #[inline(always)]
-fn round(value: f32) -> i32 {
-    // With this addend, the integer is in the lower bits of the sum. A conversion would not be vectorised as well.
-    const ADDEND: f32 = (3 << 22) as f32;
-    (value + ADDEND).to_bits().cast_signed() - ADDEND.to_bits().cast_signed()
-}
-
-/// Replaces a share of `pixel` with the same share of `light`.
-#[inline(always)]
-fn blend(pixel: Pixel, light: i32, share: f32) -> Pixel {
-    let share = round(share * 32768.0);
+fn blend(pixel: Pixel, light: i32, share: i32) -> Pixel {
     let part = |part: i32, light: i32| part + ((share * (light - part) + 16384) >> 15);
     Pixel::new(part(pixel.re(), light), part(pixel.im(), 0))
-}
-
-/// Widens spans by `by` pixels in all directions. `wider` is working memory.
-fn widen(spans: &mut Vec<Span>, wider: &mut Vec<Span>, by: usize) {
-    widen_down(spans, wider, by);
-    for span in wider.iter_mut().filter(|span| span[0] < span[1]) {
-        *span = [span[0] - by.min(span[0]), span[1] + by];
-    }
-    std::mem::swap(spans, wider);
-}
-
-/// Joins each row's span with those of the rows up to `by` above and below, into `wider`.
-fn widen_down(spans: &[Span], wider: &mut [Span], by: usize) {
-    wider.fill(NOWHERE);
-    for (y, span) in spans.iter().enumerate().filter(|(_, span)| span[0] < span[1]) {
-        let rows = y - by.min(y)..(y + by + 1).min(spans.len());
-        for wider in &mut wider[rows] {
-            *wider = join(*wider, *span);
-        }
-    }
 }
