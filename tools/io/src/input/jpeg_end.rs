@@ -3,8 +3,8 @@
 const END_OF_IMAGE: u8 = 0xD9;
 const START_OF_SCAN: u8 = 0xDA;
 
-/// Returns where the first picture of `file` ends, behind the mark EOI after its last scan, or `None` if it is cut short.
-/// Pictures inside segments, such as thumbnails, and pictures behind the first one do not count.
+/// Returns where the first picture of `file` ends, behind the mark EOI after its last scan, or `None` if it is cut
+/// short. Pictures inside segments, such as thumbnails, and pictures behind the first one do not count.
 pub(crate) fn end(file: &[u8]) -> Option<usize> {
     let mut rest = file.get(2..).unwrap_or_default();
     while let Some((marker, after)) = next_marker(rest) {

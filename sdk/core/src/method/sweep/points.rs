@@ -1,7 +1,8 @@
 //! The points of a tile and its halo, sorted by plane.
 //!
 //! Within a plane, the points of hidden layers come first, so that the front is written last. The front's points lie
-//! side by side and are kept as runs of whole registers. Hidden points lie apart, so each is kept alone, with its share.
+//! side by side and are kept as runs of whole registers. Hidden points lie apart, so each is kept alone, with its
+//! share.
 
 use super::Sweep;
 use super::hidden::NOTHING;

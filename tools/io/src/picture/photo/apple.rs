@@ -1,6 +1,6 @@
-//! What Apple's cameras say of the depth in a HEIC photo. XMP of its own lies beside each auxiliary picture: `apdi` names
-//! the numbers that the camera measured and the range that the picture's levels stand for, and `depthData` tells whether
-//! their metres hold.
+//! What Apple's cameras say of the depth in a HEIC photo. XMP of its own lies beside each auxiliary picture: `apdi`
+//! names the numbers that the camera measured and the range that the picture's levels stand for, and `depthData` tells
+//! whether their metres hold.
 
 use super::{Range, parse, property};
 

@@ -1,5 +1,5 @@
-//! The pictures that Dynamic Depth 1.0 appends to a photo. Their directory lies in the photo's XMP or, as Google's camera
-//! writes it, in the extended XMP.
+//! The pictures that Dynamic Depth 1.0 appends to a photo. Their directory lies in the photo's XMP or, as Google's
+//! camera writes it, in the extended XMP.
 
 use super::ITEM;
 use crate::input::jpeg_end;
@@ -13,9 +13,9 @@ struct Item<'a> {
     padding: usize,
 }
 
-/// Returns the bytes of the item called `uri`. The first item of the directory is the photo itself, and the others follow
-/// it in order. Cameras write data of their own before or behind all of them, so that they are looked for behind the
-/// photo, and before the end of the file.
+/// Returns the bytes of the item called `uri`. The first item of the directory is the photo itself, and the others
+/// follow it in order. Cameras write data of their own before or behind all of them, so that they are looked for behind
+/// the photo, and before the end of the file.
 pub(super) fn item<'a>(
     documents: &[&Document<'_>],
     jpeg: &'a [u8],

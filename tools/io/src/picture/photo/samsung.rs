@@ -1,5 +1,5 @@
-//! The depth of Samsung's portraits, in a trailer behind the photo. Samsung does not publish the form of its numbers, so
-//! that it is only named.
+//! The depth of Samsung's portraits, in a trailer behind the photo. Samsung does not publish the form of its numbers,
+//! so that it is only named.
 //!
 //! The trailer ends with the length of its directory and `SEFT`. The directory begins with `SEFH`, a version and the
 //! number of entries. An entry has a kind, the way from the directory back to its block, and the block's size; a block
