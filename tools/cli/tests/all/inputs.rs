@@ -701,6 +701,7 @@ fn holograms_that_say_what_cannot_be_are_refused() {
 }
 
 #[test]
+#[ignore = "slow: 25 seconds of a core"]
 fn cut_and_damaged_files_of_every_format_are_read_or_refused() {
     let folder = Folder::new();
     let small = image::imageops::resize(&colour(), 6, 4, image::imageops::FilterType::Nearest);
