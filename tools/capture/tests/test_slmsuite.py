@@ -77,6 +77,15 @@ def check_aberration(folder, unit, lasers_nm):
         assert before < 0.92 and after > 0.95
 
 
+def check_diagnosis(steps):
+    """Checks what the last photographs say of the calibrated display: nothing is wrong that calibration changes."""
+    diagnosis = steps[-2]["diagnosis"]
+    causes = [finding["cause"] for finding in diagnosis["findings"]]
+    print("diagnosis:", causes, diagnosis["explained"])
+    assert not {"wrong phase range", "inverted curve", "bent curve", "wrong distance"} & set(causes)
+    assert diagnosis["explained"] > 0.8
+
+
 def picture(folder, lasers_nm):
     """Writes a picture in the middle of the volume and returns its amplitudes, (C, H, W)."""
     y, x = numpy.mgrid[:H, :W]
@@ -110,7 +119,8 @@ def seen(folder, unit, display, wanted, lasers_nm):
 def test_a_bench_is_calibrated_unattended_by_one_command(unit, tmp_path):
     (tmp_path / "display.toml").write_text(DISPLAY)
     _, steps = calibrate(tmp_path, unit, "--photographs", "8")
-    assert [step.get("step") for step in steps] == ["curves", "laser", "aberration, laser", "model", None]
+    assert [step.get("step") for step in steps] == ["curves", "laser", "aberration, laser", "model", "diagnosis", None]
+    check_diagnosis(steps)
     settings = json.loads((tmp_path / "bench" / "captures" / "laser" / "settings.json").read_text())
     assert settings["exposure_s"] > 0
     check_curves(tmp_path, unit, LASERS_NM)
@@ -125,7 +135,8 @@ def test_three_lasers_take_turns_on_one_panel(tmp_path):
     unit = "of three lasers"
     (tmp_path / "display.toml").write_text(f"width = {W}\nheight = {H}\n")
     _, steps = calibrate(tmp_path, unit)
-    assert len(steps) == 6
+    assert len(steps) == 7
+    check_diagnosis(steps)
     check_curves(tmp_path, unit, THREE_NM)
     check_aberration(tmp_path, unit, THREE_NM)
     wanted = picture(tmp_path, THREE_NM)
@@ -160,7 +171,7 @@ def test_a_calibration_that_is_cut_off_resumes(tmp_path):
     table = (tmp_path / "bench" / "table.pfp").read_bytes()
     # Of 33 spots, 27 are there.
     run, steps = calibrate(tmp_path, "two")
-    assert [step.get("step") for step in steps] == ["curves", "laser", "aberration, laser", None]
+    assert [step.get("step") for step in steps] == ["curves", "laser", "aberration, laser", "diagnosis", None]
     assert (tmp_path / "bench" / "table.pfp").read_bytes() == table
     assert tomllib.loads((tmp_path / "bench" / "display.toml").read_text()).keys() >= {"per_pixel", "laser", "aberration"}
     (tmp_path / "display.toml").write_text(DISPLAY + "pitch_um = 6.4\n")

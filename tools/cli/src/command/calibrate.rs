@@ -3,6 +3,7 @@
 mod aberration;
 mod all;
 mod capture;
+mod diagnosis;
 mod laser;
 mod lut;
 mod model;

@@ -114,7 +114,7 @@ fn read(path: &Path, channel: usize) -> Result<Photograph> {
     Ok(if is_encoded { photo.linear_of_srgb() } else { photo })
 }
 
-fn describe(diagnosis: &Diagnosis) -> String {
+pub(super) fn describe(diagnosis: &Diagnosis) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     if diagnosis.findings.is_empty() {
         return format!(

@@ -3,6 +3,7 @@
 use super::Told;
 use super::aberration::{Aberration, ColourName};
 use super::capture::{Capture, CaptureFlags};
+use super::diagnosis;
 use super::laser::Laser;
 use super::lut::Lut;
 use super::model::LearnModel;
@@ -31,9 +32,9 @@ const MODEL: &str = "model.pfm";
 /// Run all calibrations one after another, with photographs by a program
 ///
 /// Measures the phase curves, the laser and the aberration of each colour, and with --photographs learns a model of
-/// the rest. DIR then holds display.toml, which names the files of the calibration, and all photographs. After an
-/// interruption, the same command continues: it takes the photographs that are missing, and skips a calibration whose
-/// file is there.
+/// the rest. Then it photographs a picture on the calibrated display and says what is wrong with it. DIR then holds
+/// display.toml, which names the files of the calibration, and all photographs. After an interruption, the same command
+/// continues: it takes the photographs that are missing, and skips a calibration whose file is there.
 #[derive(Args)]
 pub(crate) struct All {
     /// Folder of the calibration
@@ -104,6 +105,7 @@ impl All {
             let learn = |capture: &mut Capture<'_>| self.model(photographs, capture);
             step("model", ["model", MODEL], has(MODEL), &learn)?;
         }
+        diagnosis::diagnosis(&self.display(), &self.folder, &mut capture)?.print(json);
         let path = self.folder.join(DISPLAY);
         Told::new(json!({"display": path.display().to_string()}), terminal::name(&path)).print(json);
         Ok(())
