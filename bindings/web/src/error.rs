@@ -43,9 +43,10 @@ pub(crate) fn object<'a>(fields: impl IntoIterator<Item = (&'a str, JsValue)>) -
     object
 }
 
-/// Converts panics to errors that are thrown. Called once when the module is loaded.
+/// Converts panics to errors that are thrown, and sends warnings to the console. Called once when the module is loaded.
 #[wasm_bindgen(start)]
 pub fn start() {
+    crate::log::to_console();
     std::panic::set_hook(Box::new(|info| {
         let said = info.payload_as_str().unwrap_or("a panic").replace('\n', " ");
         let place = info.location().map(|at| format!(" at {}:{}", at.file(), at.line()));

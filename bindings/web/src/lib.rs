@@ -15,6 +15,8 @@ mod frame;
 #[cfg(target_arch = "wasm32")]
 mod hologram;
 #[cfg(target_arch = "wasm32")]
+mod log;
+#[cfg(target_arch = "wasm32")]
 mod modulator;
 #[cfg(target_arch = "wasm32")]
 mod network;

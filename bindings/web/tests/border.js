@@ -23,10 +23,34 @@ function refused(kind, start, call) {
   throw new Error(`not refused: ${start}`);
 }
 
+/** Tests that a session warns once on the console of depth that an app enlarged. */
+function warns() {
+  const size = { width: 160, height: 120 };
+  const near = (x, y, i) => (x - ((29 + 37 * i) % 160)) ** 2 + (y - ((31 + 53 * i) % 120)) ** 2 < 30 + 40 * (i % 7);
+  const discs = [...Array(24).keys()].reverse();
+  const levels = Uint8Array.from({ length: 160 * 120 }, (_, at) => {
+    const [x, y] = [at % 160, Math.floor(at / 160)].map((place) => 4 * Math.floor(place / 4) + 2);
+    return 9 * (discs.find((i) => near(x, y, i)) ?? 24);
+  });
+  const data = Uint8Array.from({ length: 4 * levels.length }, (_, i) => levels[i >> 2]);
+  const said = [];
+  const { warn } = console;
+  console.warn = (text) => said.push(text);
+  try {
+    const session = new Session({ target: size, method: { kind: "sweep" } }, "video");
+    for (const timestamp of [1, 2, 3]) session.process(new Frame({ ...size, data }, { ...size, data: levels }, { timestamp })).close();
+    session.close();
+  } finally {
+    console.warn = warn;
+  }
+  if (said.length !== 1 || !said[0].includes("enlarged 4 times (nearest) from 40×30")) throw new Error(`warned: ${said}`);
+}
+
 /** Runs all tests and throws if one fails. */
 export async function run() {
   refused("session", "not loaded", () => version());
   await load();
+  warns();
   const session = new Session({ target });
   const video = new Session({ target }, "video");
   refused("display", "width", () => Target.ofDisplay({ width: 0 }));

@@ -18,6 +18,7 @@ mod debug;
 #[cfg(feature = "tract")]
 mod depth_network;
 mod determinism;
+mod enlarged;
 mod field;
 #[cfg(feature = "gpu")]
 mod gpu_session;

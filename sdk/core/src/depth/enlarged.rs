@@ -14,7 +14,7 @@ mod fit;
 
 use crate::Size;
 use crate::depth::fill_nearest;
-use fit::{Fit, Kernel};
+use fit::{Fit, Kernel, Limits};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
@@ -95,7 +95,7 @@ pub fn find(depth: ArrayView2<'_, f32>) -> Option<Enlarged> {
     }
     let lines = [Lines::new(depth)?, Lines::new(depth.reversed_axes())?];
     let tried: Vec<Enlarged> = candidates(size);
-    let errors: Vec<[f64; 2]> = tried.par_iter().map(|map| map.errors(&lines, 0.0)).collect();
+    let errors: Vec<[f64; 2]> = tried.par_iter().map(|map| map.errors(&lines, 0.0, false)).collect();
     let joint = |errors: &[f64; 2]| errors[0] + errors[1];
     let least = errors.iter().map(joint).fold(f64::INFINITY, f64::min);
     let comparable = tried.into_iter().zip(errors);
@@ -115,7 +115,7 @@ pub fn find(depth: ArrayView2<'_, f32>) -> Option<Enlarged> {
         .max_by(|(a, a_contrast), (b, b_contrast)| {
             blocks(a).total_cmp(&blocks(b)).then(a_contrast.total_cmp(b_contrast))
         })
-        .map(|(map, _)| map)
+        .map(|(map, _)| map.where_cut_off(&lines))
 }
 
 /// Returns the maps from coarser grids to depth of `size`.
@@ -153,6 +153,8 @@ struct Lines {
     values: Vec<Vec<f32>>,
     /// Which pixels of each line count, because they lie at an edge.
     edges: Vec<Vec<bool>>,
+    /// The ends of all depth, as shares of the range.
+    limits: Limits,
 }
 
 impl Lines {
@@ -176,6 +178,7 @@ impl Lines {
         let mut lines = Lines {
             values: Vec::new(),
             edges: Vec::new(),
+            limits: Limits::of(depth).scaled(low, range),
         };
         let mut places = vec![false; width];
         for row in rows {
@@ -226,8 +229,8 @@ fn edges(values: &[f32], holes: &[bool]) -> Vec<bool> {
 
 impl Enlarged {
     /// Returns the mean squared error of the fit at edges along rows and along columns, with the grid shifted by
-    /// `shift` readings.
-    fn errors(&self, lines: &[Lines; 2], shift: f64) -> [f64; 2] {
+    /// `shift` readings. With `cut`, what lies beyond the ends of the depth was cut off.
+    fn errors(&self, lines: &[Lines; 2], shift: f64, cut: bool) -> [f64; 2] {
         let grids = [self.grid.width, self.grid.height];
         std::array::from_fn(|axis| {
             let pixels = lines[axis].values[0].len();
@@ -236,7 +239,8 @@ impl Enlarged {
             let mut scratch = fit.scratch();
             for (values, edges) in lines[axis].values.iter().zip(&lines[axis].edges) {
                 if edges.contains(&true) {
-                    let errors = fit.errors(values, &mut scratch);
+                    let limits = if cut { lines[axis].limits } else { Limits::NONE };
+                    let errors = fit.errors(values, limits, &mut scratch);
                     let at_edges = errors.iter().zip(edges).filter(|(_, is_edge)| **is_edge);
                     squares.extend(at_edges.map(|(error, _)| error * error));
                 }
@@ -249,6 +253,18 @@ impl Enlarged {
         })
     }
 
+    /// Returns this map, with that of Keys' cubics which fits better where overshoots are cut off: they hide which one
+    /// made the depth.
+    fn where_cut_off(self, lines: &[Lines; 2]) -> Self {
+        if self.by != Enlarging::Bicubic || self.factor == 2.0 {
+            return self;
+        }
+        let cubics = [Kernel::CubicHalf, Kernel::CubicThreeQuarters].map(|kernel| Enlarged { kernel, ..self });
+        let error = |map: &Enlarged| map.errors(lines, 0.0, true).iter().sum::<f64>();
+        let [half, other] = cubics.each_ref().map(error);
+        cubics[usize::from(other < half)]
+    }
+
     /// Returns the least ratio of the errors of shifted grids to `errors`, those of this one: the smaller of that along
     /// rows and along columns.
     fn contrast(&self, lines: &[Lines; 2], errors: [f64; 2]) -> f64 {
@@ -256,7 +272,7 @@ impl Enlarged {
             Enlarging::Nearest => self.factor.round() as usize,
             _ => 4,
         };
-        let shifted = (1..parts).map(|part| self.errors(lines, part as f64 / parts as f64));
+        let shifted = (1..parts).map(|part| self.errors(lines, part as f64 / parts as f64, false));
         let least = shifted.fold([f64::INFINITY; 2], |least, [x, y]| [least[0].min(x), least[1].min(y)]);
         let ratio = |axis: usize| least[axis] / errors[axis].max(EXACT);
         ratio(0).min(ratio(1))
@@ -277,9 +293,10 @@ impl Enlarged {
             // A hole's pixels must not pull at the readings beside it.
             let _ = fill_nearest(&mut known);
         }
-        let (least, most) = (known.iter()).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        let narrow = along_rows(known.view(), self.grid.width, self.kernel);
-        let mut readings = along_columns(narrow.view(), self.grid.height, self.kernel);
+        let limits = Limits::of(known.view());
+        let Limits { least, most } = limits;
+        let narrow = along_rows(known.view(), self.grid.width, self.kernel, limits);
+        let mut readings = along_columns(narrow.view(), self.grid.height, self.kernel, limits);
         let ratio = |pixels: usize, cells: usize| pixels as f64 / cells as f64;
         let (down, across) = (
             ratio(depth.dim().0, self.grid.height),
@@ -302,14 +319,14 @@ impl Enlarged {
 }
 
 /// Returns the readings, (H, w), of each row of `depth`, (H, W).
-fn along_rows(depth: ArrayView2<'_, f32>, grid: usize, kernel: Kernel) -> Array2<f32> {
+fn along_rows(depth: ArrayView2<'_, f32>, grid: usize, kernel: Kernel, limits: Limits) -> Array2<f32> {
     let (height, width) = depth.dim();
     let fit = Fit::new(width, grid, kernel, 0.0);
     let mut readings = vec![0.0; height * grid];
     (readings.par_chunks_exact_mut(grid)).enumerate().for_each_init(
         || fit.scratch(),
         |scratch, (y, to)| {
-            let found = fit.readings(&depth.row(y).to_vec(), scratch);
+            let found = fit.readings(&depth.row(y).to_vec(), limits, scratch);
             to.iter_mut().zip(found).for_each(|(to, reading)| *to = *reading as f32);
         },
     );
@@ -317,8 +334,8 @@ fn along_rows(depth: ArrayView2<'_, f32>, grid: usize, kernel: Kernel) -> Array2
 }
 
 /// Returns the readings, (h, W), of each column of `depth`, (H, W).
-fn along_columns(depth: ArrayView2<'_, f32>, grid: usize, kernel: Kernel) -> Array2<f32> {
-    along_rows(depth.reversed_axes(), grid, kernel).reversed_axes()
+fn along_columns(depth: ArrayView2<'_, f32>, grid: usize, kernel: Kernel, limits: Limits) -> Array2<f32> {
+    along_rows(depth.reversed_axes(), grid, kernel, limits).reversed_axes()
 }
 
 #[cfg(test)]

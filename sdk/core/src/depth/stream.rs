@@ -329,7 +329,8 @@ impl Plan {
         self.enlarged.map_or(self.upright(), |enlarged| enlarged.grid)
     }
 
-    /// Replaces `values` that were enlarged to the colour's size by the readings that they came from.
+    /// Replaces `values` that were enlarged to the colour's size by the readings that they came from, and tells the log
+    /// when it finds that.
     fn shrink(&mut self, out: Size) -> Result<()> {
         let layout = self.layout;
         if layout.sensor != layout.colour || layout.cameras.is_some() {
@@ -341,6 +342,7 @@ impl Plan {
             self.examined_in = self.examined_in.checked_sub(1).unwrap_or(EXAMINED_EVERY - 1);
             self.enlarged = if is_due { enlarged::find(depth) } else { None };
             if let Some(found) = self.enlarged {
+                log::warn!("the depth of frames was {found}; it is conditioned as depth of that size");
                 self.conditioner = layout.conditioner(found.grid, out)?;
                 self.scratch = self.conditioner.scratch();
             }

@@ -7,7 +7,7 @@ use crate::{Error, Result};
 use ndarray::Array2;
 use phasefront::Size;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane, RgbEncoding};
-use phasefront_core::depth::{self, DepthUnit, enlarged};
+use phasefront_core::depth::{self, DepthUnit};
 use std::io::Read;
 use std::path::Path;
 
@@ -162,13 +162,6 @@ impl VideoFrame {
             beyond += usize::from(!(near_m..=far_m).contains(&metres));
         }
         beyond as f64 / all.max(1) as f64
-    }
-
-    /// Returns how the frame's depth was enlarged to the picture's size, if it was. Sessions find it too.
-    pub fn enlarged(&self) -> Option<Doubt> {
-        let depth = self.depth.as_ref().filter(|depth| depth.size == self.colour_size)?;
-        let readings = Array2::from_shape_vec(depth.size.shape(), depth.readings().collect()).ok()?;
-        enlarged::find(readings.view()).map(Doubt::Enlarged)
     }
 
     /// Returns the reason to doubt the range of the frame's depth, if it is in metres and there is one.

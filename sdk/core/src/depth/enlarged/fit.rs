@@ -1,6 +1,7 @@
 //! The least squares fit of a line of pixels by an enlarged line of readings.
 
 use super::Enlarging;
+use ndarray::ArrayView2;
 
 /// The number of readings that make a pixel, at most.
 const TAPS: usize = 4;
@@ -71,10 +72,54 @@ pub(super) struct Fit {
     /// The readings beyond the first that are no readings of the grid.
     beyond: usize,
     grid: usize,
+    is_cubic: bool,
 }
+
+/// The least and the largest number of depth. A bicubic map swings beyond its readings, and what lies beyond the
+/// numbers of a file was cut off.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    pub(super) least: f32,
+    pub(super) most: f32,
+}
+
+impl Limits {
+    /// Nothing was cut off.
+    pub(super) const NONE: Limits = Limits {
+        least: f32::NEG_INFINITY,
+        most: f32::INFINITY,
+    };
+
+    /// Returns the ends of the numbers of `depth` that are finite.
+    pub(super) fn of(depth: ArrayView2<'_, f32>) -> Self {
+        let finite = depth.iter().filter(|v| v.is_finite());
+        let (least, most) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        Limits { least, most }
+    }
+
+    /// Returns the limits of depth from which `low` is subtracted and that is divided by `range`.
+    pub(super) fn scaled(self, low: f32, range: f32) -> Self {
+        let Limits { least, most } = self;
+        let [least, most] = [least, most].map(|end| (end - low) / range);
+        Limits { least, most }
+    }
+
+    /// Checks whether `value` may have been cut off from `made`.
+    fn hide(self, value: f32, made: f64) -> bool {
+        // Readings of rows, which columns are fitted to, lie on the limits but for rounding.
+        let near = 1e-3 * (self.most - self.least);
+        value <= self.least + near && made < f64::from(value) || value >= self.most - near && made > f64::from(value)
+    }
+}
+
+/// The most rounds in which pixels that were cut off take the numbers of the fit.
+const ROUNDS: usize = 12;
+/// The change of a pixel, as a share of the range, below which the rounds end.
+const SETTLED: f64 = 2e-4;
 
 /// Working memory.
 pub(super) struct FitScratch {
+    line: Vec<f64>,
     readings: Vec<f64>,
     errors: Vec<f64>,
 }
@@ -109,39 +154,71 @@ impl Fit {
             factor,
             beyond,
             grid,
+            is_cubic: kernel.enlarging() == Enlarging::Bicubic,
         }
     }
 
     pub(super) fn scratch(&self) -> FitScratch {
         FitScratch {
+            line: vec![0.0; self.taps.len()],
             readings: vec![0.0; self.factor.len()],
             errors: vec![0.0; self.taps.len()],
         }
     }
 
-    /// Returns the readings of the grid whose enlargement is nearest to `line`.
-    pub(super) fn readings<'a>(&self, line: &[f32], scratch: &'a mut FitScratch) -> &'a [f64] {
-        self.solve(line, &mut scratch.readings);
+    /// Returns the readings of the grid whose enlargement, cut off at `limits`, is nearest to `line`.
+    pub(super) fn readings<'a>(&self, line: &[f32], limits: Limits, scratch: &'a mut FitScratch) -> &'a [f64] {
+        self.fit(line, limits, scratch);
         &scratch.readings[self.beyond..][..self.grid]
     }
 
-    /// Returns how much each pixel of `line` differs from the nearest enlargement.
-    pub(super) fn errors<'a>(&self, line: &[f32], scratch: &'a mut FitScratch) -> &'a [f64] {
-        let FitScratch { readings, errors } = scratch;
-        self.solve(line, readings);
-        for ((error, value), (first, weights)) in errors.iter_mut().zip(line).zip(&self.taps) {
-            let made = &readings[*first..][..TAPS];
-            let made: f64 = weights.iter().zip(made).map(|(weight, reading)| weight * reading).sum();
-            *error = f64::from(*value) - made;
+    /// Returns how much each pixel of `line` differs from the nearest enlargement, cut off at `limits`.
+    pub(super) fn errors<'a>(&self, line: &[f32], limits: Limits, scratch: &'a mut FitScratch) -> &'a [f64] {
+        self.fit(line, limits, scratch);
+        let FitScratch { readings, errors, .. } = scratch;
+        for ((error, value), taps) in errors.iter_mut().zip(line).zip(&self.taps) {
+            let made = made(taps, readings);
+            let hidden = self.is_cubic && limits.hide(*value, made);
+            *error = if hidden { 0.0 } else { f64::from(*value) - made };
         }
         errors
     }
 
-    fn solve(&self, line: &[f32], readings: &mut [f64]) {
+    /// Fits `line`. A pixel on the limits that a cubic fit carries beyond them was cut off, and takes the fit's number
+    /// in the next round.
+    fn fit(&self, line: &[f32], limits: Limits, scratch: &mut FitScratch) {
+        let FitScratch {
+            line: wanted, readings, ..
+        } = scratch;
+        wanted.iter_mut().zip(line).for_each(|(to, v)| *to = f64::from(*v));
+        self.solve(wanted, readings);
+        if !self.is_cubic || !limits.least.is_finite() {
+            return;
+        }
+        for _ in 0..ROUNDS {
+            let mut changed = 0.0f64;
+            for ((wanted, value), taps) in wanted.iter_mut().zip(line).zip(&self.taps) {
+                let made = made(taps, readings);
+                let now = if limits.hide(*value, made) {
+                    made
+                } else {
+                    f64::from(*value)
+                };
+                changed = changed.max((now - *wanted).abs());
+                *wanted = now;
+            }
+            if changed <= SETTLED * f64::from(limits.most - limits.least) {
+                break;
+            }
+            self.solve(wanted, readings);
+        }
+    }
+
+    fn solve(&self, line: &[f64], readings: &mut [f64]) {
         readings.fill(0.0);
         for (value, (first, weights)) in line.iter().zip(&self.taps) {
             for (reading, weight) in readings[*first..][..TAPS].iter_mut().zip(weights) {
-                *reading += weight * f64::from(*value);
+                *reading += weight * value;
             }
         }
         for i in 0..readings.len() {
@@ -156,6 +233,16 @@ impl Fit {
             readings[i] = (readings[i] - above) / self.factor[i][0];
         }
     }
+}
+
+/// Returns the pixel that `readings` make.
+fn made((first, weights): &(usize, [f64; TAPS]), readings: &[f64]) -> f64 {
+    let readings = &readings[*first..][..TAPS];
+    weights
+        .iter()
+        .zip(readings)
+        .map(|(weight, reading)| weight * reading)
+        .sum()
 }
 
 /// Returns the Cholesky factor of the normal equations of `taps` for `count` readings: entry k of row i is that of
@@ -195,7 +282,7 @@ mod tests {
         for kernel in Kernel::ALL {
             for (grid, shift) in [(35, 0.0), (20, 0.0), (10, 0.25), (14, 0.5)] {
                 let fit = Fit::new(line.len(), grid, kernel, shift);
-                let errors = fit.errors(&line, &mut fit.scratch()).to_vec();
+                let errors = fit.errors(&line, Limits::NONE, &mut fit.scratch()).to_vec();
                 // The errors of a least squares fit are orthogonal to every reading's enlargement.
                 let mut along = vec![0.0; fit.factor.len()];
                 for (error, (first, weights)) in errors.iter().zip(&fit.taps) {
@@ -225,7 +312,7 @@ mod tests {
                 });
                 let line: Vec<f32> = line.collect();
                 let mut scratch = fit.scratch();
-                let found = fit.readings(&line, &mut scratch);
+                let found = fit.readings(&line, Limits::NONE, &mut scratch);
                 let apart = found
                     .iter()
                     .zip(&readings)

@@ -253,3 +253,43 @@ fn a_stream_reads_enlarged_depth_on_its_grid() {
     let (nothing, _) = conditioned(&scene(SIZE, 8));
     assert_eq!(nothing, None);
 }
+
+/// What a program cut off, because a bicubic map swings beyond the numbers of a file, may hide the grid, but does not
+/// spoil its readings.
+#[test]
+fn overshoots_that_were_cut_off_are_read_past() {
+    let levels = |d: &f32| ((d - 900.0) / 1700.0 * 255.0).round().clamp(0.0, 255.0);
+    let mut missed = 0;
+    for factor in [3.0, 4.0, 6.0] {
+        for seed in 10..14 {
+            // The wall and the nearest discs lie at the ends of 8 bits.
+            let readings = scene(grid(factor), seed).map(levels);
+            for a in [-0.5, -0.75] {
+                let depth = enlarge(&readings, SIZE, Enlarging::Bicubic, a).mapv(|d| d.round().clamp(0.0, 255.0));
+                let found = find(depth.view());
+                let Some(found) = found.filter(|found| found.by == Enlarging::Bicubic) else {
+                    missed += 1;
+                    continue;
+                };
+                assert_eq!(found.factor, factor, "{seed} {a}");
+                let back = found.readings(depth.view());
+                let apart = back.iter().zip(&readings).filter(|(a, b)| (*a - *b).abs() > 3.0);
+                let share = apart.count() as f64 / readings.len() as f64;
+                assert!(share < 0.01, "{factor} {seed} {a}: {share}");
+            }
+        }
+    }
+    assert!(missed <= 12, "{missed} of 24");
+}
+
+/// Masks, and depth of full resolution that lies at both ends of its numbers, are not taken for what was cut off.
+#[test]
+fn depth_at_the_ends_of_its_numbers_is_none() {
+    for seed in 40..52 {
+        let clean = scene(SIZE, seed);
+        for (low, range) in [(900.0, 1700.0), (1500.0, 600.0), (1990.0, 20.0)] {
+            let levels = clean.mapv(|d| ((d - low) / range * 255.0).round().clamp(0.0, 255.0));
+            assert_eq!(find(levels.view()), None, "{seed} {low}");
+        }
+    }
+}

@@ -135,7 +135,6 @@ impl Source {
             )));
         }
         if self.given == 0 {
-            doubts.extend(frame.enlarged());
             doubts.extend(match self.range_m {
                 Some((near_m, far_m)) => Doubt::of_clipped(frame.beyond(near_m, far_m), near_m, far_m),
                 None => frame.crowded(),
