@@ -332,7 +332,7 @@ impl SweepPlan {
             }
             let tile = Tile::of(&self.layout, self.fir, surfaces, index);
             scratch.tiles.with(|scratch| {
-                tile.gather(scratch);
+                scratch.points.gather(&tile);
                 for (colour, filters) in self.filters.iter().enumerate() {
                     tile.sweep(colour, filters, scratch);
                     let mut plane = planes[colour].lock().unwrap_or_else(PoisonError::into_inner);

@@ -531,7 +531,7 @@ fn write_page(
         ];
         figures.extend(
             row.brightness
-                .map(|brightness| ("Brightness".into(), format!("{brightness:.3} of what it is judged by"))),
+                .map(|brightness| ("Brightness".into(), format!("{brightness:.3} of that of the reference"))),
         );
         scenes.push(scene(row.judged.name(), &row.judged.hologram, figures)?);
     }

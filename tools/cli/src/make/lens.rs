@@ -17,7 +17,7 @@ use std::time::Instant;
 /// The name of the method.
 pub(crate) const FOURIER: &str = "fourier";
 
-/// The number of planes at which pictures are judged.
+/// The number of planes at which pictures are compared.
 const JUDGED_PLANES: usize = 32;
 
 impl HologramRequest {

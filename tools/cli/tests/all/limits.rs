@@ -1,7 +1,7 @@
 //! What `devices` says that a display shows at most, against the light of a simulated display.
 
 use crate::folder;
-use folder::Folder;
+use folder::{Folder, SMALL_HOLOGRAM};
 use ndarray::{Array2, Axis};
 use num_complex::Complex64;
 use phasefront::Display;
@@ -13,6 +13,19 @@ use std::fs;
 
 const SIDE: usize = 96;
 const DISPLAY: &str = "width = 96\nheight = 96\nvolume_depth_mm = 80\nwavelengths_nm = [520]\n";
+
+/// Makes a hologram of a picture on one plane, whose values are amplitudes; `--display` and `-o` follow.
+const FLAT_AMPLITUDES: [&str; 9] = [
+    "hologram",
+    "--rgb",
+    "rgb.png",
+    "--rgb-encoding",
+    "amplitude",
+    "--depth",
+    "flat",
+    "--method",
+    "sweep",
+];
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
@@ -32,18 +45,13 @@ fn stripes(folder: &Folder, display: &str, pixels: usize, z_mm: f64) -> Array2<f
         .save(folder.path("rgb.png"))
         .unwrap();
     let z = z_mm.to_string();
-    let make = [
-        "hologram",
-        "--rgb",
-        "rgb.png",
-        "--rgb-encoding",
-        "amplitude",
-        "--depth",
-        "flat",
-        "--z-mm",
-        &z,
-    ];
-    folder.succeeds(&[&make[..], &["--method", "sweep", "--display", "d.toml", "-o", "h.png"]].concat());
+    folder.succeeds(
+        &[
+            &FLAT_AMPLITUDES[..],
+            &["--z-mm", &z, "--display", "d.toml", "-o", "h.png"],
+        ]
+        .concat(),
+    );
     let straight = Curves {
         range: vec![255.0 / 256.0],
         unevenness: 0.0,
@@ -139,19 +147,8 @@ fn the_light_in_the_picture_is_that_of_the_aperture() {
         .save(folder.path("rgb.png"))
         .unwrap();
     let light = |more: &[&str]| {
-        let make = [
-            "hologram",
-            "--rgb",
-            "rgb.png",
-            "--rgb-encoding",
-            "amplitude",
-            "--depth",
-            "flat",
-            "--method",
-            "sweep",
-        ];
         let to = ["--display", "d.toml", "-o", "h.png", "--json"];
-        let told = json(&folder.succeeds(&[&make[..], &to, more].concat()))["light"]
+        let told = json(&folder.succeeds(&[&FLAT_AMPLITUDES[..], &to, more].concat()))["light"]
             .as_f64()
             .unwrap();
         let levels = levels(&folder);
@@ -197,17 +194,7 @@ fn a_request_beyond_the_limits_is_told() {
         String::from_utf8(output.stderr).unwrap()
     };
     let on = ["--display", "d.toml"];
-    let make = [
-        "hologram",
-        "--rgb",
-        "rgb.png",
-        "--depth",
-        "depth.png",
-        "--method",
-        "sweep",
-        "-o",
-        "h.png",
-    ];
+    let make = [&SMALL_HOLOGRAM[..], &["-o", "h.png"]].concat();
     let said = warned(&[&make[..], &on].concat());
     assert!(
         said.contains("the volume reaches z = 3.0 mm: details below 67 um are lost there"),

@@ -215,7 +215,7 @@ fn judge_takes_phase_maps_of_the_image() {
             row["wave_ms"].is_null() && row["brightness"].is_null() == (name != "h.png"),
             "{row}"
         );
-        // The same levels are judged as the same light, but for the scale, which the hologram's own file says.
+        // The same levels give the same figures. Only the scale differs, which the hologram's own file says.
         let natural = |row: &serde_json::Value| row["natural"]["psnr"].as_f64().unwrap();
         assert!((natural(row) - natural(&of_file[0])).abs() < 1e-3, "{row}");
         assert!(db(row, "psnr_db") > db(&of_file[0], "psnr_db") - 1.0, "{row}");

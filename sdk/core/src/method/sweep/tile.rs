@@ -116,7 +116,7 @@ pub(super) struct TileScratch {
     field: Aligned,
     /// The last rows filtered along x, in rows of `stride`.
     ring: Aligned,
-    points: Points,
+    pub(super) points: Points,
     /// The span of possible light in each row of the field.
     lit: Vec<Span>,
     /// The registers that hold `lit`.
@@ -197,11 +197,6 @@ impl<'a> Tile<'a> {
     pub(super) fn place(&self, y: usize, x: usize) -> (usize, usize) {
         let border = self.layout.border;
         (y + border - self.rows.start, x + border - self.columns.start)
-    }
-
-    /// Finds the points that the tile needs.
-    pub(super) fn gather(&self, scratch: &mut TileScratch) {
-        scratch.points.gather(self);
     }
 
     /// Sweeps one colour over the gathered points. [`Tile::store`] reads the result.
