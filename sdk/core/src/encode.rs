@@ -62,7 +62,6 @@ impl EncoderOptions {
     ///
     /// # Errors
     /// Returns an error if a number is out of its range.
-    #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         self.brightness.check()?;
         let steps = self.local_steps + self.midpoint_steps + self.focus_steps;

@@ -128,7 +128,6 @@ impl RgbdFrame {
     }
 
     /// Creates a black frame with `colours` colours at the far end of the volume.
-    #[doc(hidden)]
     pub fn black(colours: usize, Size { width, height }: Size) -> Self {
         RgbdFrame {
             rgb: Array3::zeros((colours, height, width)),
@@ -177,8 +176,7 @@ impl RgbdFrame {
     ///
     /// # Errors
     /// Returns an error if the size or the number of colours differs.
-    #[doc(hidden)]
-    pub fn check(&self, plan: Size, colours: usize) -> Result<()> {
+    pub(crate) fn check(&self, plan: Size, colours: usize) -> Result<()> {
         let size = self.size();
         if size != plan {
             return Err(Error::Frame(format!("the frame is {size}; this plan takes {plan}")));

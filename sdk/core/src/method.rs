@@ -42,7 +42,10 @@ impl Method {
     }
 
     /// Checks whether the method suits `display`.
-    #[doc(hidden)]
+    ///
+    /// # Errors
+    /// Returns [`Error::Network`] if the network takes other planes than the method gives it, or was not trained for
+    /// such a display.
     pub fn check(&self, display: &Display) -> Result<()> {
         let (network, input) = match self {
             Method::Sweep(_) => return Ok(()),

@@ -23,7 +23,6 @@ impl Device {
     ///
     /// # Errors
     /// Returns the errors of [`Device::open_async`].
-    #[doc(hidden)]
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         block_on(Self::open_async(options))
     }

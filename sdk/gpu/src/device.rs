@@ -98,7 +98,6 @@ impl Device {
     /// # Errors
     /// Returns [`GpuError::None`] if there is no GPU, or none with that name (the message lists the GPUs that exist),
     /// and [`GpuError::Refused`] if the driver does not open it.
-    #[doc(hidden)]
     pub async fn open_async(options: &DeviceOptions) -> Result<Self> {
         Self::open_with_async(options, &Allowed::default()).await
     }

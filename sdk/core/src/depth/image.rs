@@ -118,8 +118,7 @@ pub enum ConfidenceFormat {
 
 impl ConfidenceFormat {
     /// Converts `byte` to a confidence in 0..=1.
-    #[doc(hidden)]
-    pub fn confidence(self, byte: u8) -> f32 {
+    pub(crate) fn confidence(self, byte: u8) -> f32 {
         match self {
             ConfidenceFormat::LowMediumHigh => f32::from(byte.min(2)) / 2.0,
             ConfidenceFormat::U8 => f32::from(byte) / 255.0,

@@ -23,8 +23,7 @@ impl DepthRange {
     ///
     /// # Errors
     /// Returns an error if fixed distances are not a valid range.
-    #[doc(hidden)]
-    pub fn check(self) -> Result<()> {
+    pub(crate) fn check(self) -> Result<()> {
         match self {
             DepthRange::Fixed { near_m, far_m } if !(near_m >= 0.0 && near_m < far_m && far_m.is_finite()) => {
                 Err(Error::Setting(format!(

@@ -10,7 +10,6 @@ use crate::frame::RgbdFrame;
 use rayon::prelude::*;
 
 /// The change of depth over a window above which it holds an edge, as a share of the volume.
-#[doc(hidden)]
 pub const EDGE: f32 = 0.1;
 /// The least number of steps of a window.
 const LEAST_WINDOW: usize = 25;
@@ -19,14 +18,12 @@ const WINDOWS: usize = 41;
 /// The number of lines along the longer side of a large frame that are measured.
 const MEASURED: usize = 480;
 /// The share of a window's change that a sharp edge makes in one step.
-#[doc(hidden)]
 pub const ONE_STEP: f32 = 0.75;
 /// The least share of sharp edges in depth that is not soft.
 const SHARP: f32 = 0.5;
 /// The distance from [`SHARP`] within which a video frame stays what the previous frame was.
 const HYSTERESIS: f32 = 0.05;
 /// The number of lines in a thread's unit of work. The first of each is measured.
-#[doc(hidden)]
 pub const LINES: usize = 32;
 
 /// Returns whether depth of which `sharp_edges` of the edges are sharp is soft. `was` says it of the previous frame of
@@ -59,14 +56,12 @@ pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
 }
 
 /// Returns the number of steps of a window of frames of `size`, and the number of lines of which one is measured.
-#[doc(hidden)]
 pub fn scale(size: Size) -> (usize, usize) {
     let longer = size.height.max(size.width);
     ((longer / WINDOWS).max(LEAST_WINDOW), (longer / MEASURED).max(1))
 }
 
 /// Returns the share of `sharp` among `all` edges, and 1 if there are none.
-#[doc(hidden)]
 pub fn share(sharp: u32, all: u32) -> f32 {
     if all == 0 { 1.0 } else { sharp as f32 / all as f32 }
 }

@@ -39,7 +39,6 @@ impl DepthOptions {
     ///
     /// # Errors
     /// Returns an error if the range is invalid or the confidence lies outside 0..=1.
-    #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         if !(0.0..=1.0).contains(&self.least_confidence) {
             return Err(Error::Setting(format!(

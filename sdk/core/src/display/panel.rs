@@ -86,21 +86,18 @@ impl Flatness {
     }
 
     /// Returns the maps, (1 or 3, H, W), in turns of 2π/65536.
-    #[doc(hidden)]
-    pub fn maps(&self) -> &[u16] {
+    pub(crate) fn maps(&self) -> &[u16] {
         &self.maps
     }
 }
 
 impl Panel {
     /// Returns whether the panel adds nothing, so that the response alone converts phases to levels.
-    #[doc(hidden)]
     pub fn is_plain(&self) -> bool {
         !self.adds() && !self.goes_on()
     }
 
     /// Returns whether the panel adds phases.
-    #[doc(hidden)]
     pub fn adds(&self) -> bool {
         self.carrier_rad != [0.0; 2] || self.lens_m.is_some() || self.flatness.is_some()
     }
@@ -117,8 +114,7 @@ impl Panel {
     /// # Errors
     /// Returns an error if the flatness map is for another size or number of colours, the focal length is 0 or not
     /// finite, or the carrier and the lens change the phase by more than half a turn between neighbouring pixels.
-    #[doc(hidden)]
-    pub fn check(&self, display: &Display) -> Result<()> {
+    pub(crate) fn check(&self, display: &Display) -> Result<()> {
         if let Some(flatness) = &self.flatness
             && flatness.size != display.size()
         {

@@ -24,7 +24,6 @@ const REACH: usize = 4;
 
 impl Registration {
     /// Returns whether any colour is shifted or scaled.
-    #[doc(hidden)]
     pub fn moves(&self) -> bool {
         self.shift_px.iter().any(|shift| *shift != [0.0; 2]) || self.scale.iter().any(|scale| *scale != 1.0)
     }
@@ -34,8 +33,7 @@ impl Registration {
     /// # Errors
     /// Returns an error if the number of colours differs, a shift exceeds 1000 pixels, or a scale is outside 0.8 to
     /// 1.25.
-    #[doc(hidden)]
-    pub fn check(&self, colours: usize) -> Result<()> {
+    pub(crate) fn check(&self, colours: usize) -> Result<()> {
         for (what, count) in [("shift_px", self.shift_px.len()), ("scale", self.scale.len())] {
             if count > 0 {
                 check_colours(what, count, colours)?;
@@ -83,7 +81,7 @@ impl RegistrationPlan {
     /// Plans the registration of `colours` planes of `size`, or returns `None` if no colour moves.
     ///
     /// # Errors
-    /// Returns an error if [`Registration::check`] does.
+    /// Returns the errors of `Registration::check`.
     pub(crate) fn new(Size { width, height }: Size, colours: usize, of: &Registration) -> Result<Option<Self>> {
         of.check(colours)?;
         if !of.moves() {

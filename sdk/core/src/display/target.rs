@@ -82,7 +82,6 @@ impl Target {
     /// Returns an error if a table or a map is for another modulator or number of lasers, if a table is given for a
     /// display of more than 8 bits, if the panel or the registration is invalid, or if the panel of a learned model
     /// adds phases.
-    #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         let colours = self.display.colours();
         if let Response::PerPixel(table) = &self.response {

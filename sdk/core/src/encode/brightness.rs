@@ -24,8 +24,7 @@ impl Brightness {
     ///
     /// # Errors
     /// Returns an error if it is not positive.
-    #[doc(hidden)]
-    pub fn check(self) -> Result<()> {
+    pub(crate) fn check(self) -> Result<()> {
         match self {
             Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Setting(format!(
                 "a scale of {scale} cannot stand for full light; it must be above 0"
@@ -35,8 +34,7 @@ impl Brightness {
     }
 
     /// Returns the scale of `field`, or `None` for the field's largest amplitude. A smoothed scale starts from `past`.
-    #[doc(hidden)]
-    pub fn scale(self, field: &[Complex32], past: Option<Past>, percentile: &mut Percentile) -> Option<f32> {
+    pub(crate) fn scale(self, field: &[Complex32], past: Option<Past>, percentile: &mut Percentile) -> Option<f32> {
         match self {
             Brightness::FrameMax => None,
             Brightness::Fixed(scale) => Some(scale),

@@ -134,8 +134,7 @@ impl Orientation {
     }
 
     /// Returns the view of the upright image in `plane`, which holds a sensor's image of that size.
-    #[doc(hidden)]
-    pub fn view(self, plane: &Plane<'_>, size: Size) -> View {
+    pub(crate) fn view(self, plane: &Plane<'_>, size: Size) -> View {
         let at = |(x, y): (usize, usize)| (y * plane.row_stride + x * plane.pixel_stride) as isize;
         let upright = self.upright_size(size);
         let pixel = |x, y| at(self.sensor_pixel(x, y, size));

@@ -244,7 +244,6 @@ impl Network {
 
     /// Returns the number format of the layers: `f32` or `int8`, or `own` for a network of another form, which runs in
     /// the formats that its file names.
-    #[doc(hidden)]
     pub fn precision(&self) -> &'static str {
         self.of_chain().map_or("own", |of| of.chain.precision.name())
     }

@@ -114,7 +114,6 @@ impl DisplayPlan {
     ///
     /// # Errors
     /// Returns the same errors as [`Self::new`].
-    #[doc(hidden)]
     pub fn for_frames(size: Size, z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
         if let Encoding::Deep(network) = &options.encoding {
             network.check_prefilter(&target.display)?;
@@ -194,7 +193,6 @@ impl DisplayPlan {
     ///
     /// # Panics
     /// Panics if `scratch` belongs to another plan or the frame has another shape or other colours.
-    #[doc(hidden)]
     pub fn aim(&self, frame: &RgbdFrame, scratch: &mut DisplayScratch) {
         if let (Some(plan), Some(of)) = (&self.natural, &mut scratch.natural) {
             plan.aim(frame, of);

@@ -135,7 +135,6 @@ impl PerPixel {
     ///
     /// # Errors
     /// Returns the errors of [`Self::new`].
-    #[doc(hidden)]
     pub fn of_lasers(size: Size, reach: &[f64], level: impl Fn(usize, f64) -> f64) -> Result<Self> {
         let spacing = size.width.max(size.height).saturating_sub(1).max(1);
         let (rows, columns) = nodes(size, spacing);
@@ -243,35 +242,30 @@ impl PerPixel {
     }
 
     /// Returns the number of pixels between nodes.
-    #[doc(hidden)]
     pub fn spacing(&self) -> usize {
         self.spacing
     }
 
     /// Returns the number of phase intervals, K.
-    #[doc(hidden)]
     pub fn intervals(&self) -> usize {
         self.intervals
     }
 
     /// Returns the knots of all nodes, (C, Gh, Gw, K+1), in levels.
-    #[doc(hidden)]
     pub fn knots(&self) -> &[f32] {
         &self.levels
     }
 
     /// Returns the phase of each node, (C, Gh, Gw), from which phase 0 is nearer than the largest phase.
-    #[doc(hidden)]
     pub fn turns(&self) -> &[f32] {
         &self.turn
     }
 
     /// Returns the level for `phase`, in \[0, 2π), at value `at` of a stack (C, H, W). This implements the rule
-    /// directly; tests compare [`Self::levels`] with it.
+    /// directly; tests compare the form for rows with it.
     ///
     /// # Panics
     /// Panics if `at` lies outside the stack.
-    #[doc(hidden)]
     pub fn level(&self, phase: f32, at: usize) -> u8 {
         let turn = self.interpolate(at, |node| self.turn[node]);
         let phase = if phase >= turn { 0.0 } else { phase };
@@ -322,8 +316,7 @@ impl PerPixel {
     /// # Panics
     /// Panics if the lengths differ or the phases extend beyond the row.
     #[inline(always)]
-    #[doc(hidden)]
-    pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
+    pub(crate) fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         let (colour, y, x) = self.place(first);
         let end = self.corner.1 + self.window.width;
@@ -375,8 +368,7 @@ impl PerPixel {
     }
 
     /// Returns the smallest phase whose curve reaches `level` at value `at` of a stack, in \[0, 2π).
-    #[doc(hidden)]
-    pub fn phase(&self, level: u8, at: usize) -> f32 {
+    pub(crate) fn phase(&self, level: u8, at: usize) -> f32 {
         let knots = self.intervals + 1;
         let value = |k: usize| self.interpolate(at, |node| self.levels[node * knots + k]);
         let wanted = f32::from(level);
