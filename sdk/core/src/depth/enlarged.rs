@@ -14,7 +14,7 @@ mod fit;
 
 use crate::Size;
 use crate::depth::fill_nearest;
-use fit::{Fit, Kernel, Limits};
+use fit::{Fit, Kernel, LANES, Limits};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
@@ -149,7 +149,7 @@ fn candidates(size: Size) -> Vec<Enlarged> {
 
 /// The lines along one axis that are examined.
 struct Lines {
-    /// The lines, without holes, as shares of the range.
+    /// The lines with edges, without holes, as shares of the range.
     values: Vec<Vec<f32>>,
     /// Which pixels of each line count, because they lie at an edge.
     edges: Vec<Vec<bool>>,
@@ -191,8 +191,10 @@ impl Lines {
                     places[x] = true;
                 }
             }
-            lines.values.push(values);
-            lines.edges.push(edges);
+            if edges.contains(&true) {
+                lines.values.push(values);
+                lines.edges.push(edges);
+            }
         }
         (places.iter().filter(|place| **place).count() >= LEAST_PLACES).then_some(lines)
     }
@@ -237,12 +239,12 @@ impl Enlarged {
             let fit = Fit::new(pixels, grids[axis], self.kernel, shift);
             let mut squares = Vec::new();
             let mut scratch = fit.scratch();
-            for (values, edges) in lines[axis].values.iter().zip(&lines[axis].edges) {
-                if edges.contains(&true) {
-                    let limits = if cut { lines[axis].limits } else { Limits::NONE };
-                    let errors = fit.errors(values, limits, &mut scratch);
+            let limits = if cut { lines[axis].limits } else { Limits::NONE };
+            for (values, edges) in lines[axis].values.chunks(LANES).zip(lines[axis].edges.chunks(LANES)) {
+                let errors = fit.errors(values, limits, &mut scratch);
+                for (lane, edges) in edges.iter().enumerate() {
                     let at_edges = errors.iter().zip(edges).filter(|(_, is_edge)| **is_edge);
-                    squares.extend(at_edges.map(|(error, _)| error * error));
+                    squares.extend(at_edges.map(|(errors, _)| errors[lane] * errors[lane]));
                 }
             }
             let kept = ((KEPT * squares.len() as f64).ceil() as usize).clamp(1, squares.len());
@@ -323,11 +325,17 @@ fn along_rows(depth: ArrayView2<'_, f32>, grid: usize, kernel: Kernel, limits: L
     let (height, width) = depth.dim();
     let fit = Fit::new(width, grid, kernel, 0.0);
     let mut readings = vec![0.0; height * grid];
-    (readings.par_chunks_exact_mut(grid)).enumerate().for_each_init(
+    (readings.par_chunks_mut(LANES * grid)).enumerate().for_each_init(
         || fit.scratch(),
-        |scratch, (y, to)| {
-            let found = fit.readings(&depth.row(y).to_vec(), limits, scratch);
-            to.iter_mut().zip(found).for_each(|(to, reading)| *to = *reading as f32);
+        |scratch, (group, to)| {
+            let rows = LANES * group..(LANES * (group + 1)).min(height);
+            let rows: Vec<Vec<f32>> = rows.map(|y| depth.row(y).to_vec()).collect();
+            let found = fit.readings(&rows, limits, scratch);
+            for (lane, to) in to.chunks_exact_mut(grid).enumerate() {
+                to.iter_mut()
+                    .zip(found)
+                    .for_each(|(to, readings)| *to = readings[lane] as f32);
+            }
         },
     );
     Array2::from_shape_vec((height, grid), readings).expect("rows of the grid")

@@ -105,10 +105,11 @@ impl Limits {
     }
 
     /// Checks whether `value` may have been cut off from `made`.
-    fn hide(self, value: f32, made: f64) -> bool {
+    fn hide(self, value: f64, made: f64) -> bool {
         // Readings of rows, which columns are fitted to, lie on the limits but for rounding.
         let near = 1e-3 * (self.most - self.least);
-        value <= self.least + near && made < f64::from(value) || value >= self.most - near && made > f64::from(value)
+        let [low, high] = [self.least + near, self.most - near].map(f64::from);
+        value <= low && made < value || value >= high && made > value
     }
 }
 
@@ -117,11 +118,19 @@ const ROUNDS: usize = 12;
 /// The change of a pixel, as a share of the range, below which the rounds end.
 const SETTLED: f64 = 2e-4;
 
+/// The number of lines that are fitted together. Each step of a line's solution needs the one before, so the steps of
+/// several lines fill the time.
+pub(super) const LANES: usize = 8;
+/// A number of each line; 0 of those that are missing.
+pub(super) type Lanes = [f64; LANES];
+
 /// Working memory.
 pub(super) struct FitScratch {
-    line: Vec<f64>,
-    readings: Vec<f64>,
-    errors: Vec<f64>,
+    values: Vec<Lanes>,
+    wanted: Vec<Lanes>,
+    readings: Vec<Lanes>,
+    solved: Vec<Lanes>,
+    errors: Vec<Lanes>,
 }
 
 impl Fit {
@@ -159,90 +168,149 @@ impl Fit {
     }
 
     pub(super) fn scratch(&self) -> FitScratch {
+        let [pixels, readings] = [self.taps.len(), self.factor.len()].map(|count| vec![[0.0; LANES]; count]);
         FitScratch {
-            line: vec![0.0; self.taps.len()],
-            readings: vec![0.0; self.factor.len()],
-            errors: vec![0.0; self.taps.len()],
+            values: pixels.clone(),
+            wanted: pixels.clone(),
+            readings: readings.clone(),
+            solved: readings,
+            errors: pixels,
         }
     }
 
-    /// Returns the readings of the grid whose enlargement, cut off at `limits`, is nearest to `line`.
-    pub(super) fn readings<'a>(&self, line: &[f32], limits: Limits, scratch: &'a mut FitScratch) -> &'a [f64] {
-        self.fit(line, limits, scratch);
+    /// Returns the readings of the grid whose enlargement, cut off at `limits`, is nearest to each of up to [`LANES`]
+    /// `lines`.
+    pub(super) fn readings<'a>(
+        &self,
+        lines: &[impl AsRef<[f32]>],
+        limits: Limits,
+        scratch: &'a mut FitScratch,
+    ) -> &'a [Lanes] {
+        self.fit(lines, limits, scratch);
         &scratch.readings[self.beyond..][..self.grid]
     }
 
-    /// Returns how much each pixel of `line` differs from the nearest enlargement, cut off at `limits`.
-    pub(super) fn errors<'a>(&self, line: &[f32], limits: Limits, scratch: &'a mut FitScratch) -> &'a [f64] {
-        self.fit(line, limits, scratch);
-        let FitScratch { readings, errors, .. } = scratch;
-        for ((error, value), taps) in errors.iter_mut().zip(line).zip(&self.taps) {
+    /// Returns how much each pixel of up to [`LANES`] `lines` differs from the nearest enlargement, cut off at
+    /// `limits`.
+    pub(super) fn errors<'a>(
+        &self,
+        lines: &[impl AsRef<[f32]>],
+        limits: Limits,
+        scratch: &'a mut FitScratch,
+    ) -> &'a [Lanes] {
+        self.fit(lines, limits, scratch);
+        let FitScratch {
+            values,
+            readings,
+            errors,
+            ..
+        } = scratch;
+        for ((errors, values), taps) in errors.iter_mut().zip(values).zip(&self.taps) {
             let made = made(taps, readings);
-            let hidden = self.is_cubic && limits.hide(*value, made);
-            *error = if hidden { 0.0 } else { f64::from(*value) - made };
+            for ((error, value), made) in errors.iter_mut().zip(values).zip(made) {
+                let hidden = self.is_cubic && limits.hide(*value, made);
+                *error = if hidden { 0.0 } else { *value - made };
+            }
         }
         errors
     }
 
-    /// Fits `line`. A pixel on the limits that a cubic fit carries beyond them was cut off, and takes the fit's number
+    /// Fits `lines`. A pixel on the limits that a cubic fit carries beyond them was cut off, and takes the fit's number
     /// in the next round.
-    fn fit(&self, line: &[f32], limits: Limits, scratch: &mut FitScratch) {
+    fn fit(&self, lines: &[impl AsRef<[f32]>], limits: Limits, scratch: &mut FitScratch) {
         let FitScratch {
-            line: wanted, readings, ..
+            values,
+            wanted,
+            readings,
+            solved,
+            ..
         } = scratch;
-        wanted.iter_mut().zip(line).for_each(|(to, v)| *to = f64::from(*v));
+        for lane in 0..LANES {
+            match lines.get(lane) {
+                Some(line) => (values.iter_mut().zip(line.as_ref())).for_each(|(to, v)| to[lane] = f64::from(*v)),
+                None => values.iter_mut().for_each(|to| to[lane] = 0.0),
+            }
+        }
+        wanted.copy_from_slice(values);
         self.solve(wanted, readings);
         if !self.is_cubic || !limits.least.is_finite() {
             return;
         }
+        let settled = SETTLED * f64::from(limits.most - limits.least);
+        let mut is_settled = [false; LANES];
         for _ in 0..ROUNDS {
-            let mut changed = 0.0f64;
-            for ((wanted, value), taps) in wanted.iter_mut().zip(line).zip(&self.taps) {
+            let mut changed: Lanes = [0.0; LANES];
+            for ((wanted, values), taps) in wanted.iter_mut().zip(&*values).zip(&self.taps) {
                 let made = made(taps, readings);
-                let now = if limits.hide(*value, made) {
-                    made
-                } else {
-                    f64::from(*value)
-                };
-                changed = changed.max((now - *wanted).abs());
-                *wanted = now;
+                for lane in 0..LANES {
+                    let is_hidden = limits.hide(values[lane], made[lane]);
+                    let now = if is_hidden { made[lane] } else { values[lane] };
+                    changed[lane] = changed[lane].max((now - wanted[lane]).abs());
+                    wanted[lane] = now;
+                }
             }
-            if changed <= SETTLED * f64::from(limits.most - limits.least) {
+            for (is_settled, changed) in is_settled.iter_mut().zip(changed) {
+                *is_settled |= changed <= settled;
+            }
+            if !is_settled.contains(&false) {
                 break;
             }
-            self.solve(wanted, readings);
+            self.solve(wanted, solved);
+            // A line that has settled keeps its readings, whichever lines are fitted beside it.
+            for (to, from) in readings.iter_mut().zip(&*solved) {
+                for lane in (0..LANES).filter(|lane| !is_settled[*lane]) {
+                    to[lane] = from[lane];
+                }
+            }
         }
     }
 
-    fn solve(&self, line: &[f64], readings: &mut [f64]) {
-        readings.fill(0.0);
-        for (value, (first, weights)) in line.iter().zip(&self.taps) {
+    fn solve(&self, lines: &[Lanes], readings: &mut [Lanes]) {
+        readings.fill([0.0; LANES]);
+        for (values, (first, weights)) in lines.iter().zip(&self.taps) {
             for (reading, weight) in readings[*first..][..TAPS].iter_mut().zip(weights) {
-                *reading += weight * value;
+                add(reading, *weight, values);
             }
         }
-        for i in 0..readings.len() {
-            let below: f64 = (1..TAPS.min(i + 1)).map(|k| self.factor[i][k] * readings[i - k]).sum();
-            readings[i] = (readings[i] - below) / self.factor[i][0];
-        }
         let count = readings.len();
+        for i in 0..count {
+            let mut below = [0.0; LANES];
+            for k in 1..TAPS.min(i + 1) {
+                add(&mut below, self.factor[i][k], &readings[i - k]);
+            }
+            subtract_and_divide(&mut readings[i], &below, self.factor[i][0]);
+        }
         for i in (0..count).rev() {
-            let above: f64 = (1..TAPS.min(count - i))
-                .map(|k| self.factor[i + k][k] * readings[i + k])
-                .sum();
-            readings[i] = (readings[i] - above) / self.factor[i][0];
+            let mut above = [0.0; LANES];
+            for k in 1..TAPS.min(count - i) {
+                add(&mut above, self.factor[i + k][k], &readings[i + k]);
+            }
+            subtract_and_divide(&mut readings[i], &above, self.factor[i][0]);
         }
     }
 }
 
-/// Returns the pixel that `readings` make.
-fn made((first, weights): &(usize, [f64; TAPS]), readings: &[f64]) -> f64 {
-    let readings = &readings[*first..][..TAPS];
-    weights
-        .iter()
-        .zip(readings)
-        .map(|(weight, reading)| weight * reading)
-        .sum()
+/// Adds `values` times `weight` to `sums`.
+fn add(sums: &mut Lanes, weight: f64, values: &Lanes) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += weight * value;
+    }
+}
+
+/// Takes `less` from `values` and divides them by `divisor`.
+fn subtract_and_divide(values: &mut Lanes, less: &Lanes, divisor: f64) {
+    for (value, less) in values.iter_mut().zip(less) {
+        *value = (*value - less) / divisor;
+    }
+}
+
+/// Returns the pixel of each line that `readings` make.
+fn made((first, weights): &(usize, [f64; TAPS]), readings: &[Lanes]) -> Lanes {
+    let mut made = [0.0; LANES];
+    for (weight, readings) in weights.iter().zip(&readings[*first..][..TAPS]) {
+        add(&mut made, *weight, readings);
+    }
+    made
 }
 
 /// Returns the Cholesky factor of the normal equations of `taps` for `count` readings: entry k of row i is that of
@@ -276,13 +344,18 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    /// Returns what a fit says of the only line.
+    fn only(lanes: &[Lanes]) -> Vec<f64> {
+        lanes.iter().map(|lanes| lanes[0]).collect()
+    }
+
     #[test]
     fn the_fit_is_that_of_the_dense_normal_equations() {
         let line: Vec<f32> = (0..70).map(|x| ((x * 37 + 11) % 29) as f32 / 29.0).collect();
         for kernel in Kernel::ALL {
             for (grid, shift) in [(35, 0.0), (20, 0.0), (10, 0.25), (14, 0.5)] {
                 let fit = Fit::new(line.len(), grid, kernel, shift);
-                let errors = fit.errors(&line, Limits::NONE, &mut fit.scratch()).to_vec();
+                let errors = only(fit.errors(&[&line], Limits::NONE, &mut fit.scratch()));
                 // The errors of a least squares fit are orthogonal to every reading's enlargement.
                 let mut along = vec![0.0; fit.factor.len()];
                 for (error, (first, weights)) in errors.iter().zip(&fit.taps) {
@@ -312,13 +385,37 @@ mod tests {
                 });
                 let line: Vec<f32> = line.collect();
                 let mut scratch = fit.scratch();
-                let found = fit.readings(&line, Limits::NONE, &mut scratch);
+                let found = only(fit.readings(&[&line], Limits::NONE, &mut scratch));
                 let apart = found
                     .iter()
                     .zip(&readings)
                     .map(|(a, b)| (a - b).abs())
                     .fold(0.0, f64::max);
                 assert!(apart < 1e-4, "{kernel:?} {pixels}: {apart}");
+            }
+        }
+    }
+
+    /// Lines that are fitted together have the bits that each has alone, also where some settle before others.
+    #[test]
+    fn lines_do_not_touch_each_other() {
+        let limits = Limits { least: 0.0, most: 1.0 };
+        let lines: Vec<Vec<f32>> = (0..LANES as i32)
+            .map(|lane| {
+                (0..70)
+                    .map(|x| ((x / (2 + lane) * 5 + lane) % 4 - 1).clamp(0, 1) as f32)
+                    .collect()
+            })
+            .collect();
+        for kernel in Kernel::ALL {
+            for (grid, shift) in [(35, 0.0), (20, 0.25)] {
+                let fit = Fit::new(70, grid, kernel, shift);
+                let together = fit.readings(&lines, limits, &mut fit.scratch()).to_vec();
+                for (lane, line) in lines.iter().enumerate() {
+                    let alone = only(fit.readings(&[line], limits, &mut fit.scratch()));
+                    let beside: Vec<f64> = together.iter().map(|lanes| lanes[lane]).collect();
+                    assert_eq!(alone, beside, "{kernel:?} {grid}, line {lane}");
+                }
             }
         }
     }
