@@ -5,7 +5,7 @@ const at = (id) => document.getElementById(id);
 const DEPTH_MM = 6;
 const STEPS = Number(at("focus").max);
 
-const state = { focus: STEPS / 2, source: "", frames: 0, method: "rgbd-8", width: 640, localSteps: 1, backend: "cpu" };
+const state = { focus: STEPS / 2, source: "", frames: 0, method: "auto", width: 640, localSteps: 1, backend: "cpu" };
 globalThis.state = state;
 
 function say(error) {
@@ -41,7 +41,7 @@ function newest(fulfil) {
 
 const zOf = (focus) => (0.5 - focus / STEPS) * DEPTH_MM;
 
-let session, planned, hologram, said;
+let opened, planned, hologram, said;
 
 const LABELS = { shown: "What an eye sees of the hologram", phases: "The phases of the hologram" };
 
@@ -60,22 +60,25 @@ async function draw(id, { width, height }, onto) {
 // A driver in software is taken only by its name: `?adapter=swiftshader`.
 const adapter = new URLSearchParams(location.search).get("adapter") ?? undefined;
 
-// The session of these options. A new one is made if they change.
-async function sessionOf({ method, localSteps, width, height, video, backend }) {
+// The session of these options. A new one is opened if they change.
+function sessionOf({ method, localSteps, width, height, video, backend }) {
   const wanted = JSON.stringify([method, localSteps, width, height, video, backend]);
-  if (wanted === planned) return;
-  session?.close();
-  session = planned = hologram = canvases.shown = canvases.phases = undefined;
+  if (wanted === planned) return opened;
+  opened?.then((session) => session.close(), () => {});
+  hologram = canvases.shown = canvases.phases = undefined;
   const options = {
     target: { width, height },
-    method: method === "sweep" ? { kind: "sweep" } : { kind: "trained", network: method },
+    method: method === "auto" || method === "sweep" ? { kind: method } : { kind: "trained", network: method },
     localSteps,
     backend,
     adapter,
   };
-  session = await WorkerSession.open(options, video ? "video" : "image");
-  await session.warmUp();
   planned = wanted;
+  opened = WorkerSession.open(options, video ? "video" : "image");
+  opened.catch(() => {
+    if (planned === wanted) planned = undefined;
+  });
+  return opened;
 }
 
 // Returns how often it was called for `calls` in the last second.
@@ -129,11 +132,12 @@ async function show() {
   if (!picture) return;
   const { method, localSteps, width, backend } = state;
   const height = Math.round((width * picture.depth.height) / picture.depth.width);
-  await sessionOf({ method, localSteps, width, height, video: Boolean(stream), backend });
+  const opening = sessionOf({ method, localSteps, width, height, video: Boolean(stream), backend });
   const colour = pixels(picture.colour, width, height, true);
   // Depth is not interpolated, because a mean of two depths lies on neither surface.
   const depth = pixels(picture.depth, width, height, false);
   if (at("white").checked) depth.data = depth.data.map((value) => 255 - value);
+  const session = await opening;
   const start = performance.now();
   const frame = new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestamp: start * 1000 });
   const made = await session.process(frame, { transfer: [colour.data.buffer], onGpu: true });
@@ -185,10 +189,8 @@ async function take(source, files) {
   if (files.length !== 2) throw new Error(`${files.length} files; give two: a colour picture and its depth picture`);
   const images = await Promise.all(files.map(read));
   const named = files.findIndex(({ name }) => /depth/i.test(name));
-  const grey = images.findIndex(isGrey);
-  if (named < 0 && grey < 0)
-    throw new Error("both pictures are coloured; depth is a grey one, black near and white far");
-  const depth = named < 0 ? grey : named;
+  const depth = named < 0 ? images.findIndex(isGrey) : named;
+  if (depth < 0) throw new Error("both pictures are coloured; depth is a grey one, black near and white far");
   picture = { colour: images[1 - depth], depth: images[depth] };
   state.source = source;
 }
@@ -360,4 +362,6 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
 });
 
+// The session opens while the sample comes.
+sessionOf({ ...state, height: Math.round((state.width * 9) / 16), video: false });
 await sample();

@@ -93,11 +93,12 @@ export class Runner {
   }
 }
 
-const sandbox = process.getuid() === 0 ? ["--no-sandbox"] : [];
+/** Chromium refuses to sandbox itself for root. */
+export const SANDBOX = process.getuid() === 0 ? ["--no-sandbox"] : [];
 /** The browsers that the package's tests run in. */
 export const BROWSERS = {
   Chromium: () =>
-    Runner.start("chromium", (profile) => ["--headless", "--disable-gpu", "--no-first-run", `--user-data-dir=${profile}`, ...sandbox]),
+    Runner.start("chromium", (profile) => ["--headless", "--disable-gpu", "--no-first-run", `--user-data-dir=${profile}`, ...SANDBOX]),
   Firefox: () => Runner.start("firefox-esr", (profile) => ["--headless", "--no-remote", "--profile", profile]),
 };
 
@@ -109,7 +110,7 @@ export const GPU = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"
 export async function open(t, flags = ["--disable-gpu"]) {
   const browser = await puppeteer.launch({
     executablePath: "/usr/bin/chromium",
-    args: ["--hide-scrollbars", ...sandbox, ...flags],
+    args: ["--hide-scrollbars", ...SANDBOX, ...flags],
     protocolTimeout: 600_000,
   });
   t.after(() => browser.close());

@@ -26,10 +26,10 @@ export async function run() {
   const results = {};
   const target = { width: WIDTH, height: HEIGHT };
   const all = {
-    "rgbd-8": { target },
+    automatic: { target },
     "rgbd-15": { target, method: { kind: "trained", network: Network.builtIn("rgbd-15") } },
     sweep: { target, method: { kind: "sweep" } },
-    "rgbd-8, 6 mm away": { target: { ...target, offsetMm: 6 } },
+    "automatic, 6 mm away": { target: { ...target, offsetMm: 6 } },
   };
   const said = frame();
   for (const [name, options] of Object.entries(all)) {

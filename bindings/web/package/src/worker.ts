@@ -98,6 +98,21 @@ function start(threaded: boolean): Worker {
     : new Worker(new URL("./session-worker.js", import.meta.url), { type: "module" });
 }
 
+/**
+ * Returns the module of a worker that {@link start} makes, compiled while the worker's scripts load, or undefined if that
+ * fails: the worker then loads it, and says what is wrong.
+ */
+async function compiled(threaded: boolean): Promise<WebAssembly.Module | undefined> {
+  const address = threaded
+    ? new URL("./threads/raw/phasefront_web_bg.wasm", import.meta.url)
+    : new URL("./raw/phasefront_web_bg.wasm", import.meta.url);
+  try {
+    return await WebAssembly.compileStreaming(fetch(address));
+  } catch {
+    return undefined;
+  }
+}
+
 /** A session in a worker of its own. The worker ends when the session is closed, and with the page. */
 export class WorkerSession {
   readonly #worker: Worker;
@@ -146,21 +161,27 @@ export class WorkerSession {
     mode: RunningMode = "image",
     settings: WorkerSettings = {},
   ): Promise<WorkerSession> {
-    const { module, signal } = settings;
+    const { signal } = settings;
     signal?.throwIfAborted();
     const { backend } = options;
     const threads = settings.threads ?? (globalThis.crossOriginIsolated && backend !== "webgpu" ? undefined : 1);
     if (threads !== 1 && backend === "webgpu")
       throw new PhasefrontError("setting", "a module with threads has no WebGPU; leave out threads or backend");
     const session = new WorkerSession(settings.worker ?? start(threads !== 1));
-    const source = module instanceof WebAssembly.Module ? module : module && new URL(module, location.href).href;
     try {
+      const source = await until(signal, session.#source(settings, threads !== 1));
       await until(signal, session.#ask("open", [options, mode, { threads, source }]));
     } catch (error) {
       session.close();
       throw error;
     }
     return session;
+  }
+
+  /** Returns the module that the worker takes, or undefined if it loads its own. */
+  #source({ module, worker }: WorkerSettings, threaded: boolean): Promise<string | WebAssembly.Module | undefined> {
+    if (module === undefined) return worker ? Promise.resolve(undefined) : compiled(threaded);
+    return Promise.resolve(module instanceof WebAssembly.Module ? module : new URL(module, location.href).href);
   }
 
   /**
