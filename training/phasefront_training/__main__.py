@@ -92,12 +92,12 @@ def parser():
     p.add_argument("--average", type=int, default=0, metavar="STEPS", help="keep and evaluate the running mean of the weights over about this many steps (default 0: the weights themselves)")
     p.add_argument("--dimmed", type=float, default=0.0, help="share of samples whose colours, and with them their holograms, are scaled by a factor each (default 0)")
 
-    p = add("natural", run_natural, "Train a seeded network at half the resolution for natural focus: what the default encoder displays of its field, against incoherent focal stacks.")
+    p = add("natural", run_natural, "Train a network at half the resolution for natural focus: what the default encoder displays of its field, against incoherent focal stacks.")
     training_flags(p, rate=7e-4)
     resume_flag(p)
     p.add_argument("--stacks", required=True, nargs="+", help="folder of the stacks of each data set or of the pool")
     p.add_argument("--layers", type=int, default=8, help="number of convolution layers (default 8)")
-    p.add_argument("--filters", type=int, default=32, help="number of filters per layer (default 32)")
+    p.add_argument("--filters", type=int, default=48, help="number of filters per layer (default 48)")
     p.add_argument("--init", metavar="FILE", help="start with the weights of an .onnx or a checkpoint; layers are added up to --layers")
     p.add_argument("--average", type=int, default=0, metavar="STEPS", help="keep and evaluate the running mean of the weights over about this many steps (default 0: the weights themselves)")
     p.add_argument("--dimmed", type=float, default=0.0, help="share of samples whose colours, and with them their stacks, are scaled by a factor each (default 0)")
@@ -282,7 +282,7 @@ def run_stage1(args):
 def run_natural(args):
     resume = resumed(args)
     workers = loop.Workers.start(args.device)
-    wanted = networks.Architecture(args.layers, args.filters, "seeded-colour", halved=True)
+    wanted = networks.Architecture(args.layers, args.filters, halved=True)
     train, validation = load(args, wanted)
     network = resume.network() if resume else begun(args, wanted, train)
     task = Natural(network, train, validation, workers, bf16=not args.f32, dimmed=args.dimmed, **sampling(args))
@@ -372,7 +372,7 @@ def load(args, architecture):
 def scenes_for(folder, folder_of_seeds, folder_of_stacks, split, inputs, limit):
     """Returns scenes with the data that networks with these inputs read, and with stacks if there is a folder of
     them."""
-    if any(each.startswith("seeded") for each in inputs) and not folder_of_seeds:
+    if "seeded" in inputs and not folder_of_seeds:
         raise ValueError(NEEDS_SEEDS)
     layers = {networks.Architecture(3, input=each).ldi_layers for each in inputs}
     if len(layers) > 1:

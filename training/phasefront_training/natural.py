@@ -1,8 +1,9 @@
-"""Natural focus: a seeded network learns to display what incoherent light shows, out of focus as well as in focus.
+"""Natural focus: a network learns to display what incoherent light shows, out of focus as well as in focus.
 
-There is no target wave. The network corrects the plane sweep's field of each colour in turn, the default encoder turns it into phasors, and the loss is the root mean square difference between the amplitudes that these display at some depths of focus and the
-incoherent focal stack of the whole layered scene (stacks.py). Pixels in focus weigh five times as much as others.
-The network learns through the encoder because, trained on fields alone, it uses amplitudes that double phase clips.
+There is no target wave. The network makes a field from RGB-D, the default encoder turns it into phasors, and the loss is
+the root mean square difference between the amplitudes that these display at some depths of focus and the incoherent
+focal stack of the whole layered scene (stacks.py). Pixels in focus weigh nine times as much as others. The network
+learns through the encoder because, trained on fields alone, it uses amplitudes that double phase clips.
 """
 
 from dataclasses import dataclass
@@ -10,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from .data import Sampler, network_input
+from .data import Sampler
 from .encode import default_phasors, full_light, views
+from .evaluate import SENSOR, scene_as_seen, torch_predictor
 from .metrics import ssim
-from .networks import field_of, in_turn
+from .networks import head_field
 from .stage1 import LIGHT_REACH_PX, Stage1
 
 PLANES = 3  # depths of focus of each sample
@@ -27,7 +29,7 @@ BRIGHTER_ELSEWHERE = 0.3  # largest logarithm of a frame's full light over that 
 class Batch:
     """The samples of one step.
 
-    input: the network's input (N, 10, H, W). stack: amplitudes (N, P, 3, H, W). depth: clean normalized depth of the
+    input: the network's input (N, 4, H, W). stack: amplitudes (N, P, 3, H, W). depth: clean normalized depth of the
     front layer (N, H, W). valid: (N, 1, H, W), 1 where the crop does not cut the network's view. depths: of focus,
     normalized (N, P).
     """
@@ -45,7 +47,7 @@ class StackSampler(Sampler):
     batch_of = Batch
 
     def __init__(self, *args, planes=PLANES, **options):
-        super().__init__(*args, kind="seeded", **options)
+        super().__init__(*args, **options)
         self.planes = planes
 
     def target(self, i, window, gains, rng):
@@ -67,7 +69,7 @@ def blur_px(depth, depths, display):
 
 
 class Natural(Stage1):
-    """The task that trains a network for natural focus, which takes the colours in turn."""
+    """The task that trains a network for natural focus."""
 
     kind = "natural"
 
@@ -78,7 +80,8 @@ class Natural(Stage1):
     def loss(self, module, batch, step):
         x = batch.input.contiguous(memory_format=torch.channels_last)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
-            field = field_of(module, self.network.architecture, x, self.display)
+            output = module(x)
+        field = head_field(self.network.architecture, output, x)
         part = np.random.default_rng([self.seed, self.rank, step, 2]).random(len(field))
         brighter = torch.from_numpy(np.exp(BRIGHTER_ELSEWHERE * part**2)).to(field.real)
         scale = full_light(field) * brighter[:, None, None, None]
@@ -96,38 +99,23 @@ class Natural(Stage1):
             terms = {"in_focus": error(counts * (blur < IN_FOCUS)), "out_of_focus": error(counts * (blur > OUT_OF_FOCUS))}
         return error(weight), terms
 
-    def examples(self, step):
-        return in_turn(self.revival.draw(step).input, self.display)
-
     def validate(self):
-        predict = predictor(self.network, self.display, self.bf16)
+        predict = torch_predictor(self.network, self.bf16)
         line = {f"validation_{name}": value for name, value in figures(predict, self.validation).items()}
         if self.sensor_depth:
-            line |= {f"validation_sensor_{name}": value for name, value in figures(predict, self.validation, 1).items()}
+            line |= {f"validation_sensor_{name}": value for name, value in figures(predict, self.validation, SENSOR).items()}
         return line
 
 
-def predictor(network, display, autocast=False):
-    """Returns a predictor, colour, depth, seed -> field (3, H, W), by a network that takes the colours in turn."""
-
-    def predict(colour, depth, seed):
-        x = network_input(colour, depth, "seeded", seed)[None]
-        with torch.no_grad(), torch.autocast(x.device.type, torch.bfloat16, enabled=autocast):
-            return field_of(network, network.architecture, x, display)[0]
-
-    return predict
-
-
 @torch.no_grad()
-def figures(predict, scenes, variant=0):
+def figures(predict, scenes, seen_depth="clean"):
     """Returns the means over scenes of amplitude PSNR (all pixels, in focus, out of focus) and SSIM against the stack,
-    after one common scale, of what the default encoder displays of `predict`'s fields. variant: of the depth and seed
-    that `predict` reads."""
+    after one common scale, of what the default encoder displays of `predict`'s fields. seen_depth: the kind of depth that
+    `predict` reads, "clean" or SENSOR."""
     rows = []
     for i in range(len(scenes)):
-        colour, depth, _ = scenes.scene(i)
-        measured, seed = scenes.variant(i, variant)
-        field = predict(colour, measured, seed)[None]
+        _, depth, _ = scenes.scene(i)
+        field = predict(*scene_as_seen(scenes, i, seen_depth)[:3])[None]
         scale = full_light(field)
         depths = scenes.stack_depths[i][None]
         seen = views(default_phasors(field, scale), scale, depths, scenes.display)[0]

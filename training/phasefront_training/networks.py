@@ -19,9 +19,6 @@ Inputs:
   depth 1.
 * ``seeded``: 10 channels, those of rgbd, then the field of the plane sweep in the layout of data.network_input. That
   field is the base.
-* ``seeded-colour``: 4 channels, for each colour in turn: its amplitude and the depth, each minus 0.5, and its seed as in
-  seeded. Depth minus 0.5 is scaled by the wavelength over the longest one, because a midpoint hologram without its
-  carrier depends only on λ·z. Of the output, channels 0 and 3 are used.
 * ``field``: 6 channels, the real parts of the three colours, then the imaginary parts, for a pre-filter of the deep
   double phase method.
 * ``blurred-field``: the channels of field after the blur of AA-DPM. The network's correction is then small, and so is
@@ -72,17 +69,17 @@ class Architecture:
     @property
     def ldi_layers(self):
         """The number of layers of a layered depth image in the input: 1 for rgbd, rgbdxy and those with seeds."""
-        if self.input in ("rgbd", "rgbdxy", "seeded", "seeded-colour"):
+        if self.input in ("rgbd", "rgbdxy", "seeded"):
             return 1
         count = self.input.removeprefix("ldi")
         if self.input.startswith("ldi") and count in LDI_COUNTS:
             return int(count)
-        raise ValueError(f"the input is rgbd, rgbdxy, seeded, seeded-colour, ldi2 to ldi9, field, blurred-field or split-blurred-field, not '{self.input}'")
+        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldi2 to ldi9, field, blurred-field or split-blurred-field, not '{self.input}'")
 
     @property
     def seeded(self):
         """Whether the network corrects the plane sweep's field."""
-        return self.input in ("seeded", "seeded-colour")
+        return self.input == "seeded"
 
     @property
     def of_fields(self):
@@ -91,7 +88,7 @@ class Architecture:
 
     @property
     def input_channels(self):
-        known = {"field": 6, "blurred-field": 6, "split-blurred-field": 12, "rgbdxy": 6, "seeded": 10, "seeded-colour": 4}
+        known = {"field": 6, "blurred-field": 6, "split-blurred-field": 12, "rgbdxy": 6, "seeded": 10}
         return known.get(self.input) or 4 * self.ldi_layers
 
     def channels(self, i):
@@ -137,8 +134,6 @@ class Chain(nn.Module):
                 if i % 2 == 0 and 2 <= i < layers - 1:
                     conv.weight *= math.sqrt(2 / layers)
             self.convs[-1].weight *= 0.1
-            if self.architecture.input == "seeded-colour":
-                self.convs[-1].weight.unflatten(0, (-1, 6))[:, [1, 2, 4, 5]] = 0
 
     def forward(self, x):
         return self.leaving(self._chain(self.entering(x)).float(), x.shape[-2:])
@@ -173,23 +168,6 @@ class Chain(nn.Module):
     def field(self, x):
         """Returns the complex field (N, 3, H, W) of network inputs (N, C, H, W)."""
         return head_field(self.architecture, self(x), x)
-
-
-def in_turn(x, display):
-    """Converts inputs of seeded networks (N, 10, H, W) to those of each colour in turn (3·N, 4, H, W)."""
-    longest = max(display.wavelengths_m)
-    scales = torch.tensor([each / longest for each in display.wavelengths_m], dtype=x.dtype, device=x.device)
-    return torch.stack([x[:, :3], x[:, 3:4] * scales[:, None, None], x[:, 4:7], x[:, 7:]], 2).flatten(0, 1)
-
-
-def field_of(network, architecture, x, display):
-    """Returns the complex field (N, 3, H, W) of a network, called as `network`, for inputs (N, C, H, W). One that takes
-    the colours in turn gets those of a seeded network."""
-    if architecture.input != "seeded-colour":
-        return head_field(architecture, network(x), x)
-    output = network(in_turn(x, display).contiguous(memory_format=torch.channels_last)).float().unflatten(0, (-1, 3))
-    real, imaginary = seed_of_input(x.float())
-    return torch.complex(real + output[:, :, 0], imaginary + output[:, :, 3])
 
 
 @torch.no_grad()
@@ -241,5 +219,4 @@ def head_field(architecture, output, x):
 def multiplies_per_pixel(architecture):
     """Returns the multiply-accumulates of the whole chain per pixel, for all colours."""
     count = sum(9 * a * b for a, b in map(architecture.channels, range(architecture.layers)))
-    count *= 3 if architecture.input == "seeded-colour" else 1
     return count // 4 if architecture.halved else count

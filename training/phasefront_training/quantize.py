@@ -27,8 +27,8 @@ from torch.nn import functional as F
 from .data import network_input
 from .evaluate import evaluate, scene_as_seen, torch_predictor
 from .evaluate_encoding import DEEP, encoding_figures
-from .natural import Natural, figures, predictor
-from .networks import SPLIT_STEP, in_turn
+from .natural import Natural, figures
+from .networks import SPLIT_STEP
 from .stage1 import Stage1
 from .stage2 import Stage2
 
@@ -212,10 +212,7 @@ def examples(scenes, kind):
     count = min(len(scenes), CALIBRATION_SCENES)
     for i in range(count):
         colour, depth, seed, _ = scene_as_seen(scenes, i * len(scenes) // count, "clean")
-        if kind == "seeded-colour":
-            yield from in_turn(network_input(colour, depth, "seeded", seed)[None], scenes.display)
-        else:
-            yield network_input(colour, depth, kind, seed)
+        yield network_input(colour, depth, kind, seed)
 
 
 class QuantizationAware(Stage1):
@@ -266,7 +263,7 @@ def figure(network, scenes):
 def natural_figure(network, scenes):
     """Returns the amplitude PSNR of what the default encoder displays of a network's fields, against the stacks of
     scenes."""
-    return figures(predictor(network, scenes.display), scenes)["psnr"]
+    return figures(torch_predictor(network), scenes)["psnr"]
 
 
 def encoded_figure(model, scenes):

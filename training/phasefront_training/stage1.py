@@ -49,7 +49,7 @@ class Stage1(Task):
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.scenes, self.looked = scenes, 0
-        cut, kind = margin(network.architecture), "seeded" if network.architecture.seeded else network.architecture.input
+        cut, kind = margin(network.architecture), network.architecture.input
         self.sampler = Sampler(scenes, batch, crop, cut, sensor_depth, seed, workers.rank, kind, dimmed)
         self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, sensor_depth, seed, 0, kind, dimmed)
 

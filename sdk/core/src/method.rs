@@ -36,7 +36,7 @@ impl Method {
     /// Returns the method that fits the input of a trained network.
     pub fn trained(network: Arc<Network>) -> Self {
         match network.input() {
-            InputKind::Seeded | InputKind::SeededColour => Method::Seeded(network),
+            InputKind::Seeded => Method::Seeded(network),
             _ => Method::Network(network),
         }
     }
@@ -51,7 +51,6 @@ impl Method {
             Method::Sweep(_) => return Ok(()),
             Method::Network(network) if network.input() == InputKind::RgbdXy => (network, InputKind::RgbdXy),
             Method::Network(network) => (network, InputKind::Rgbd),
-            Method::Seeded(network) if network.input() == InputKind::SeededColour => (network, InputKind::SeededColour),
             Method::Seeded(network) => (network, InputKind::Seeded),
             Method::Auto(_, network) if network.chain().is_none() => {
                 return Err(Error::Network(

@@ -118,11 +118,6 @@ impl MethodPlan {
                 let (packer, sweep) = swept(sweep_plan(size, *sweep, display)?)?;
                 (packer, Plan::Sweep(sweep))
             }
-            Method::Seeded(network) if network.input() == InputKind::SeededColour => {
-                return Err(GpuError::Refused(
-                    "a network that takes the colours in turn runs on the CPU only".into(),
-                ));
-            }
             Method::Seeded(network) => {
                 let sweep = seed(network, display);
                 let plan = SweepPlan::new(size, display, sweep, 0.0)?;

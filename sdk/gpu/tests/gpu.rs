@@ -134,8 +134,11 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
                 );
                 fused.push(output);
             }
-            for both in fused.chunks_exact(2) {
-                assert!(both[0] == both[1], "{size:?}: fusion changes bits");
+            // A driver may contract a product and a sum in one program and not in another, so the bits can differ.
+            for (both, tolerance) in fused.chunks_exact(2).zip([1e-5, 2e-3]) {
+                let worst = largest_difference(&both[0], &both[1]) / largest;
+                println!("fusion {} layers {size:?} {worst}", model.layers);
+                assert!(worst < tolerance, "{size:?}: fusion changes values by {worst}");
             }
         }
     }

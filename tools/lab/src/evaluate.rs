@@ -196,7 +196,7 @@ impl<'a> Method<'a> {
     /// Returns an error if the network is a pre-filter or is for another display.
     pub fn network(name: impl Into<String>, network: &Network, size: usize, display: &Display) -> Result<Self> {
         let name = name.into();
-        if matches!(network.input(), InputKind::Seeded | InputKind::SeededColour) {
+        if network.input() == InputKind::Seeded {
             return Self::seeded(name, network, size, display);
         }
         let of_layers = matches!(network.input(), InputKind::Ldi { .. });

@@ -297,16 +297,6 @@ impl Network {
         Ok(depth_scale(self.serve(display)?))
     }
 
-    /// Returns the factor of [`Self::depth_scale`] for each laser of `display`, for a network that takes the colours in
-    /// turn ([`InputKind::SeededColour`]). It serves any lasers.
-    ///
-    /// # Errors
-    /// Returns [`Error::Network`] if a laser has a larger λ·V/p² than the longest trained wavelength.
-    pub(crate) fn depth_scales_in_turn(&self, display: &Display) -> Result<Vec<f32>> {
-        let scales = self.display.serve_in_turn(display)?;
-        Ok(scales.into_iter().map(|scale| scale.min(1.0) as f32).collect())
-    }
-
     /// Returns the output colour that is the field of a `display` with one laser: 0 red, 1 green, 2 blue. It is the
     /// nearest colour whose trained depths cover the display's range. Returns `None` for a display with three lasers.
     ///
@@ -322,10 +312,7 @@ impl Network {
     /// # Errors
     /// Returns the same errors as [`Self::depth_scale`].
     pub fn check_display(&self, display: &Display) -> Result<()> {
-        match self.input() {
-            InputKind::SeededColour => self.depth_scales_in_turn(display).map(|_| ()),
-            _ => self.depth_scale(display).map(|_| ()),
-        }
+        self.depth_scale(display).map(|_| ())
     }
 
     /// Checks that this pre-filter supports `display` and its offset, for which λ·offset/p² must equal the trained
@@ -345,20 +332,12 @@ impl Network {
     }
 
     /// Plans like [`Self::plan`] for the depths and colours of `display`. For one laser, the network reads its
-    /// amplitude as red, green and blue, and only the output of [`Self::colour`] is kept. A network that takes the
-    /// colours in turn runs on one of them, whose depth the caller stretches (`depth_scales_in_turn`).
+    /// amplitude as red, green and blue, and only the output of [`Self::colour`] is kept.
     ///
     /// # Errors
     /// Returns the same errors as [`Self::plan`] and [`Self::depth_scale`].
     #[doc(hidden)]
     pub fn plan_for(&self, size: Size, display: &Display) -> Result<NetworkPlan> {
-        if self.input() == InputKind::SeededColour {
-            self.check_display(display)?;
-            return Ok(NetworkPlan {
-                colour: Some(0),
-                ..self.plan(size)?
-            });
-        }
         let served = self.serve(display)?;
         Ok(NetworkPlan {
             depth_scale: depth_scale(served),

@@ -4,15 +4,11 @@
 //! on both and has learned how far to trust the sweep. Its input is RGB-D, each value minus ½, followed by the seed u:
 //! ½(Re u − ½) of the three colours, then ½ Im u, so that all values share one 8-bit range. Its head adds the output to
 //! u.
-//!
-//! A network may take the colours in turn instead. It then reads amplitude, depth and seed of one colour, with depth
-//! stretched about the middle by the colour's λ·V/p², because a hologram without its carrier depends on λ·z/p² alone.
-//! So one small network serves all colours and any lasers.
 
 use crate::Size;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
-use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch, Source};
+use crate::method::network::{Engine, Network, NetworkPlan, NetworkScratch, Source};
 use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
@@ -33,8 +29,6 @@ pub struct SeededPlan {
     colours: usize,
     sweep: SweepPlan,
     network: NetworkPlan,
-    /// The stretch of depth for each colour, if the network takes the colours in turn.
-    in_turn: Option<Vec<f32>>,
 }
 
 /// The working memory of a [`SeededPlan`] for one frame at a time.
@@ -54,16 +48,13 @@ impl SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`InputKind::Seeded`] or [`InputKind::SeededColour`], for frames of `size`, on
-    /// the field of its [`seed`] at the midpoint.
+    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for frames of `size`, on the field of its [`seed`] at the midpoint.
     ///
     /// # Errors
     /// Returns an error if the network or the sweep cannot be planned.
     pub fn new(size: Size, network: &Network, display: &Display) -> Result<Self> {
         let sweep = seed(network, display);
-        let in_turn = network.input() == InputKind::SeededColour;
         Ok(SeededPlan {
-            in_turn: in_turn.then(|| network.depth_scales_in_turn(display)).transpose()?,
             colours: display.colours(),
             sweep: SweepPlan::new(size, display, sweep, 0.0)?,
             network: network.plan_for(size, display)?,
@@ -97,22 +88,6 @@ impl SeededPlan {
     /// Returns an error if the frame has another shape or other colours, or if `field` does not have C·H·W values.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SeededScratch) -> Result<()> {
         self.sweep.field(frame, &mut scratch.seed, &mut scratch.sweep)?;
-        if let Some(scales) = &self.in_turn {
-            let size = field.len() / scales.len();
-            let planes = field
-                .chunks_exact_mut(size.max(1))
-                .zip(scratch.seed.chunks_exact(size.max(1)));
-            for (colour, ((field, seed), &depth_scale)) in planes.zip(scales).enumerate() {
-                let of_colour = SeededColour {
-                    frame,
-                    colour,
-                    depth_scale,
-                    seed,
-                };
-                self.network.field(&of_colour, field, &mut scratch.network)?;
-            }
-            return Ok(());
-        }
         let seeded = SeededFrame {
             frame,
             seed: &scratch.seed,
@@ -142,32 +117,6 @@ impl Source for SeededFrame<'_> {
         let values = into.iter_mut().zip(&self.seed[at..]);
         match part / 3 {
             0 => values.for_each(|(to, u)| *to = 0.5 * (u.re - 0.5)),
-            _ => values.for_each(|(to, u)| *to = 0.5 * u.im),
-        }
-    }
-}
-
-/// One colour of a frame and of its seed, as the input of a network that takes the colours in turn.
-struct SeededColour<'a> {
-    frame: &'a RgbdFrame,
-    colour: usize,
-    /// The factor that stretches depth about the middle of the volume.
-    depth_scale: f32,
-    /// The sweep's field of the colour, (H, W).
-    seed: &'a [Complex32],
-}
-
-impl Source for SeededColour<'_> {
-    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
-        let width = self.frame.size().width;
-        let values = into.iter_mut().zip(&self.seed[row * width + from..]);
-        match plane {
-            0 => self.frame.read(self.colour, row, from, into),
-            1 => {
-                self.frame.read(RGBD - 1, row, from, into);
-                into.iter_mut().for_each(|depth| *depth *= self.depth_scale);
-            }
-            2 => values.for_each(|(to, u)| *to = 0.5 * (u.re - 0.5)),
             _ => values.for_each(|(to, u)| *to = 0.5 * u.im),
         }
     }

@@ -73,7 +73,7 @@ impl HologramFlags {
                 (Method::trained(network), encoder)
             }
             CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
-            CoreMethod::Auto if network.is_none() && matches!(focus.default_method(display)?, Method::Seeded(_)) => {
+            CoreMethod::Auto if network.is_none() && matches!(focus.default_method(display)?, Method::Network(_)) => {
                 let network = networks::network(NATURAL.name, precision)?;
                 (Method::trained(network), encoder.read()?)
             }

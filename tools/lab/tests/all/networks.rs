@@ -1,5 +1,5 @@
 //! Tests that the bundled networks load and that the fast path gives the same results as tract.
-use ndarray::{Array3, Axis};
+use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Size;
 use phasefront::{Display, Method, Network, RgbdFrame};
@@ -31,12 +31,6 @@ fn input(kind: InputKind, size: Size) -> Vec<f32> {
     let layer = &ldi.layers[0];
     let depth = layer.depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     let mut planes: Vec<f32> = layer.rgb.iter().chain(&depth).map(|v| v - 0.5).collect();
-    if kind == InputKind::SeededColour {
-        let one = layer.rgb.index_axis(Axis(0), 1);
-        planes = one.iter().chain(&depth).map(|v| v - 0.5).collect();
-        planes.extend(one.iter().map(|v| 0.5 * (v * 0.8 - 0.5)));
-        planes.extend(one.iter().map(|v| 0.5 * v * 0.6));
-    }
     if kind == InputKind::Seeded {
         planes.extend(layer.rgb.iter().map(|v| 0.5 * (v * 0.8 - 0.5)));
         planes.extend(layer.rgb.iter().map(|v| 0.5 * v * 0.6));

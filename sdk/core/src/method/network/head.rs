@@ -113,14 +113,10 @@ impl Head {
                             }
                         }
                     }
-                    InputKind::Seeded | InputKind::SeededColour => {
-                        // A seed u is encoded as ½(Re u − ½) and ½ Im u, after RGB-D or one colour and depth.
-                        let (first, second) = match kind {
-                            InputKind::SeededColour => (2, 3),
-                            _ => (4 + c, 7 + c),
-                        };
-                        base(first, at, &mut re[..count]);
-                        base(second, at, &mut im[..count]);
+                    InputKind::Seeded => {
+                        // A seed u is encoded as ½(Re u − ½) and ½ Im u, after RGB-D.
+                        base(4 + c, at, &mut re[..count]);
+                        base(7 + c, at, &mut im[..count]);
                         re[..count].iter_mut().for_each(|re| *re = 2.0 * *re + 0.5);
                         im[..count].iter_mut().for_each(|im| *im *= 2.0);
                     }

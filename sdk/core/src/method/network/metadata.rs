@@ -22,9 +22,6 @@ pub enum InputKind {
     },
     /// "seeded": the planes of [`InputKind::Rgbd`], then the plane sweep's field of the frame; see `seeded.rs`.
     Seeded,
-    /// "seeded-colour": amplitude and depth of one colour, each minus 0.5, then the plane sweep's field of it. The
-    /// network runs for each colour in turn; see `seeded.rs`. Of its output, planes 0 and 3 are used.
-    SeededColour,
     /// "field": the real (3) and imaginary (3) parts of a field's colours, for a pre-filter network.
     Field,
     /// "blurred-field": the planes of [`InputKind::Field`], of a field that AA-DPM's blur was applied to. The remaining
@@ -53,7 +50,7 @@ impl InputKind {
     /// Returns the number of input planes.
     pub fn channels(self) -> usize {
         match self {
-            InputKind::Rgbd | InputKind::SeededColour => 4,
+            InputKind::Rgbd => 4,
             InputKind::RgbdXy => 6,
             InputKind::Ldi { layers } => 4 * layers,
             InputKind::Seeded => 10,
@@ -67,7 +64,6 @@ impl InputKind {
         match self {
             InputKind::Rgbd | InputKind::RgbdXy | InputKind::Seeded => plane == 3,
             InputKind::Ldi { .. } => plane % 4 == 3,
-            InputKind::SeededColour => plane == 1,
             InputKind::Field | InputKind::BlurredField | InputKind::SplitBlurredField => false,
         }
     }
@@ -87,7 +83,6 @@ impl InputKind {
             b"rgbd" => Some(InputKind::Rgbd),
             b"rgbdxy" => Some(InputKind::RgbdXy),
             b"seeded" => Some(InputKind::Seeded),
-            b"seeded-colour" => Some(InputKind::SeededColour),
             b"field" => Some(InputKind::Field),
             b"blurred-field" => Some(InputKind::BlurredField),
             b"split-blurred-field" => Some(InputKind::SplitBlurredField),
@@ -106,7 +101,6 @@ impl std::fmt::Display for InputKind {
             InputKind::RgbdXy => f.write_str("rgbdxy"),
             InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
             InputKind::Seeded => f.write_str("seeded"),
-            InputKind::SeededColour => f.write_str("seeded-colour"),
             InputKind::Field => f.write_str("field"),
             InputKind::BlurredField => f.write_str("blurred-field"),
             InputKind::SplitBlurredField => f.write_str("split-blurred-field"),
@@ -115,8 +109,7 @@ impl std::fmt::Display for InputKind {
 }
 
 /// The permitted values of `phasefront.input`.
-const INPUTS: &str =
-    "'rgbd', 'rgbdxy', 'seeded', 'seeded-colour', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
+const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
 
 /// The largest difference between the modulator's offset and the one that a pre-filter was trained for, scaled to the
 /// trained display. Over it, light spreads by less than a tenth of a pixel of 8 µm.
@@ -152,26 +145,6 @@ pub(super) struct Served {
 }
 
 impl TrainedDisplay {
-    /// Returns the factors that stretch depths about the middle of the volume for each laser of `display`, if a network
-    /// for this display takes the colours in turn: λ·V/p² divided by that of the trained display's longest wavelength.
-    ///
-    /// # Errors
-    /// Returns an error if a laser has a larger λ·V/p², whose depths were not trained.
-    pub(super) fn serve_in_turn(&self, display: &Display) -> Result<Vec<f64>> {
-        let longest_m = self.wavelengths_m.into_iter().fold(0.0, f64::max);
-        let trained = longest_m * self.volume_depth_m / self.pitch_m.powi(2);
-        let each = display.wavelengths_m().iter();
-        let scales: Vec<f64> = each
-            .map(|m| m * display.volume_depth_m() / display.pitch_m().powi(2) / trained)
-            .collect();
-        match scales.iter().find(|scale| **scale > 1.0 + RANGE_TOLERANCE) {
-            None => Ok(scales),
-            Some(scale) => Err(Error::Network(format!(
-                "light of this display spreads {scale:.2} times as far as it was trained for; take a smaller volume or a method without a network"
-            ))),
-        }
-    }
-
     /// Returns the factor s that stretches depths d of frames for `display` about the middle of the volume, d' = ½ +
     /// s·(d − ½), so that a network for this display computes their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over
     /// the colours.
@@ -337,7 +310,7 @@ pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
         corrected: found(metadata, "corrected") == Some("true"),
     };
     let seed_planes = match found(metadata, "seed_planes") {
-        Some(planes) if matches!(input, InputKind::Seeded | InputKind::SeededColour) => {
+        Some(planes) if input == InputKind::Seeded => {
             let right = format!("a number from 1 to {MAX_PLANES}");
             let known = (planes.parse().ok()).filter(|n| (1..=MAX_PLANES).contains(n));
             Some(known.ok_or_else(|| wrong("seed_planes", planes, &right))?)
