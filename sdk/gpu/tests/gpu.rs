@@ -77,6 +77,17 @@ const SIZES: [Size; 3] = [
 
 #[test]
 fn chains_in_f32_and_f16_agree_with_the_definition() {
+    chains_in_f32_and_f16(2);
+}
+
+#[test]
+#[ignore = "slow: 20 seconds of a core in software"]
+fn all_chains_in_f32_and_f16_agree_with_the_definition() {
+    chains_in_f32_and_f16(1);
+}
+
+/// Tries every `step`-th model. A driver in software takes a second or two to compile one.
+fn chains_in_f32_and_f16(step: usize) {
     let device = device();
     let models = [
         Model::new(2, 8),
@@ -107,7 +118,7 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
             ..Model::new(5, 8).halved()
         },
     ];
-    for model in models {
+    for model in models.into_iter().step_by(step) {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         for size in SIZES {
             let input = frame(model.inputs, size, 7);
@@ -146,6 +157,7 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
 
 /// Compares frames of phone sizes with the CPU kernels.
 #[test]
+#[ignore = "slow: 6 seconds of a core in software"]
 fn chains_of_whole_frames_agree_with_the_cpu() {
     let device = device();
     for (model, float, tolerance) in [
@@ -186,6 +198,17 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
 
 #[test]
 fn chains_in_int8_have_the_bits_of_the_cpu() {
+    chains_in_int8(2);
+}
+
+#[test]
+#[ignore = "slow: 12 seconds of a core in software"]
+fn all_chains_in_int8_have_the_bits_of_the_cpu() {
+    chains_in_int8(1);
+}
+
+/// Tries every `step`-th model.
+fn chains_in_int8(step: usize) {
     let models = [
         Model::int8(2, 8),
         Model::int8(3, 24),
@@ -217,7 +240,7 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
             ..Model::int8(5, 8).halved()
         },
     ];
-    for model in models {
+    for model in models.into_iter().step_by(step) {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         for size in SIZES {
             let input = frame(model.inputs, size, 7);
