@@ -83,7 +83,7 @@ pub const NETWORKS: &[Model] = &[
     },
 ];
 
-/// The network for natural focus: it corrects the plane sweep's wave so that what is out of focus is soft.
+/// The network for natural focus, whose displayed image is soft out of focus.
 pub const NATURAL: &Model = &Model {
     name: "natural-8",
     files: files!("natural-8"),
