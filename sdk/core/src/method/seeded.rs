@@ -48,8 +48,8 @@ impl SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for frames of `size`, on the field
-    /// of its [`seed`] at the midpoint.
+    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for frames of `size`, on the
+    /// field of its [`seed`] at the midpoint.
     ///
     /// # Errors
     /// Returns an error if the network or the sweep cannot be planned.
