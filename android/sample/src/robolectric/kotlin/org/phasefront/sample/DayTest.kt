@@ -151,7 +151,7 @@ class DayTest {
         launchWithCamera()
         home()
         wait("the release of the camera") { Phone.openSessions == 0 }
-        assertTrue(ThermalContract.listeners.isEmpty())
+        wait("the end of the session") { ThermalContract.listeners.isEmpty() }
         back()
         shows(CAMERA)
         // And at once again, as quickly as a user can.
