@@ -3,11 +3,12 @@
 
 pub mod gpu;
 pub mod random;
+mod scene;
+pub mod session;
 
-use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::Size;
-use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
+use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, Target};
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::{Error, Result};
@@ -113,11 +114,12 @@ pub fn measure(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row
     pool.install(|| measure_here(case, target, budget))
 }
 
-/// Returns a method's name, which is also the name of its stage, and its network.
+/// Returns a method's name, which is also the name of its stage in a [`Row`], and its network.
 fn named(method: &Method) -> (&'static str, Option<&Arc<Network>>) {
     match method {
         Method::Network(network) => ("network", Some(network)),
         Method::Seeded(network) => ("seeded", Some(network)),
+        Method::Auto(_, network) => ("auto", Some(network)),
         _ => ("sweep", None),
     }
 }
@@ -199,7 +201,7 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
         .map(|_| DisplayPlan::new(case.size, target, &options))
         .transpose()?;
     let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
-    let frame = test_frame(case.size)?.for_display(&target.display);
+    let frame = scene::balls(case.size)?.for_display(&target.display);
     let mut scratch = pipeline.scratch();
     let values = pipeline.colours() * height * width;
     let mut field = vec![Complex32::ZERO; values];
@@ -224,30 +226,6 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
         times.totals.push(ms(method + propagate + encode));
     }
     Ok(times)
-}
-
-/// Makes a frame with colour everywhere and the depths of a typical scene: ground up to a wall, and balls in front. The
-/// content does not change the cost of a network. A sweep costs more the closer together the depths are.
-fn test_frame(size: Size) -> Result<RgbdFrame> {
-    let Size { width, height } = size;
-    let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
-    let depth = |y: usize, x: usize| {
-        let (v, u) = (y as f32 / height as f32, x as f32 / height as f32);
-        let ground = (2.0 * (1.0 - v)).min(0.95);
-        (0..6).fold(ground, |depth, ball| {
-            let (at, radius) = (0.2 + 0.27 * ball as f32, 0.1 + 0.02 * (ball % 3) as f32);
-            let inside = radius.powi(2) - (u - at).powi(2) - (v - 0.6).powi(2);
-            if inside > 0.0 {
-                depth.min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0).max(0.0)
-            } else {
-                depth
-            }
-        })
-    };
-    Ok(RgbdFrame::new(
-        Array3::from_shape_fn((3, height, width), |(c, y, x)| value(c, y, x)),
-        Array2::from_shape_fn((height, width), |(y, x)| depth(y, x)),
-    )?)
 }
 
 /// Sorts `values`, which must not be empty, and returns the middle one.

@@ -25,7 +25,6 @@ use crate::given::Flag;
 use clap::{Parser, Subcommand};
 use phasefront_command::start::Common;
 use phasefront_io::Result;
-use std::num::NonZeroUsize;
 
 /// The rules for replacing output files.
 const FILES: &str = "\
@@ -87,7 +86,7 @@ impl Command {
             Command::Compare(command) => command.run(json),
             Command::Judge(command) => command.run(json),
             Command::Networks(command) => command.run(json),
-            Command::Bench(command) => command.run(common.threads().map(NonZeroUsize::get), json),
+            Command::Bench(command) => command.run(common.threads(), json),
             Command::Video(command) => command.run(common.threads(), json, flags),
             Command::Multiplex(command) => command.run(json),
             Command::Devices(command) => command.run(json),

@@ -1,7 +1,9 @@
 //! GPUs for the command: selects a device and keeps its compiled programs between runs.
 
+use phasefront::session::{Backend, SessionHandle};
 use phasefront_core::runtime::file;
 use phasefront_gpu::{Device, DeviceOptions};
+use phasefront_io::Result;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -31,6 +33,23 @@ pub fn keep_programs(device: &Device) {
             log::info!("{}: {why}", path.display());
         }
     }
+}
+
+/// Warms up a session and keeps the compiled programs of its GPU. Warns if `asked` is the GPU and the session runs on
+/// the CPU.
+///
+/// # Errors
+/// Returns an error if the session is closed or its computation panics.
+pub fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
+    session.warm_up()?;
+    match session.gpu() {
+        Some(device) => keep_programs(&device),
+        None if asked == Backend::Gpu => {
+            log::warn!("on the CPU: {}", session.statistics().backend.why);
+        }
+        None => {}
+    }
+    Ok(())
 }
 
 /// Returns the path of the saved programs.

@@ -3,6 +3,7 @@
 
 pub mod bench;
 pub mod doctor;
+pub mod frame_statistics;
 pub mod gpu;
 pub mod modulator;
 pub mod viewer;

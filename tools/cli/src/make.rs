@@ -8,6 +8,7 @@ mod judged;
 mod layers;
 mod lens;
 mod request;
+pub(crate) mod session;
 
 pub(crate) use judged::{Judged, judge};
 pub(crate) use lens::{FOURIER, judge_in_focus};

@@ -1,11 +1,15 @@
 //! `phasefront bench`: measures how long each stage of a frame takes on this machine.
 
 use crate::flags::backend::BackendFlags;
+use crate::flags::depth::DepthFlags;
 use crate::flags::encoder::{Encoder, EncoderFlags};
+use crate::flags::method::{CoreMethod, HologramFlags};
+use crate::make;
 use clap::{Args, ValueEnum};
 use phasefront::Size;
 use phasefront::{Method, Network, Sweep, Target};
 use phasefront_cli::bench::gpu::{GpuCase, GpuRow};
+use phasefront_cli::bench::session::{self, Scene, SessionRow};
 use phasefront_cli::bench::{self, Case, Machine, Row};
 use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
@@ -16,14 +20,17 @@ use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront_io::picture::plot::{self, Bar};
 use phasefront_io::{Error, Result, output};
 use serde_json::json;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Measure how long each stage of a frame takes, for all combinations of the flags that are not given
 ///
-/// With a --display that has a per-pixel table, also measure how much longer a frame takes because of the table.
+/// With a --display that has a per-pixel table, also measure how much longer a frame takes because of the table. With
+/// --session, measure all that an app does with a camera's frame.
 #[derive(Args)]
+#[command(mut_group("DepthFlags", |depth| depth.requires("rgb")))]
 pub(crate) struct Bench {
     /// Layers of the network; 0 for the plane sweep. If no network with this number is bundled, one with random f32
     /// weights
@@ -32,15 +39,30 @@ pub(crate) struct Bench {
     /// Number type of the network
     #[arg(long, value_enum, help_heading = "Expert")]
     precision: Option<PrecisionName>,
-    /// An ONNX file instead of the bundled networks
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["layers", "precision"], help_heading = "Method")]
+    /// One bundled network, or an ONNX file, instead of all bundled networks
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "layers", help_heading = "Method")]
     network: Option<String>,
-    /// Width and height [default: 384x384, 960x540 and 1920x1080]
+    /// Measure sessions: 8-bit colour of a camera with a sensor's depth of 256×192 in metres, whose noise differs from
+    /// frame to frame, to levels. Reports the first frame, and the median and 95th percentile of each stage
+    #[arg(long, conflicts_with_all = ["layers", "fusion", "plot"])]
+    session: bool,
+    /// Method of --session [default: auto; network with --network or --encoder deep]
+    #[arg(long, value_enum, requires = "session", help_heading = "Method")]
+    method: Option<CoreMethod>,
+    /// Colour image of a scene for --session, with its --depth; may be repeated [default: two scenes that need no files]
+    #[arg(long, value_name = "FILE", requires_all = ["session", "depth"], help_heading = "Input")]
+    rgb: Vec<PathBuf>,
+    /// Depth image of the --rgb at the same place
+    #[arg(long, value_name = "FILE", requires = "rgb", help_heading = "Input")]
+    depth: Vec<PathBuf>,
+    /// Width and height [default: 384x384, 960x540 and 1920x1080; the display's with --session]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<Size>,
-    /// Seconds for each combination, with at least five frames
-    #[arg(long, value_name = "S", default_value_t = 2.0)]
-    seconds: f64,
+    /// Seconds for each combination, with at least five frames [default: 2; 30 frames with --session]
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    #[command(flatten)]
+    depth_numbers: DepthFlags,
     #[command(flatten)]
     encoder: EncoderFlags,
     /// Write a chart of the stages' times
@@ -58,6 +80,9 @@ pub(crate) struct Bench {
     #[command(flatten)]
     display: DisplayFlags,
 }
+
+/// The seconds for each combination, other than sessions.
+const SECONDS: u64 = 2;
 
 /// The number of layers of the deepest network that GPUs are measured with.
 const DEEPEST: usize = 30;
@@ -88,7 +113,7 @@ enum FusionName {
 }
 
 impl Bench {
-    pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
+    pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
         if let Some(path) = &self.plot {
             output::file(path, &["svg"])?;
         }
@@ -108,23 +133,87 @@ impl Bench {
                 "a network",
             ),
         ])?;
+        if self.session {
+            return self.of_sessions(threads, json);
+        }
         let target = self.display.read()?.target;
-        let budget = Duration::try_from_secs_f64(self.seconds)
-            .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
+        let budget = self.budget()?.unwrap_or(Duration::from_secs(SECONDS));
         let encoder = self.encoder.read()?;
         let device = self.backend.device()?;
         let methods = self.methods(&target, device.is_some())?;
         let sizes = self.size.map_or_else(|| SIZES.to_vec(), |size| vec![size]);
         match device {
             Some(options) => self.on_gpu(&methods, &sizes, (&target, &encoder), &options, budget, json),
-            None => self.on_cpu(&methods, &sizes, (&target, &encoder), threads, budget, json),
+            None => self.on_cpu(
+                &methods,
+                &sizes,
+                (&target, &encoder),
+                threads.map(NonZeroUsize::get),
+                budget,
+                json,
+            ),
         }
+    }
+
+    /// Returns the time for each combination, if it is given.
+    fn budget(&self) -> Result<Option<Duration>> {
+        let budget = self.seconds.map(Duration::try_from_secs_f64).transpose();
+        budget.map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))
+    }
+
+    /// Measures sessions, one for each scene.
+    fn of_sessions(&self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
+        let flags = HologramFlags {
+            network: self.network.clone(),
+            precision: self.precision,
+            encoder: self.encoder.clone(),
+            display: self.display.clone(),
+        };
+        let file = self.display.read()?;
+        let size = self.size.unwrap_or_else(|| file.target.display.size());
+        let (options, encoder) = make::session::options(&flags, self.method, (&file, size), &self.backend, threads)?;
+        let budget = self.budget()?;
+        let scenes = self.scenes(size)?;
+        let bar = progress_bar(scenes.len() as u64, "scenes");
+        let mut rows = Vec::new();
+        for scene in &scenes {
+            rows.push(session::measure(options.clone(), scene, budget)?);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let machine = Machine::this();
+        terminal::print(
+            json,
+            &json!({"machine": machine, "encoder": encoder.describe(), "rows": rows}),
+            as_session_table(&machine, &encoder.describe(), &rows),
+        );
+        Ok(())
+    }
+
+    /// Returns the scenes that are given, or those that need no files.
+    fn scenes(&self, size: Size) -> Result<Vec<Scene>> {
+        let (colours, depths) = (&self.rgb, &self.depth);
+        if colours.len() != depths.len() {
+            return Err(Error::Input(format!(
+                "{} --rgb and {} --depth are given; every picture needs both",
+                colours.len(),
+                depths.len()
+            )));
+        }
+        if colours.is_empty() {
+            return Scene::made(size);
+        }
+        let options = self.depth_numbers.options(false)?;
+        let pairs = colours.iter().zip(depths);
+        pairs
+            .map(|(rgb, depth)| Scene::read(rgb, depth, options, size))
+            .collect()
     }
 
     /// Returns the requested methods, or those of all bundled networks.
     fn methods(&self, target: &Target, on_gpu: bool) -> Result<Vec<Method>> {
         if let Some(file) = &self.network {
-            let network = networks::network(file, None)?;
+            let network = networks::network(file, self.precision.map(PrecisionName::precision))?;
             return Ok(vec![Method::trained(network)]);
         }
         let mut methods: Vec<_> = (self.bundled().into_iter()).map(Method::trained).collect();
@@ -318,6 +407,40 @@ fn as_table(machine: &Machine, encoder: &str, rows: &[Row]) -> String {
             whole(row.peak_percent),
             whole(row.peak_memory_mb),
             tenths(row.table_percent),
+        );
+    }
+    text
+}
+
+fn as_session_table(machine: &Machine, encoder: &str, rows: &[SessionRow]) -> String {
+    let mut text = format!(
+        "{}, {} cores; {encoder}; medians, 95th percentiles in brackets\n\n",
+        machine.cpu, machine.cores
+    );
+    text += "| scene | method | layers | precision | size | threads | frames | start ms | first frame ms | colour ms | depth ms | method ms | propagate ms | encode ms | frame ms | memory MB |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    for row in rows {
+        let frames = &row.frames;
+        let stage = |name| format!("{:.1} ({:.1})", frames.median_ms[name], frames.p95_ms[name]);
+        text += &format!(
+            "\n| {} | {} | {} | {} | {}×{} | {} | {} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | {} |",
+            row.scene,
+            row.method,
+            row.layers,
+            row.precision,
+            row.width,
+            row.height,
+            row.threads,
+            frames.frames,
+            row.start_ms,
+            frames.first_ms,
+            stage("colour"),
+            stage("depth"),
+            stage("method"),
+            stage("propagate"),
+            stage("encode"),
+            stage("total"),
+            whole(row.peak_memory_mb),
         );
     }
     text

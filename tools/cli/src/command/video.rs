@@ -9,17 +9,17 @@ use crate::flags::depth::DepthFlags;
 use crate::flags::frame::{SeenDepthFlags, warn_of_size};
 use crate::flags::method::{CoreMethod, HologramFlags};
 use crate::given::{Flag, SOURCE};
-use crate::make::levels_info;
+use crate::make;
 use crate::record::{Before, RunRecord};
 use clap::{ArgGroup, Args, ValueEnum};
 use phasefront::Size;
 use phasefront::input::DepthRange;
-use phasefront::session::{Backend, Event, FrameTimes, Quality, SessionHandle, Statistics};
-use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
+use phasefront::session::{Event, Quality, Statistics};
+use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, VideoSession};
+use phasefront_cli::frame_statistics::{FrameStatistics, rounded_ms};
 use phasefront_cli::gpu;
 use phasefront_command::flags::parse_size;
 use phasefront_command::terminal;
-use phasefront_core::display::panel::Panel;
 use phasefront_io::hologram::{self, HologramInfo};
 use phasefront_io::{Error, Result, film};
 use serde_json::json;
@@ -114,20 +114,6 @@ enum BrightnessName {
     Max,
 }
 
-/// Warms up a session and keeps the compiled programs of its GPU. Warns if `asked` is the GPU and the session runs on
-/// the CPU.
-fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
-    session.warm_up()?;
-    match session.gpu() {
-        Some(device) => gpu::keep_programs(&device),
-        None if asked == Backend::Gpu => {
-            log::warn!("on the CPU: {}", session.statistics().backend.why);
-        }
-        None => {}
-    }
-    Ok(())
-}
-
 impl Video {
     pub(crate) fn run(mut self, threads: Option<NonZeroUsize>, json: bool, flags: &[Flag]) -> Result<()> {
         if self.output.is_none() && !self.live && !json {
@@ -199,32 +185,8 @@ impl Video {
             warn_of_size(colour, modulator, self.hologram.display.is_given(), &flag);
         }
         let size = self.size.unwrap_or(colour);
-        if let Some(light) = &file.target.illumination
-            && size != modulator.size()
-        {
-            let (rows, columns) = light.nodes();
-            return Err(Error::Input(format!(
-                "the display's laser map ({columns}×{rows} nodes) is for {} pixels, the frames are {size}; give --size or leave the map out",
-                modulator.size()
-            )));
-        }
-        let target = file.corrected()?;
-        let target = Target {
-            display: target.display.with_size(size)?,
-            response: target.response.centred(size)?,
-            panel: Panel {
-                flatness: (target.panel.flatness.as_ref())
-                    .map(|map| map.centred(size))
-                    .transpose()?,
-                ..target.panel
-            },
-            ..target
-        };
-        let display = target.display.clone();
-        let method = self.hologram.method(self.method);
-        let (method, encoder) = self.hologram.read(method, &display, Sweep::for_display(&display))?;
-        let mut options = SessionOptions::new(target, method);
-        options.encoder = encoder.options;
+        let (mut options, encoder) =
+            make::session::options(&self.hologram, self.method, (&file, size), &self.backend, threads)?;
         options.encoder.brightness = match self.brightness {
             BrightnessName::Smoothed => Brightness::Smoothed,
             BrightnessName::Max => Brightness::FrameMax,
@@ -234,12 +196,6 @@ impl Video {
             Some((near_m, far_m)) => DepthRange::Fixed { near_m, far_m },
         };
         options.depth_network = self.seen.open(size)?.map(Arc::new);
-        if let Some(device) = self.backend.device()? {
-            options.backend = Backend::Gpu;
-            options.gpu.device = device;
-        }
-        options.threads = threads;
-        options.quality = Quality::Fixed(0);
         if self.adaptive {
             options.quality = Quality::Adaptive;
             options.target_rate_hz = Some(rate);
@@ -253,8 +209,8 @@ impl Video {
             }
         }
         let info = HologramInfo {
-            display,
-            ..levels_info(&file, encoder.name, None) // The frames say their scale and colours.
+            display: options.target.display.clone(),
+            ..make::levels_info(&file, encoder.name, None) // The frames say their scale and colours.
         };
         Ok((options, info))
     }
@@ -271,7 +227,7 @@ impl Video {
         let steps = options.encoder.midpoint_steps + options.encoder.focus_steps;
         let backend = options.backend;
         let session = VideoSession::new(options)?;
-        warm_up(session.handle(), backend)?;
+        gpu::warm_up(session.handle(), backend)?;
         let mut resuming = sink.resumes();
         let mut frame = 0;
         while let Some(read) = source.next()? {
@@ -331,7 +287,7 @@ impl Video {
         };
         let backend = options.backend;
         let session = LiveSession::new(options, listener)?;
-        warm_up(session.handle(), backend)?;
+        gpu::warm_up(session.handle(), backend)?;
         let (submitted, written) = std::thread::scope(|scope| {
             let writer = scope.spawn(move || {
                 let mut result = Ok(());
@@ -386,7 +342,7 @@ impl Video {
                 "paused": s.dropped.paused, "reset": s.dropped.reset, "closed": s.dropped.closed,
             },
             "seconds": seconds, "rate_hz": s.processed as f64 / seconds, "recent_rate_hz": s.rate_hz,
-            "stage_ms": stages, "total_ms": rounded_ms(s.times.total()), "frame_times": frame_times(&sink.times), "backend": s.backend.name,
+            "stage_ms": stages, "total_ms": rounded_ms(s.times.total()), "frame_times": FrameStatistics::of(&sink.times), "backend": s.backend.name,
             "backend_reason": s.backend.why, "quality_level": s.quality_level, "scale_change": change, "memory_mb": memory_mb,
         });
         sink.write_report(&result)?;
@@ -405,28 +361,6 @@ impl Video {
         );
         Ok(())
     }
-}
-
-/// Returns the time of the first frame, and the median and the 95th percentile of each stage of all frames, in ms.
-fn frame_times(times: &[FrameTimes]) -> Option<serde_json::Value> {
-    let first = times.first()?;
-    let percentile = |share: f64| {
-        let of = |stage: &dyn Fn(&FrameTimes) -> Duration| {
-            let mut stages: Vec<_> = times.iter().map(stage).collect();
-            stages.sort_unstable();
-            json!(rounded_ms(stages[((stages.len() - 1) as f64 * share).round() as usize]))
-        };
-        let names = first.stages().map(|(name, _)| name);
-        let stages = (names.into_iter().enumerate()).map(|(i, name)| (name, of(&|times| times.stages()[i].1)));
-        (stages.chain([("total", of(&FrameTimes::total))])).collect::<std::collections::BTreeMap<_, _>>()
-    };
-    Some(json!({
-        "frames": times.len(), "first_ms": rounded_ms(first.total()), "median_ms": percentile(0.5), "p95_ms": percentile(0.95),
-    }))
-}
-
-fn rounded_ms(time: Duration) -> f64 {
-    (time.as_secs_f64() * 1e5).round() / 100.0
 }
 
 fn check_rate(rate_hz: Option<f64>) -> Result<()> {

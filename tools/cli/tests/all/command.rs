@@ -1096,6 +1096,56 @@ fn the_bench_measures_every_stage_and_draws_it() {
 }
 
 #[test]
+fn the_bench_measures_sessions_of_scenes_and_pictures() {
+    let folder = Folder::new().with_frame();
+    let bench = ["bench", "--session", "--size", "40x30", "--threads", "1"];
+    let measured = |more: &[&str]| -> serde_json::Value {
+        let text = folder.succeeds(&[&bench[..], more, &["--json"]].concat());
+        let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        value["rows"].take()
+    };
+    let rows = measured(&["--method", "sweep"]);
+    assert_eq!(
+        (&rows[0]["scene"], &rows[1]["scene"]),
+        (&"balls".into(), &"leaves".into())
+    );
+    for row in rows.as_array().unwrap() {
+        assert_eq!((&row["method"], &row["frames"]), (&"sweep".into(), &30.into()), "{row}");
+        assert_eq!((&row["width"], &row["height"]), (&40.into(), &30.into()), "{row}");
+        for stage in ["colour", "depth", "method", "propagate", "encode", "total"] {
+            let ms = |of: &str| row[of][stage].as_f64().unwrap();
+            assert!(ms("median_ms") <= ms("p95_ms"), "{stage}: {row}");
+        }
+        assert!(
+            row["first_ms"].as_f64() > Some(0.0) && row["start_ms"].as_f64() > Some(0.0),
+            "{row}"
+        );
+    }
+    let picture = ["--rgb", "rgb.png", "--depth", "depth.png"];
+    let millimetres = ["--seconds", "0", "--depth-unit", "mm"];
+    let rows = measured(&[&picture[..], &picture, &millimetres].concat());
+    assert_eq!(rows.as_array().unwrap().len(), 2);
+    assert_eq!(
+        (&rows[1]["scene"], &rows[1]["method"], &rows[1]["frames"]),
+        (&"rgb.png".into(), &"auto".into(), &5.into())
+    );
+    let natural = ["--focus", "natural", "--focus-steps", "0"];
+    let rows = measured(&[&picture[..], &["--seconds", "0"], &natural].concat());
+    assert_eq!(rows[0]["method"], "network", "{rows}");
+    let one = [&bench[..], &picture, &["--rgb", "rgb.png"]].concat();
+    folder.refuses(&one, 1, &["2 --rgb and 1 --depth"]);
+    for alone in [
+        "--method sweep",
+        "--rgb rgb.png --depth depth.png",
+        "--session --layers 8",
+        "--session --near 1",
+    ] {
+        let call: Vec<_> = ["bench"].into_iter().chain(alone.split(' ')).collect();
+        folder.refuses(&call, 2, &["--"]);
+    }
+}
+
+#[test]
 fn a_calibrated_display_is_packed_for_an_app() {
     let folder = Folder::new();
     let lut: Vec<u8> = (0..=255).map(|i| i / 2 + 30).collect();
