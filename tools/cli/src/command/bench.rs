@@ -49,7 +49,8 @@ pub(crate) struct Bench {
     /// Method of --session [default: auto; network with --network or --encoder deep]
     #[arg(long, value_enum, requires = "session", help_heading = "Method")]
     method: Option<CoreMethod>,
-    /// Colour image of a scene for --session, with its --depth; may be repeated [default: two scenes that need no files]
+    /// Colour image of a scene for --session, with its --depth; may be repeated [default: two scenes that need no
+    /// files]
     #[arg(long, value_name = "FILE", requires_all = ["session", "depth"], help_heading = "Input")]
     rgb: Vec<PathBuf>,
     /// Depth image of the --rgb at the same place
