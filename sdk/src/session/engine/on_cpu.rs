@@ -47,7 +47,7 @@ impl OnCpu {
         let method = self.pipeline.method();
         let (engine, sweep) = (method.engine(), method.swept_on());
         let name = engine.map(|engine| engine.name).or(sweep.map(|isa| isa.name()));
-        let sweep = sweep.map(|isa| format!("the plane sweep in f32 on {isa}"));
+        let sweep = sweep.map(|isa| format!("the plane sweep in 16-bit integers on {isa}"));
         let why: Vec<_> = engine
             .map(|engine| engine.why.clone())
             .into_iter()
