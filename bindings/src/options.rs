@@ -222,6 +222,10 @@ pub struct SessionOptions {
     pub depth_range: DepthRange,
     /// The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
     pub least_confidence: f32,
+    /// Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
+    /// only the tiles in which colour or depth have changed by more than a camera's noise.
+    #[uniffi(default = true)]
+    pub keep_standing: bool,
     /// The number of threads to compute with, at most 256; none for as many as the device has.
     pub threads: Option<usize>,
     /// The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a
@@ -364,6 +368,7 @@ impl SessionOptions {
             focus: Focus::Coherent,
             depth_range: core.depth.range,
             least_confidence: core.depth.least_confidence,
+            keep_standing: core.keep_standing,
             threads: core.threads.map(NonZeroUsize::get),
             most_pixels: core.most_pixels,
             backend: core.backend,
@@ -443,6 +448,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         to.quality_levels = quality_levels;
         to.depth.range = options.depth_range;
         to.depth.least_confidence = options.least_confidence;
+        to.keep_standing = options.keep_standing;
         #[cfg(feature = "tract")]
         {
             to.depth_network = options.depth_network.as_ref().map(|network| network.core.clone());

@@ -195,7 +195,7 @@ impl VideoSession {
 
     /// Resumes a video: updates the state of the session with `frame`, without making its hologram, whose
     /// [`Hologram::scale`] was `scale`. The frames that follow give the same result as after [`Self::process`] of
-    /// `frame`, except with steps at the midpoint, which keep more state.
+    /// `frame`, except with steps at the midpoint, or where what stands still keeps its wave: they keep more state.
     ///
     /// # Errors
     /// Returns an error in the same cases as [`Self::process`], and if the scale is not positive and finite.

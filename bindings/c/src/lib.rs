@@ -42,9 +42,9 @@ pub use options::{
     pf_options_push_quality_level, pf_options_set_anti_alias, pf_options_set_backend, pf_options_set_band_limit,
     pf_options_set_brightness_fixed, pf_options_set_brightness_frame_max, pf_options_set_brightness_smoothed,
     pf_options_set_dark_threshold, pf_options_set_deep, pf_options_set_depth_network, pf_options_set_depth_range,
-    pf_options_set_double_phase, pf_options_set_least_confidence, pf_options_set_local_steps,
-    pf_options_set_midpoint_steps, pf_options_set_most_pixels, pf_options_set_natural_focus,
-    pf_options_set_target_rate_hz, pf_options_set_threads,
+    pf_options_set_double_phase, pf_options_set_keep_standing, pf_options_set_least_confidence,
+    pf_options_set_local_steps, pf_options_set_midpoint_steps, pf_options_set_most_pixels,
+    pf_options_set_natural_focus, pf_options_set_target_rate_hz, pf_options_set_threads,
 };
 pub use session::{
     PfDropReason, PfListener, PfQualityChange, PfQualityReason, PfRunningMode, PfSession, PfStatistics, PfThermal,

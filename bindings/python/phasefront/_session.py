@@ -140,6 +140,7 @@ class Changes(TypedDict, total=False):
     focus: Focus | str
     depth_range: DepthRange | tuple[float, float] | str
     least_confidence: float
+    keep_standing: bool
     threads: int | None
     most_pixels: int
     backend: Backend | str

@@ -163,6 +163,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_natural_focus(SessionOptions options, uint steps);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_depth_range(SessionOptions options, float nearM, float farM);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_least_confidence(SessionOptions options, float confidence);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_keep_standing(SessionOptions options, [MarshalAs(UnmanagedType.I1)] bool keep);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_threads(SessionOptions options, uint threads);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_most_pixels(SessionOptions options, ulong pixels);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_backend(SessionOptions options, Backend backend);

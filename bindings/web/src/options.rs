@@ -159,6 +159,12 @@ impl RawOptions {
         self.core.depth.least_confidence = least;
     }
 
+    /// Sets whether what stands still in a video keeps its wave.
+    #[wasm_bindgen(js_name = keepStanding)]
+    pub fn keep_standing(&mut self, keep: bool) {
+        self.core.keep_standing = keep;
+    }
+
     /// Sets the target rate in frames per second.
     #[wasm_bindgen(js_name = targetRateHz)]
     pub fn target_rate_hz(&mut self, rate: f64) {

@@ -228,6 +228,15 @@ impl MethodPlan {
         self.field_after(None, frame, field, scratch)
     }
 
+    /// Lets what stands still in a video keep its wave where the plane sweep makes it.
+    pub(crate) fn keep_standing(&self, scratch: &mut MethodScratch) {
+        match (&self.plan, &mut scratch.0) {
+            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.keep_standing(scratch),
+            (Plan::Auto(plan, _), Scratch::Auto { sweep, .. }) => plan.keep_standing(sweep),
+            _ => {}
+        }
+    }
+
     /// Works like [`Self::field`] for a frame that follows another if there is a `past`, as in video. This keeps
     /// [`Method::Auto`] from switching back and forth between its methods.
     pub(crate) fn field_after(
@@ -240,7 +249,7 @@ impl MethodPlan {
         frame.check(self.size, self.colours)?;
         match (&self.plan, &mut scratch.0) {
             (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
-            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
+            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.field_after(past, frame, field, scratch),
             (Plan::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
             (
                 Plan::Auto(sweep, trained),
@@ -253,7 +262,7 @@ impl MethodPlan {
                 if choose(was_soft, past, frame) {
                     trained.field(frame, field, of_trained)
                 } else {
-                    sweep.field(frame, field, of_sweep)
+                    sweep.field_after(past, frame, field, of_sweep)
                 }
             }
             _ => panic!("the scratch is another plan's"),

@@ -143,6 +143,13 @@ impl Pipeline {
         }
     }
 
+    /// Lets what stands still in a video keep its wave where the plane sweep makes it, from [`Self::process_after`] to
+    /// the next. This takes memory for another frame and its wave.
+    #[doc(hidden)]
+    pub fn keep_standing(&self, scratch: &mut PipelineScratch) {
+        self.method.keep_standing(&mut scratch.method);
+    }
+
     /// Writes the field at the modulator into `field`, (C, H, W), and returns the times of the method and of the
     /// propagation. The mean phase is removed unless the encoding was trained with it.
     ///

@@ -36,7 +36,9 @@ pub struct AnsweringSession {
 
 impl AnsweringSession {
     /// Creates a session, whose frames follow one another if they come `in_order`.
-    pub(super) async fn new(options: SessionOptions, in_order: bool) -> Result<Self> {
+    pub(super) async fn new(mut options: SessionOptions, in_order: bool) -> Result<Self> {
+        // Nothing stands still from one picture to another.
+        options.keep_standing &= in_order;
         let estimates = DepthEstimates::for_each_frame(&options);
         let shared = Shared::new(options, estimates).await?;
         let gate = Arc::new(Mutex::new(Gate::new(in_order, shared.cancel.clone())));

@@ -43,6 +43,9 @@ pub struct SessionOptions {
     pub target_rate_hz: Option<f64>,
     /// The conversion of fields to levels.
     pub encoder: EncoderOptions,
+    /// Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
+    /// only the tiles in which colour or depth have changed by more than a camera's noise.
+    pub keep_standing: bool,
     /// The processing of depth.
     pub depth: DepthOptions,
     /// The network that estimates the depth of frames without depth. A live session runs it on its own thread, at the
@@ -108,6 +111,7 @@ impl SessionOptions {
             quality: Quality::Adaptive,
             target_rate_hz: None,
             encoder: EncoderOptions::default(),
+            keep_standing: true,
             depth: DepthOptions::default(),
             #[cfg(feature = "tract")]
             depth_network: None,

@@ -25,3 +25,4 @@ mod gpu_session;
 mod one_colour;
 mod session;
 mod session_layers;
+mod standing;

@@ -92,6 +92,11 @@ export interface SessionOptions<N = Network, T = Target | Display> {
   readonly depthRange?: { readonly nearM: number; readonly farM: number };
   /** The confidence, 0 to 1, below which readings are ignored. */
   readonly leastConfidence?: number;
+  /**
+   * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes only
+   * the tiles in which colour or depth have changed by more than a camera's noise. True by default.
+   */
+  readonly keepStanding?: boolean;
   /** The maximum number of pixels of a quality level and of the modulator. */
   readonly mostPixels?: number;
   /**
@@ -174,6 +179,7 @@ function rawOptions(options: SessionOptions): RawOptions {
     setEncoder(raw, options);
     if (options.depthRange) raw.depthRange(options.depthRange.nearM, options.depthRange.farM);
     if (options.leastConfidence !== undefined) raw.leastConfidence(options.leastConfidence);
+    if (options.keepStanding !== undefined) raw.keepStanding(options.keepStanding);
     if (options.targetRateHz !== undefined) raw.targetRateHz(options.targetRateHz);
     if (options.mostPixels !== undefined) raw.mostPixels(whole("mostPixels", options.mostPixels));
     if (options.qualityLevels) {

@@ -5413,6 +5413,11 @@ public struct SessionOptions {
      */
     public var leastConfidence: Float
     /**
+     * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
+     * only the tiles in which colour or depth have changed by more than a camera's noise.
+     */
+    public var keepStanding: Bool
+    /**
      * The number of threads to compute with, at most 256; none for as many as the device has.
      */
     public var threads: Int?
@@ -5475,6 +5480,10 @@ public struct SessionOptions {
          * The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
          */leastConfidence: Float, 
         /**
+         * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
+         * only the tiles in which colour or depth have changed by more than a camera's noise.
+         */keepStanding: Bool = true, 
+        /**
          * The number of threads to compute with, at most 256; none for as many as the device has.
          */threads: Int?, 
         /**
@@ -5500,6 +5509,7 @@ public struct SessionOptions {
         self.focus = focus
         self.depthRange = depthRange
         self.leastConfidence = leastConfidence
+        self.keepStanding = keepStanding
         self.threads = threads
         self.mostPixels = mostPixels
         self.backend = backend
@@ -5534,6 +5544,7 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
                 focus: FfiConverterTypeFocus.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
+                keepStanding: FfiConverterBool.read(from: &buf), 
                 threads: FfiConverterOptionTypeInt.read(from: &buf), 
                 mostPixels: FfiConverterTypeInt.read(from: &buf), 
                 backend: FfiConverterTypeBackend.read(from: &buf), 
@@ -5554,6 +5565,7 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         FfiConverterTypeFocus.write(value.focus, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
+        FfiConverterBool.write(value.keepStanding, into: &buf)
         FfiConverterOptionTypeInt.write(value.threads, into: &buf)
         FfiConverterTypeInt.write(value.mostPixels, into: &buf)
         FfiConverterTypeBackend.write(value.backend, into: &buf)

@@ -23,12 +23,13 @@ mod points;
 pub mod reference;
 mod shares;
 mod spans;
+mod standing;
 mod tile;
 mod workers;
 
 use crate::Size;
 use crate::display::Display;
-use crate::frame::RgbdFrame;
+use crate::frame::{Past, RgbdFrame};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use filters::Filters;
@@ -41,6 +42,8 @@ use phasefront_kernels::wide;
 use rayon::prelude::*;
 pub use shares::MEET;
 use shares::Slot;
+use standing::{BLOCK, Standing};
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 pub use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
@@ -183,6 +186,8 @@ pub struct SweepScratch {
     sources: Vec<u32>,
     hidden: HiddenScratch,
     tiles: Workers<TileScratch>,
+    /// What stands still, if it keeps its wave.
+    standing: Option<Box<Standing>>,
     cancel: Cancel,
 }
 
@@ -282,8 +287,15 @@ impl SweepPlan {
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
+            standing: None,
             cancel: Cancel::default(),
         }
+    }
+
+    /// Lets what stands still in a video keep its wave, in [`SweepPlan::field_after`]. This takes memory for another
+    /// frame and its wave.
+    pub(crate) fn keep_standing(&self, scratch: &mut SweepScratch) {
+        scratch.standing = Some(Box::new(Standing::new(self.filters.len(), self.size)));
     }
 
     /// Writes the hologram of `frame`, without the carrier, at [`SweepPlan::z_m`] into `field`, (C, H, W). Allocates
@@ -295,15 +307,44 @@ impl SweepPlan {
     /// # Panics
     /// Panics if `field` does not have C·H·W values or `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
+        self.field_after(None, frame, field, scratch)
+    }
+
+    /// Works like [`Self::field`] for a frame that follows another if there is a `past`. What stands still since then
+    /// keeps its wave after [`Self::keep_standing`].
+    pub(crate) fn field_after(
+        &self,
+        past: Option<Past>,
+        frame: &RgbdFrame,
+        field: &mut [Complex32],
+        scratch: &mut SweepScratch,
+    ) -> Result<()> {
         frame.check(self.size(), self.filters.len())?;
         let size = self.size.pixels();
         assert_eq!(field.len(), self.filters.len() * size);
+        let SweepScratch {
+            positions,
+            slots,
+            sources,
+            hidden,
+            tiles,
+            standing,
+            cancel,
+        } = scratch;
+        if let Some(standing) = standing {
+            standing.show(frame, past.is_some(), self.sweep.planes);
+        }
+        let (frame, changes, wave) = match standing.as_deref_mut() {
+            Some(standing) => (&standing.frame, Some(&standing.changes), &mut standing.wave[..]),
+            None => (frame, None, &mut [][..]),
+        };
+        let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows, 0..self.size.width));
         let (rgb, depth) = frame.values();
-        const PART: usize = 1 << 14;
-        let parts = (scratch.slots.par_chunks_mut(PART)).zip(scratch.positions.par_chunks_mut(PART));
-        parts
-            .zip(depth.par_chunks(PART))
-            .for_each(|((slots, positions), depth)| {
+        let part = BLOCK * self.size.width;
+        let parts = (slots.par_chunks_mut(part)).zip(positions.par_chunks_mut(part));
+        (parts.zip(depth.par_chunks(part)).enumerate())
+            .filter(|(row, _)| changed(row * BLOCK..(row + 1) * BLOCK))
+            .for_each(|(_, ((slots, positions), depth))| {
                 wide!(
                     for ((slot, position), d) in slots.iter_mut().zip(positions).zip(depth) {
                         *position = self.sweep.position(*d);
@@ -313,33 +354,50 @@ impl SweepPlan {
             });
         let layers = self.sweep.hidden_layers;
         if layers > 0 {
-            self.hidden.find(depth, &mut scratch.sources, &mut scratch.hidden);
+            self.hidden.find_where(changed, depth, sources, hidden);
         }
         let surfaces = Surfaces {
             rgb,
-            positions: &scratch.positions,
-            slots: &scratch.slots,
-            hidden: &scratch.sources[..layers * size],
+            positions,
+            slots,
+            hidden: &sources[..layers * size],
             size: self.size,
         };
         let mut planes = field.chunks_exact_mut(size);
+        let mut waves = wave.chunks_exact_mut(size);
         // An array of the largest number of planes avoids an allocation.
-        let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
+        let planes: [_; 3] =
+            std::array::from_fn(|_| Mutex::new((planes.next().unwrap_or_default(), waves.next().unwrap_or_default())));
         let (down, across) = self.layout.count(self.size);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
-            if scratch.cancel.requested() {
+            if cancel.requested() {
                 return;
             }
             let tile = Tile::of(&self.layout, self.fir, surfaces, index);
-            scratch.tiles.with(|scratch| {
-                scratch.points.gather(&tile);
+            let stands = changes.is_some_and(|changes| {
+                let (rows, columns) = tile.around(self.hidden.dependence());
+                !changes.any(rows, columns)
+            });
+            tiles.with(|scratch| {
+                if !stands {
+                    scratch.points.gather(&tile);
+                }
                 for (colour, filters) in self.filters.iter().enumerate() {
-                    tile.sweep(colour, filters, scratch);
+                    if !stands {
+                        tile.sweep(colour, filters, scratch);
+                    }
                     let mut plane = planes[colour].lock().unwrap_or_else(PoisonError::into_inner);
-                    tile.store(&mut plane, scratch);
+                    let (plane, wave) = &mut *plane;
+                    match stands {
+                        true => tile.restore(plane, wave),
+                        false => tile.store(plane, wave, scratch),
+                    }
                 }
             });
         });
+        if let Some(standing) = standing {
+            standing.finish(!cancel.requested());
+        }
         Ok(())
     }
 }

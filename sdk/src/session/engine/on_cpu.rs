@@ -22,6 +22,9 @@ impl OnCpu {
         let pipeline = Self::plan(options, quality_level)?;
         let mut scratch = pipeline.scratch();
         scratch.set_cancel(cancel);
+        if options.keep_standing {
+            pipeline.keep_standing(&mut scratch);
+        }
         Ok(OnCpu { pipeline, scratch })
     }
 

@@ -81,6 +81,10 @@ pub(crate) struct Video {
     /// Let a live stream step down to half and a quarter of the resolution if it cannot hold the rate
     #[arg(long, requires = "live", help_heading = "Input")]
     adaptive: bool,
+    /// Let what stands still keep its wave where the plane sweep makes it, as --live does: a frame computes only what has
+    /// changed by more than a camera's noise
+    #[arg(long, help_heading = "Method")]
+    keep_standing: bool,
     /// Number of times to show the frames of a folder
     #[arg(long, group = SOURCE, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Input")]
     repeat: u32,
@@ -191,6 +195,7 @@ impl Video {
             BrightnessName::Smoothed => Brightness::Smoothed,
             BrightnessName::Max => Brightness::FrameMax,
         };
+        options.keep_standing = self.keep_standing || self.live;
         options.depth.range = match self.depth.range()? {
             None => DepthRange::Percentiles,
             Some((near_m, far_m)) => DepthRange::Fixed { near_m, far_m },
@@ -224,7 +229,8 @@ impl Video {
         bar: &indicatif::ProgressBar,
         rate: f64,
     ) -> Result<Statistics> {
-        let steps = options.encoder.midpoint_steps + options.encoder.focus_steps;
+        // Steps and what stands still keep more than a replay restores.
+        let keeps_more = options.keep_standing || options.encoder.midpoint_steps + options.encoder.focus_steps > 0;
         let backend = options.backend;
         let session = VideoSession::new(options)?;
         gpu::warm_up(session.handle(), backend)?;
@@ -236,8 +242,7 @@ impl Video {
             let written = if resuming { sink.written(&read)? } else { None };
             resuming = written.is_some();
             match written {
-                // These steps keep more state than a replay restores, so such frames are made again.
-                Some(scale) if steps > 0 => {
+                Some(scale) if keeps_more => {
                     session.process(&image).map_err(named)?;
                     sink.skip(scale);
                 }

@@ -13,6 +13,7 @@
 use super::workers::Workers;
 use crate::Size;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The difference in normalized depth above which two pixels are on different surfaces.
 pub const JUMP: f32 = 0.02;
@@ -188,6 +189,11 @@ impl Hidden {
         Hidden { height, width, reach }
     }
 
+    /// Returns how far from a pixel the depth affects its sources: one pixel beyond the farthest source.
+    pub(super) fn dependence(&self) -> usize {
+        self.reach + 1
+    }
+
     /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> HiddenScratch {
         HiddenScratch {
@@ -205,12 +211,27 @@ impl Hidden {
     /// # Panics
     /// Panics if a length is wrong.
     pub fn find(&self, depth: &[f32], sources: &mut [u32], scratch: &mut HiddenScratch) {
+        self.find_where(|_| true, depth, sources, scratch);
+    }
+
+    /// Works like [`Self::find`], but keeps the sources of rows that depend on no row that has `changed`.
+    pub(super) fn find_where(
+        &self,
+        changed: impl Fn(Range<usize>) -> bool + Sync,
+        depth: &[f32],
+        sources: &mut [u32],
+        scratch: &mut HiddenScratch,
+    ) {
         let size = self.height * self.width;
         assert!(depth.len() == size && sources.len() == 2 * size);
         let (first, second) = sources.split_at_mut(size);
         (first.par_chunks_mut(BAND * self.width))
             .zip(second.par_chunks_mut(BAND * self.width))
             .enumerate()
+            .filter(|(band, _)| {
+                let (top, around) = (band * BAND, self.dependence());
+                changed(top.saturating_sub(around)..top + BAND + around)
+            })
             .for_each(|(band, (first, second))| {
                 scratch.workers.with(|work| {
                     self.band(depth, band * BAND, first, second, work);
@@ -230,7 +251,7 @@ impl Hidden {
         }
         // Sources are at most `reach` rows away, and the row behind a source determines whether it is at an edge. A
         // walk that starts there without sources therefore finds the same result.
-        let before = self.reach + 1;
+        let before = self.dependence();
         let (columns, busy) = (&mut work.columns, &mut work.busy);
         columns.fill(Found::NOTHING);
         busy.fill(false);

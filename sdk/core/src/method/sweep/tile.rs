@@ -183,9 +183,9 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Returns the rows and columns of the frame whose points may matter.
-    pub(super) fn around(&self) -> (Range<usize>, Range<usize>) {
-        let widest = self.layout.widest.last().copied().unwrap_or(0);
+    /// Returns the rows and columns of the frame whose points may matter, and of what is up to `more` pixels beside.
+    pub(super) fn around(&self, more: usize) -> (Range<usize>, Range<usize>) {
+        let widest = self.layout.widest.last().copied().unwrap_or(0) + more;
         let around =
             |side: &Range<usize>, size: usize| side.start.saturating_sub(widest)..(side.end + widest).min(size);
         let Size { width, height } = self.surfaces.size;
@@ -326,18 +326,34 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Writes the swept tile into a colour's plane of the frame.
-    pub(super) fn store(&self, plane: &mut [Complex32], scratch: &mut TileScratch) {
+    /// Writes the swept tile into a colour's plane of the frame, and into `wave` if it has that plane too.
+    pub(super) fn store(&self, plane: &mut [Complex32], wave: &mut [Pixel], scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let field = scratch.field.pixels();
         for (i, y) in self.rows.clone().enumerate() {
-            let at = (border + i) * stride + border;
-            let out = &mut plane[y * self.surfaces.size.width..][self.columns.clone()];
-            wide!(for (out, pixel) in out.iter_mut().zip(&field[at..]) {
-                *out = Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT);
-            });
+            let row = &field[(border + i) * stride + border..][..self.columns.len()];
+            let at = y * self.surfaces.size.width + self.columns.start;
+            values(row, &mut plane[at..]);
+            if !wave.is_empty() {
+                wave[at..][..row.len()].copy_from_slice(row);
+            }
         }
     }
+
+    /// Writes the tile into a colour's plane of the frame as [`Self::store`] wrote it into `wave`.
+    pub(super) fn restore(&self, plane: &mut [Complex32], wave: &[Pixel]) {
+        for y in self.rows.clone() {
+            let at = y * self.surfaces.size.width + self.columns.start;
+            values(&wave[at..][..self.columns.len()], &mut plane[at..]);
+        }
+    }
+}
+
+/// Writes the values of pixels.
+fn values(pixels: &[Pixel], out: &mut [Complex32]) {
+    wide!(for (out, pixel) in out.iter_mut().zip(pixels) {
+        *out = Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT);
+    });
 }
 
 /// Returns an amplitude in units of [`UNIT`].

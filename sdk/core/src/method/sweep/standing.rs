@@ -1,0 +1,307 @@
+//! What stands still in a video. Tiles whose light and depth stay as they were keep their wave.
+//!
+//! The sweep shows a frame of its own, the *shown* frame. In a frame of a video, each block of pixels that differs from
+//! the shown frame by more than a tolerance replaces its part there, and only the tiles that see such a block are swept
+//! again. So the wave is always exactly the sweep of the shown frame, and no block of the shown frame differs from the
+//! given one by more than the tolerance, however long a scene stands. A camera's noise stays below it.
+//!
+//! The difference in colour of a block is the mean of Δa² over its pixels and colours, and that in depth the mean of
+//! a²·min(1, [`DEPTH_WEIGHT`]·Δp²), with the amplitude a and the position p among the planes. Sums run in a fixed order,
+//! so that all instruction sets decide alike.
+
+use crate::Size;
+use crate::frame::RgbdFrame;
+use phasefront_kernels::fir::Pixel;
+use phasefront_kernels::wide;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// The number of pixels along each side of a block.
+pub(super) const BLOCK: usize = 16;
+
+/// The largest difference in colour of a block that stands, 34 dB below full light.
+const COLOUR_TOLERANCE: f32 = 4e-4;
+
+/// The largest difference in depth of a block that stands, 24 dB below full light. It is larger than that of colour
+/// because the noise of a sensor moves edges by a pixel here and there.
+const DEPTH_TOLERANCE: f32 = 4e-3;
+
+/// The share of a point's light that counts as different if its depth changes by the distance of two planes: its image
+/// becomes a little more or less sharp.
+const DEPTH_WEIGHT: f32 = 0.05;
+
+/// The blocks of a frame that have changed.
+pub(super) struct Changes {
+    blocks: Vec<bool>,
+    /// The number of blocks across the frame.
+    across: usize,
+}
+
+impl Changes {
+    /// Returns whether a block that contains one of these pixels has changed. Ranges may go beyond the frame.
+    pub(super) fn any(&self, rows: Range<usize>, columns: Range<usize>) -> bool {
+        let blocks =
+            |side: Range<usize>, most: usize| (side.start / BLOCK).min(most)..side.end.div_ceil(BLOCK).min(most);
+        let columns = blocks(columns, self.across);
+        let mut rows = blocks(rows, self.blocks.len() / self.across);
+        rows.any(|row| self.blocks[row * self.across..][columns.clone()].contains(&true))
+    }
+}
+
+/// The memory of what is shown.
+pub(super) struct Standing {
+    /// The shown frame.
+    pub(super) frame: RgbdFrame,
+    pub(super) changes: Changes,
+    /// The wave of the shown frame, (C, H, W).
+    pub(super) wave: Vec<Pixel>,
+    /// Whether `wave` is that of `frame`.
+    is_whole: bool,
+}
+
+impl Standing {
+    /// Creates memory for frames of `colours` and `size`.
+    pub(super) fn new(colours: usize, size: Size) -> Self {
+        let (across, down) = (size.width.div_ceil(BLOCK), size.height.div_ceil(BLOCK));
+        Standing {
+            frame: RgbdFrame::black(colours, size),
+            changes: Changes {
+                blocks: vec![true; across * down],
+                across,
+            },
+            wave: vec![Pixel::ZERO; colours * size.pixels()],
+            is_whole: false,
+        }
+    }
+
+    /// Finds what changes from the shown frame to `frame`, and shows it. Without a past, everything changes. The wave is
+    /// that of the shown frame again after [`Self::finish`].
+    pub(super) fn show(&mut self, frame: &RgbdFrame, has_past: bool, planes: usize) {
+        let keeps = has_past && self.is_whole;
+        self.is_whole = false;
+        let Size { width, height } = frame.size();
+        let across = self.changes.across;
+        let shown = &self.frame;
+        let rows = self.changes.blocks.par_chunks_mut(across).enumerate();
+        rows.for_each(|(row, blocks)| match keeps {
+            false => blocks.fill(true),
+            true => {
+                let rows = row * BLOCK..((row + 1) * BLOCK).min(height);
+                wide!(compare(frame, shown, rows, planes as f32, blocks));
+            }
+        });
+        let (shown_rgb, shown_depth) = self.frame.planes_mut();
+        let (rgb, depth) = frame.values();
+        let planes = shown_rgb
+            .chunks_exact_mut(width * height)
+            .zip(rgb.chunks_exact(width * height));
+        for (shown, new) in planes.chain(std::iter::once((shown_depth, depth))) {
+            (shown.par_chunks_mut(BLOCK * width))
+                .zip(new.par_chunks(BLOCK * width))
+                .zip(self.changes.blocks.par_chunks(across))
+                .for_each(|((shown, new), blocks)| {
+                    for (shown, new) in shown.chunks_exact_mut(width).zip(new.chunks_exact(width)) {
+                        let parts = shown.chunks_mut(BLOCK).zip(new.chunks(BLOCK)).zip(blocks);
+                        for ((shown, new), _) in parts.filter(|(_, changed)| **changed) {
+                            shown.copy_from_slice(new);
+                        }
+                    }
+                });
+        }
+    }
+
+    /// Notes whether the wave of the shown frame was computed to its end.
+    pub(super) fn finish(&mut self, is_whole: bool) {
+        self.is_whole = is_whole;
+    }
+}
+
+/// Sets which blocks of a row of blocks differ between two frames by more than the tolerance.
+#[inline(always)]
+fn compare(frame: &RgbdFrame, shown: &RgbdFrame, rows: Range<usize>, planes: f32, blocks: &mut [bool]) {
+    let width = frame.size().width;
+    let size = frame.size().pixels();
+    let colours = frame.colours();
+    let ((rgb, depth), (shown_rgb, shown_depth)) = (frame.values(), shown.values());
+    let weight = DEPTH_WEIGHT * planes * planes;
+    for (block, changed) in blocks.iter_mut().enumerate() {
+        let left = block * BLOCK;
+        let count = BLOCK.min(width - left);
+        let (mut of_colour, mut of_depth) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for y in rows.clone() {
+            let at = y * width + left;
+            let mut moved = [0.0; BLOCK];
+            for ((moved, new), old) in moved.iter_mut().zip(&depth[at..at + count]).zip(&shown_depth[at..]) {
+                let share = weight * (new - old) * (new - old);
+                *moved = if share < 1.0 { share } else { 1.0 };
+            }
+            for plane in 0..colours {
+                let at = plane * size + at;
+                let values = rgb[at..at + count].iter().zip(&shown_rgb[at..]);
+                let sums = of_colour.iter_mut().zip(&mut of_depth).zip(&moved);
+                for (((of_colour, of_depth), moved), (new, old)) in sums.zip(values) {
+                    *of_colour += (new - old) * (new - old);
+                    *of_depth += new * new * moved;
+                }
+            }
+        }
+        let is_above =
+            |sums: [f32; BLOCK], most: f32| sums.iter().sum::<f32>() > most * (colours * rows.len() * count) as f32;
+        *changed = is_above(of_colour, COLOUR_TOLERANCE) || is_above(of_depth, DEPTH_TOLERANCE);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::display::Display;
+    use crate::frame::Past;
+    use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
+    use crate::runtime::cancel::Cancel;
+    use num_complex::Complex32;
+    use std::time::Duration;
+
+    const SIZE: Size = Size { width: 83, height: 61 };
+    const PAST: Option<Past> = Some(Past {
+        scale: 1.0,
+        elapsed: Duration::from_millis(33),
+    });
+
+    /// A sequence of numbers from −1 to 1.
+    fn noise(seed: u32) -> impl FnMut() -> f32 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        }
+    }
+
+    /// Returns a wall and a ball whose centre is in column `x`, with noise of these amplitudes in colour and depth.
+    fn scene(x: usize, [of_colour, of_depth]: [f32; 2], seed: u32) -> RgbdFrame {
+        let mut frame = RgbdFrame::black(3, SIZE);
+        let mut noise = noise(seed);
+        let (rgb, depth) = frame.planes_mut();
+        for (i, depth) in depth.iter_mut().enumerate() {
+            let (row, column) = (i / SIZE.width, i % SIZE.width);
+            let is_ball = column.abs_diff(x).pow(2) + row.abs_diff(20).pow(2) < 60;
+            *depth = (if is_ball { 0.2 } else { 0.7 } + of_depth * noise()).clamp(0.0, 1.0);
+            for (colour, rgb) in rgb.chunks_exact_mut(SIZE.pixels()).enumerate() {
+                let texture = (row * 3 + column * (2 + colour)) % 7;
+                rgb[i] = (if is_ball { 0.9 } else { 0.1 * texture as f32 } + of_colour * noise()).clamp(0.0, 1.0);
+            }
+        }
+        frame
+    }
+
+    fn plan(layers: usize) -> SweepPlan {
+        let display = Display::from_toml("volume_depth_mm = 1.5").unwrap();
+        let sweep = Sweep {
+            tile: 16,
+            hidden_layers: layers,
+            ..Sweep::of_planes(&display, 9)
+        };
+        SweepPlan::new(SIZE, &display, sweep, 0.0).unwrap()
+    }
+
+    fn keeping(plan: &SweepPlan) -> SweepScratch {
+        let mut scratch = plan.scratch();
+        plan.keep_standing(&mut scratch);
+        scratch
+    }
+
+    fn field(plan: &SweepPlan, past: Option<Past>, frame: &RgbdFrame, scratch: &mut SweepScratch) -> Vec<Complex32> {
+        let mut field = vec![Complex32::new(f32::NAN, f32::NAN); 3 * SIZE.pixels()];
+        plan.field_after(past, frame, &mut field, scratch).unwrap();
+        field
+    }
+
+    fn anew(plan: &SweepPlan, frame: &RgbdFrame) -> Vec<Complex32> {
+        field(plan, None, frame, &mut plan.scratch())
+    }
+
+    fn changed(scratch: &SweepScratch) -> usize {
+        let blocks = &scratch.standing.as_ref().unwrap().changes.blocks;
+        blocks.iter().filter(|changed| **changed).count()
+    }
+
+    #[test]
+    fn the_wave_is_the_sweep_of_the_shown_frame_which_is_near_the_given_one() {
+        for layers in [0, 2] {
+            let plan = plan(layers);
+            let mut scratch = keeping(&plan);
+            for i in 0..6_u32 {
+                let frame = scene(20 + 4 * i as usize, [0.004, 0.01], i);
+                let past = PAST.filter(|_| i > 0);
+                let field = field(&plan, past, &frame, &mut scratch);
+                let shown = scratch.standing.as_ref().unwrap().frame.clone();
+                assert!(field == anew(&plan, &shown), "{layers} {i}");
+                if i == 0 {
+                    assert!(shown == frame);
+                    continue;
+                }
+                let blocks = changed(&scratch);
+                assert!((1..12).contains(&blocks), "{layers} {i}: {blocks}");
+                let wave = anew(&plan, &frame);
+                let squares: f32 = field.iter().zip(&wave).map(|(a, b)| (a - b).norm_sqr()).sum();
+                let error = (squares / wave.len() as f32).sqrt();
+                assert!(error < 0.03, "{layers} {i}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_changes_slowly_is_shown_before_it_is_far_from_what_was() {
+        let plan = plan(2);
+        let mut scratch = keeping(&plan);
+        let mut frame = scene(40, [0.0, 0.0], 1);
+        field(&plan, None, &frame, &mut scratch);
+        let mut most = 0;
+        for _ in 0..8 {
+            frame.planes_mut().0.iter_mut().for_each(|a| *a = 0.99 * *a);
+            field(&plan, PAST, &frame, &mut scratch);
+            most = most.max(changed(&scratch));
+            let shown = &scratch.standing.as_ref().unwrap().frame;
+            let farthest = (shown.values().0.iter().zip(frame.values().0)).map(|(a, b)| (a - b).abs());
+            assert!(farthest.fold(0.0, f32::max) < 0.06);
+        }
+        assert!(most > 12, "{most}");
+    }
+
+    #[test]
+    fn without_a_past_or_after_a_frame_that_was_given_up_all_is_computed() {
+        let plan = plan(2);
+        let mut scratch = keeping(&plan);
+        let still = scene(40, [0.0, 0.0], 1);
+        let expected = anew(&plan, &still);
+        assert!(field(&plan, PAST, &still, &mut scratch) == expected);
+        assert!(field(&plan, PAST, &still, &mut scratch) == expected);
+        assert_eq!(changed(&scratch), 0);
+        assert!(field(&plan, None, &still, &mut scratch) == expected);
+        assert_eq!(changed(&scratch), 6 * 4);
+        let cancel = Cancel::default();
+        scratch.set_cancel(&cancel);
+        cancel.request();
+        field(&plan, PAST, &scene(20, [0.0, 0.0], 1), &mut scratch);
+        cancel.clear();
+        assert!(field(&plan, PAST, &still, &mut scratch) == expected);
+        assert_eq!(changed(&scratch), 6 * 4);
+    }
+
+    #[test]
+    fn all_instruction_sets_and_numbers_of_threads_keep_the_same() {
+        let frames = [0, 1, 2].map(|i| scene(30 + 5 * i as usize, [0.012, 0.03], i));
+        let run = |plan: &SweepPlan| {
+            let mut scratch = keeping(plan);
+            frames.each_ref().map(|frame| field(plan, PAST, frame, &mut scratch))
+        };
+        let expected = run(&plan(2));
+        for isa in phasefront_kernels::Isa::fir() {
+            if let Some(plan) = plan(2).on(isa) {
+                assert!(run(&plan) == expected, "{isa}");
+            }
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        assert!(pool.install(|| run(&plan(2))) == expected);
+    }
+}
