@@ -5,8 +5,10 @@
 mod enlarged;
 mod flicker;
 
+use super::Lab;
 use super::sensors::{self, Sensors};
-use clap::{Args, ValueEnum};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, ValueEnum};
 use phasefront::Sweep;
 use phasefront_command::flags::{DisplayFlags, check_used};
 use phasefront_command::terminal::{self, progress_bar};
@@ -143,6 +145,11 @@ impl Study {
         let of_planes = self.what == What::Planes;
         let of_flicker = self.what == What::Flicker;
         let of_enlarged = self.what == What::Enlarged;
+        if of_flicker && self.data.is_some() && self.sensor.is_empty() {
+            // clap knows no flag that another one requires for one value of a third.
+            let why = "the study of flicker takes --data with --sensor, which reads its scenes";
+            Lab::command().error(ErrorKind::MissingRequiredArgument, why).exit();
+        }
         check_used(&[
             (
                 "--display",
@@ -171,8 +178,8 @@ impl Study {
             (
                 "--data",
                 self.data.is_some(),
-                of_enlarged || of_flicker && !self.sensor.is_empty(),
-                "the study of enlarged depth and, with --sensor, the study of flicker",
+                of_enlarged || of_flicker,
+                "the studies of enlarged depth and of flicker",
             ),
             ("--sensor", !self.sensor.is_empty(), of_flicker, "the study of flicker"),
         ])

@@ -147,7 +147,7 @@ fn what_cannot_be_made_is_refused_in_one_line() {
     ] {
         folder.refuses(&call.split(' ').collect::<Vec<_>>(), 1, &[word]);
     }
-    folder.refuses(&["study", "flicker", "--data", "data", "-o", "study"], 1, &["--sensor"]);
+    folder.refuses(&["study", "flicker", "--data", "data", "-o", "study"], 2, &["--sensor"]);
     folder.refuses(&["scene", "-o", "s"], 2, &["--model"]);
     folder.refuses(&["scene", "--seed", "1", "--size", "0x5", "-o", "s"], 2, &["WxH"]);
 }
