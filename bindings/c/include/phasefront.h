@@ -308,6 +308,9 @@ typedef struct PfHologramInfo {
   float valid_depth;
   // The time that each stage took.
   struct PfFrameTimes times;
+  // The meaning of the frame's colours, a PfRgbEncoding. Views are in sRGB unless these are amplitudes, as which
+  // views show them.
+  uint32_t rgb_encoding;
 } PfHologramInfo;
 
 // The caller's memory for an image.

@@ -65,6 +65,12 @@ pub enum PfRgbEncoding {
 
 const RGB_ENCODINGS: [RgbEncoding; 6] = RgbEncoding::ALL;
 
+/// Returns the PfRgbEncoding of `encoding`.
+pub(crate) fn encoding_number(encoding: RgbEncoding) -> u32 {
+    let place = RGB_ENCODINGS.iter().position(|known| *known == encoding);
+    place.expect("all encodings are listed") as u32
+}
+
 /// The memory layout of a depth image. In all formats except the normalized and the relative ones, 0, negative numbers,
 /// NaN, numbers of 1e9 or more, the largest code of an integer format and the largest finite 16-bit float mean no
 /// reading.

@@ -1,5 +1,6 @@
 //! Results: objects whose memory is read in place.
 
+use crate::frame::encoding_number;
 use crate::pointer::{Extensible, free, give, give_sized, object, pick, read};
 use crate::status::{PfStatus, call};
 use phasefront_ffi::{FrameTimes, Layout, OutputSize, Placement, RawHologram, RawMemory, RawPlanes};
@@ -65,6 +66,9 @@ pub struct PfHologramInfo {
     pub valid_depth: f32,
     /// The time that each stage took.
     pub times: PfFrameTimes,
+    /// The meaning of the frame's colours, a PfRgbEncoding. Views are in sRGB unless these are amplitudes, as which
+    /// views show them.
+    pub rgb_encoding: u32,
 }
 
 // SAFETY: its first field is its size.
@@ -203,6 +207,7 @@ pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mu
                 far_m: known.far_m.unwrap_or(f32::NAN),
                 valid_depth: known.valid_depth,
                 times: known.times.into(),
+                rgb_encoding: encoding_number(known.encoding),
             })
         })
     })

@@ -211,6 +211,10 @@ static void run(const cJSON *json, const char *suite, const char *models, const 
         ok(pf_session_process(session, &frame, &hologram), name);
         PfHologramInfo info = {.size = sizeof info};
         ok(pf_hologram_info(hologram, &info), "info");
+        if (info.rgb_encoding != frame.rgb_encoding) {
+            fprintf(stderr, "%s: the encoding of the colours is %u\n", name, info.rgb_encoding);
+            exit(1);
+        }
         for (uint32_t colour = 0; colour < info.colours; colour++) {
             const uint8_t *levels = NULL;
             size_t length = 0;

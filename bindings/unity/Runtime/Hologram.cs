@@ -47,6 +47,9 @@ namespace Phasefront
         public float ValidDepth;
         /// <summary>The time of each stage.</summary>
         public FrameTimes Times;
+        /// <summary>The meaning of the frame's colours. Views are in sRGB unless these are amplitudes, as which views
+        /// show them.</summary>
+        public RgbEncoding Encoding;
     }
 
     /// <summary>The layout of the colours' levels in images for a modulator's driver.</summary>

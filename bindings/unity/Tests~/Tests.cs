@@ -250,7 +250,7 @@ internal static class Tests
                 var frame = Sample(2);
                 using (var hologram = session.Process(frame))
                 {
-                    Require(hologram.Info.Width == 48 && float.IsNaN(hologram.Info.NearM), "what is known");
+                    Require(hologram.Info.Width == 48 && float.IsNaN(hologram.Info.NearM) && hologram.Info.Encoding == RgbEncoding.Srgb, "what is known");
                     var bytes = new byte[48 * 36 * 4];
                     var size = hologram.OutputSize(ModulatorLayout.Rgba);
                     Require(size.Width == 48 && size.Height == 36 && size.PixelBytes == 4 && size.Images == 1, "its size");

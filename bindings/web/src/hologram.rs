@@ -53,6 +53,7 @@ impl RawHologram {
             ("validDepth", self.core.valid_depth().unwrap_or(0.0).into()),
             ("qualityLevel", self.core.quality_level().into()),
             ("times", times(self.core.times()).into()),
+            ("encoding", self.core.encoding().name().into()),
         ])
     }
 

@@ -1,5 +1,5 @@
 // Checks the public types. This file is compiled but not run.
-import { Frame, Network, Session, Target, load, type Display, type SessionOptions } from "phasefront";
+import { Frame, Network, Session, Target, load, type Display, type RgbEncoding, type SessionOptions } from "phasefront";
 
 const display: Display = { width: 640, height: 480, wavelengthsNm: [532] };
 const options: SessionOptions = {
@@ -19,7 +19,8 @@ export async function show(context: CanvasRenderingContext2D, metres: Float32Arr
   );
   const hologram = session.process(frame);
   const near: number | undefined = hologram.info.rangeM?.[0];
-  console.log(near, hologram.levels.byteLength, session.statistics.times.totalMs);
+  const encoding: RgbEncoding = hologram.info.encoding;
+  console.log(near, encoding, hologram.levels.byteLength, session.statistics.times.totalMs);
   const view = new ImageData(640, 480);
   hologram.writePreview(hologram.zAt(0.5, 0.5), view);
   return view;

@@ -1,5 +1,6 @@
 /// <reference lib="esnext.disposable" preserve="true" />
 import { putPixels, type Canvas, type Size } from "./canvas.js";
+import type { RgbEncoding } from "./frame.js";
 import { PhasefrontError, bytesOf, guard, guardAsync, release, whole } from "./error.js";
 import type { RawHologram } from "./raw/phasefront_web.js";
 
@@ -33,6 +34,10 @@ export interface HologramInfo {
   /** The quality level; 0 is the best. */
   readonly qualityLevel: number;
   readonly times: FrameTimes;
+  /**
+   * The meaning of the frame's colours. Views are in sRGB unless these are amplitudes, as which views show them.
+   */
+  readonly encoding: RgbEncoding;
 }
 
 /**
