@@ -24,6 +24,11 @@ pub fn name(path: &Path) -> String {
     Line(&path.display().to_string()).to_string()
 }
 
+/// Writes a figure that there may not be, with `decimals`.
+pub fn figure(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
 /// Prints a command's result: `value` on one line if `json` is set, else `text` unless --quiet is given. Replaces
 /// control characters in `text` other than newlines, because names of files, networks and scenes may contain any. Where
 /// an output file takes stdout, the result goes to stderr.

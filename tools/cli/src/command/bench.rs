@@ -14,7 +14,7 @@ use phasefront_cli::bench::{self, Case, Machine, Row};
 use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
 use phasefront_command::networks::{self, Precision};
-use phasefront_command::terminal::{self, progress_bar};
+use phasefront_command::terminal::{self, figure, progress_bar};
 use phasefront_core::method::network::Isa;
 use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront_io::picture::plot::{self, Bar};
@@ -374,10 +374,10 @@ fn as_gpu_table(device: &Device, encoder: &str, rows: &[GpuRow]) -> String {
             row.spread_ms[0],
             row.spread_ms[1],
             row.flying_ms,
-            whole(row.gmac_per_s),
-            whole(row.peak_percent),
-            whole(row.bandwidth_percent),
-            tenths(row.table_percent),
+            figure(row.gmac_per_s, 0),
+            figure(row.peak_percent, 0),
+            figure(row.bandwidth_percent, 0),
+            figure(row.table_percent, 1),
         );
     }
     text
@@ -404,10 +404,10 @@ fn as_table(machine: &Machine, encoder: &str, rows: &[Row]) -> String {
             row.total_ms,
             row.spread_ms[0],
             row.spread_ms[1],
-            whole(row.gmac_per_s),
-            whole(row.peak_percent),
-            whole(row.peak_memory_mb),
-            tenths(row.table_percent),
+            figure(row.gmac_per_s, 0),
+            figure(row.peak_percent, 0),
+            figure(row.peak_memory_mb, 0),
+            figure(row.table_percent, 1),
         );
     }
     text
@@ -441,14 +441,10 @@ fn as_session_table(machine: &Machine, encoder: &str, rows: &[SessionRow]) -> St
             stage("propagate"),
             stage("encode"),
             stage("total"),
-            whole(row.peak_memory_mb),
+            figure(row.peak_memory_mb, 0),
         );
     }
     text
-}
-
-fn tenths(value: Option<f64>) -> String {
-    value.map_or("–".into(), |value| format!("{value:.1}"))
 }
 
 fn title(machine: &Machine, encoder: &str, row: &Row) -> String {
@@ -480,8 +476,4 @@ fn bars(rows: &[Row]) -> Vec<Bar> {
         .to_vec(),
     };
     rows.iter().map(bar).collect()
-}
-
-fn whole(value: Option<f64>) -> String {
-    value.map_or("–".into(), |value| format!("{value:.0}"))
 }

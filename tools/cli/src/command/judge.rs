@@ -15,7 +15,7 @@ use phasefront::Size;
 use phasefront_cli::viewer::{self, Depth, Scene};
 use phasefront_command::flags::{DisplayFlags, EncoderName, PrecisionName};
 use phasefront_command::networks;
-use phasefront_command::terminal::{self, progress_bar};
+use phasefront_command::terminal::{self, figure, progress_bar};
 use phasefront_core::depth::sharpness;
 use phasefront_core::view::colours::ViewColours;
 use phasefront_exact::incoherent::{self, Natural, Pupil};
@@ -431,21 +431,19 @@ fn table(rows: &[Row], what: &str) -> String {
             focal_ssim,
             ..
         } = row.figures;
-        let [wave_ms, encode_ms] = row.judged.ms().map(|ms| ms.map(|ms| format!("{ms:.1}")));
-        let none = || "–".to_owned();
+        let [wave_ms, encode_ms] = row.judged.ms().map(|ms| figure(ms, 1));
         text += &format!(
             "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {:10.2}  {:>8}  {:>12}  {:12.3}  {:>9}  {:>10}  {:>7}  {:>9}",
             row.judged.method,
             row.judged.encoder,
             row.natural.psnr,
-            figure(row.natural.in_focus_psnr),
-            figure(row.natural.out_of_focus_psnr),
+            figure(row.natural.in_focus_psnr, 2),
+            figure(row.natural.out_of_focus_psnr, 2),
             row.natural.ssim,
-            figure(row.ciede2000),
-            row.brightness
-                .map_or_else(none, |brightness| format!("{brightness:.3}")),
-            wave_ms.unwrap_or_else(none),
-            encode_ms.unwrap_or_else(none),
+            figure(row.ciede2000, 2),
+            figure(row.brightness, 3),
+            wave_ms,
+            encode_ms,
         );
     }
     text + &format!(
@@ -457,11 +455,6 @@ fn table(rows: &[Row], what: &str) -> String {
 fn colour_difference(shown: &Array3<f32>, wanted: &Array3<f32>, colours: &ViewColours) -> Option<f64> {
     let light = |view: &Array3<f32>| difference::light_of_view(view.view(), colours);
     Some(difference::of_pictures(light(shown)?.view(), light(wanted)?.view()))
-}
-
-/// Writes a figure that there may not be.
-fn figure(figure: Option<f64>) -> String {
-    figure.map_or_else(|| "–".to_owned(), |figure| format!("{figure:.2}"))
 }
 
 /// Writes a page that shows the displayed images of each combination and the reference.
@@ -523,8 +516,8 @@ fn write_page(
                 format!(
                     "{:.2} dB, in focus {}, out of focus {}, SSIM {:.3}",
                     row.natural.psnr,
-                    figure(row.natural.in_focus_psnr),
-                    figure(row.natural.out_of_focus_psnr),
+                    figure(row.natural.in_focus_psnr, 2),
+                    figure(row.natural.out_of_focus_psnr, 2),
                     row.natural.ssim
                 ),
             ),

@@ -56,15 +56,20 @@ impl HologramFlags {
         })
     }
 
+    /// Refuses the flags of a network where the method is not `trained`.
+    pub(crate) fn check_network(&self, trained: bool) -> Result<()> {
+        let with = "--method network or auto";
+        check_used(&[
+            ("--network", self.network.is_some(), trained, with),
+            ("--precision", self.precision.is_some(), trained, with),
+        ])
+    }
+
     /// Makes `method` for `display`, where `sweep` is its plane sweep, and the encoder of its fields.
     pub(crate) fn read(&self, method: CoreMethod, display: &Display, sweep: Sweep) -> Result<(Method, Encoder)> {
         let (network, encoder) = (self.network.as_deref(), &self.encoder);
         let trained = method != CoreMethod::Sweep;
-        let with = "a --method with a network, not with sweep";
-        check_used(&[
-            ("--network", network.is_some(), trained, with),
-            ("--precision", self.precision.is_some(), trained, with),
-        ])?;
+        self.check_network(trained)?;
         let precision = self.precision.map(PrecisionName::precision);
         let focus = encoder.focus()?;
         let (method, encoder) = match method {

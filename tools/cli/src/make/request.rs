@@ -176,10 +176,8 @@ impl HologramRequest {
         let any = |of: &[CoreMethod]| matches!(method, Method::Core(core) if of.contains(&core));
         let (sweeps, trained) = (any(&[Sweep, Auto]), any(&[Network, Auto]));
         let planes = sweeps || matches!(method, Method::Layers | Method::Points);
-        let network = "--method network or auto";
+        self.hologram.check_network(trained)?;
         check_used(&[
-            ("--network", self.hologram.network.is_some(), trained, network),
-            ("--precision", self.hologram.precision.is_some(), trained, network),
             (
                 "--planes",
                 self.planes.is_some(),

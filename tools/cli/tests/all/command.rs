@@ -710,7 +710,7 @@ fn a_flag_of_other_calls_is_refused() {
     fs::rename(folder.path("h.png"), folder.path("there.png")).unwrap();
     let sweep = "multiplex --rgb rgb.png --depth depth.png --method sweep --network 8 -o maps";
     let cases = [
-        (sweep, "not with sweep"),
+        (sweep, "--method network or auto"),
         ("compare rgb.png rgb.png --z-mm 1", "two images"),
         ("refocus there.png --z-mm 0 --offset-mm 3 -o v.png", "--display"),
         ("show there.png --offset-mm 3", "--display"),

@@ -211,7 +211,7 @@ fn wrong_input_is_named() {
         (&[name, "--depth-scale", "5000"], "--depth-unit raw"),
         (
             &[name, "--depth-unit", "mm", "--method", "sweep", "--network", "8"],
-            "not with sweep",
+            "--method network or auto",
         ),
     ] {
         let said = refusal(arguments);

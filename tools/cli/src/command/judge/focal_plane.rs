@@ -6,7 +6,7 @@ use crate::flags::frame::{shown_json, shown_text};
 use crate::make::{FOURIER, HologramRequest, judge_in_focus};
 use phasefront::Size;
 use phasefront_command::flags::{EncoderName, check_used};
-use phasefront_command::terminal;
+use phasefront_command::terminal::{self, figure};
 use phasefront_io::display::DisplayFile;
 use phasefront_io::hologram;
 use phasefront_io::{Error, Result};
@@ -52,17 +52,14 @@ impl Judge {
                 "method": judged.method, "encoder": judged.encoder, "psnr_db": figures.psnr_db, "ssim": figures.ssim,
                 "brightness": figures.brightness, "wave_ms": search_ms, "encode_ms": encode_ms,
             }));
-            let none = || "–".to_owned();
             text += &format!(
                 "\n{:8}  {:24}  {:7.2}  {:5.3}  {:>10}  {:>9}",
                 judged.method,
                 judged.encoder,
                 figures.psnr_db,
                 figures.ssim,
-                figures
-                    .brightness
-                    .map_or_else(none, |brightness| format!("{brightness:.3}")),
-                search_ms.map_or_else(none, |ms| format!("{ms:.1}")),
+                figure(figures.brightness, 3),
+                figure(search_ms, 1),
             );
         }
         text += "\nJudged by the picture, each pixel in focus.";
