@@ -74,8 +74,8 @@ impl Standing {
         }
     }
 
-    /// Finds what changes from the shown frame to `frame`, and shows it. Without a past, everything changes. The wave is
-    /// that of the shown frame again after [`Self::finish`].
+    /// Finds what changes from the shown frame to `frame`, and shows it. Without a past, everything changes. The wave
+    /// is that of the shown frame again after [`Self::finish`].
     pub(super) fn show(&mut self, frame: &RgbdFrame, has_past: bool, planes: usize) {
         let keeps = has_past && self.is_whole;
         self.is_whole = false;
