@@ -6,8 +6,8 @@
 //! given one by more than the tolerance, however long a scene stands. A camera's noise stays below it.
 //!
 //! The difference in colour of a block is the mean of Δa² over its pixels and colours, and that in depth the mean of
-//! a²·min(1, [`DEPTH_WEIGHT`]·Δp²), with the amplitude a and the position p among the planes. Sums run in a fixed order,
-//! so that all instruction sets decide alike.
+//! a²·min(1, [`DEPTH_WEIGHT`]·Δp²), with the amplitude a and the position p among the planes. Sums run in a fixed
+//! order, so that all instruction sets decide alike.
 
 use crate::Size;
 use crate::frame::RgbdFrame;
