@@ -258,7 +258,7 @@ mod tests {
         field(&plan, None, &frame, &mut scratch);
         let mut most = 0;
         for _ in 0..8 {
-            frame.planes_mut().0.iter_mut().for_each(|a| *a = 0.99 * *a);
+            frame.planes_mut().0.iter_mut().for_each(|a| *a *= 0.99);
             field(&plan, PAST, &frame, &mut scratch);
             most = most.max(changed(&scratch));
             let shown = &scratch.standing.as_ref().unwrap().frame;
