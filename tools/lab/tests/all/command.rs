@@ -140,10 +140,7 @@ fn what_cannot_be_made_is_refused_in_one_line() {
             "have displays of their own",
         ),
         ("study flicker --size 64 -o study", "studies other than of flicker"),
-        (
-            "study layers --data data --sensor lidar -o study",
-            "the study of flicker",
-        ),
+        ("study layers --data data --sensor lidar -o study", "of flicker"),
     ] {
         folder.refuses(&call.split(' ').collect::<Vec<_>>(), 1, &[word]);
     }
