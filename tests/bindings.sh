@@ -40,7 +40,10 @@ build_library() {
     need cargo || PATH="$HOME/.cargo/bin:$PATH"
     need cargo || cannot 'cargo is missing; see https://rustup.rs'
     cargo build --release --quiet --workspace || exit 1
-    cargo test --release --quiet --workspace --test conformance >/dev/null || exit 1
+    cargo test --release --quiet --workspace --test conformance >"$cache/conformance.log" 2>&1 || {
+        cat "$cache/conformance.log"
+        exit 1
+    }
 }
 
 # Installs the packages that bindings/web/package.json names, or fails.

@@ -30,6 +30,7 @@ export async function run() {
     "rgbd-15": { target, method: { kind: "trained", network: Network.builtIn("rgbd-15") } },
     sweep: { target, method: { kind: "sweep" } },
     "automatic, 6 mm away": { target: { ...target, offsetMm: 6 } },
+    "natural focus": { target, focus: { kind: "natural" } },
   };
   const said = frame();
   for (const [name, options] of Object.entries(all)) {

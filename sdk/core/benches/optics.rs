@@ -52,7 +52,7 @@ fn aperture(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn remove_mean_phase(bencher: Bencher<'_, '_>) {
     let mut field = field(3);
-    let run = || phasefront_core::pipeline::display_plan::remove_mean_phase(&mut field, 3);
+    let run = || phasefront_core::method::mean_phase::remove_mean_phase(&mut field, 3);
     bencher.counter(pixels(3)).bench_local(run);
 }
 

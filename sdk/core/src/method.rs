@@ -1,5 +1,6 @@
 //! Methods that compute the hologram of an RGB-D frame. Later stages prepare it for the modulator.
 
+pub mod mean_phase;
 pub mod network;
 pub mod seeded;
 pub mod sweep;
@@ -8,6 +9,7 @@ use crate::Size;
 use crate::depth::softness;
 use crate::display::Display;
 use crate::frame::{Past, RgbdFrame};
+use crate::method::mean_phase::{MeanPhase, remove_mean_phase};
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::method::seeded::{SeededPlan, SeededScratch};
 use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
@@ -225,7 +227,7 @@ impl MethodPlan {
     /// # Panics
     /// Panics if `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut MethodScratch) -> Result<()> {
-        self.field_after(None, frame, field, scratch)
+        self.field_after(None, frame, MeanPhase::Kept, field, scratch)
     }
 
     /// Lets what stands still in a video keep its wave where the plane sweep makes it.
@@ -237,20 +239,24 @@ impl MethodPlan {
         }
     }
 
-    /// Works like [`Self::field`] for a frame that follows another if there is a `past`, as in video. This keeps
-    /// [`Method::Auto`] from switching back and forth between its methods.
+    /// Works like [`Self::field`] for a frame that follows another if there is a `past`, as in video, which keeps
+    /// [`Method::Auto`] from switching back and forth between its methods; and can remove the mean phase of each
+    /// colour.
     pub(crate) fn field_after(
         &self,
         past: Option<Past>,
         frame: &RgbdFrame,
+        mean_phase: MeanPhase,
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
         frame.check(self.size, self.colours)?;
         match (&self.plan, &mut scratch.0) {
-            (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
-            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.field_after(past, frame, field, scratch),
-            (Plan::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
+            (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch)?,
+            (Plan::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch)?,
+            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => {
+                return plan.field_after(past, frame, mean_phase, field, scratch);
+            }
             (
                 Plan::Auto(sweep, trained),
                 Scratch::Auto {
@@ -259,14 +265,17 @@ impl MethodPlan {
                     was_soft,
                 },
             ) => {
-                if choose(was_soft, past, frame) {
-                    trained.field(frame, field, of_trained)
-                } else {
-                    sweep.field_after(past, frame, field, of_sweep)
+                if !choose(was_soft, past, frame) {
+                    return sweep.field_after(past, frame, mean_phase, field, of_sweep);
                 }
+                trained.field(frame, field, of_trained)?;
             }
             _ => panic!("the scratch is another plan's"),
         }
+        if mean_phase == MeanPhase::Removed {
+            remove_mean_phase(field, self.colours);
+        }
+        Ok(())
     }
 
     /// Updates the state in `scratch` as [`Self::field_after`] does, without computing the field of `frame`.

@@ -9,8 +9,9 @@ use crate::display::levels::LevelsMut;
 use crate::display::target::Target;
 use crate::encode::{EncoderOptions, Encoding};
 use crate::frame::{Past, RgbdFrame};
+use crate::method::mean_phase::MeanPhase;
 use crate::method::{Method, MethodPlan, MethodScratch};
-use crate::pipeline::display_plan::{DisplayPlan, DisplayScratch, Modulation, remove_mean_phase};
+use crate::pipeline::display_plan::{DisplayPlan, DisplayScratch, Modulation};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::stage::stage;
@@ -174,11 +175,11 @@ impl Pipeline {
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
         let stage = stage!("method");
-        let of_method = &mut scratch.method;
-        self.method.field_after(past, frame, field, of_method)?;
-        if !self.display.keeps_phase() {
-            remove_mean_phase(field, self.display.colours());
-        }
+        let mean_phase = match self.display.keeps_phase() {
+            true => MeanPhase::Kept,
+            false => MeanPhase::Removed,
+        };
+        (self.method).field_after(past, frame, mean_phase, field, &mut scratch.method)?;
         self.display.aim(frame, &mut scratch.display);
         let method = stage.end();
         let stage = stage!("propagate");

@@ -25,9 +25,9 @@ use phasefront_core::display::response::per_pixel;
 use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::{EncoderOptions, Encoding};
-use phasefront_core::frame::RgbdFrame;
 use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
 use phasefront_core::frame::{ColourPlan, Crop, LightPlan, RgbEncoding};
+use phasefront_core::frame::{Past, RgbdFrame};
 use phasefront_core::method::Method;
 use phasefront_core::method::MethodPlan;
 use phasefront_core::method::network::Network;
@@ -41,6 +41,7 @@ use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::view::preview::Preview;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 fn count(mut call: impl FnMut()) -> usize {
     // The first calls may grow the pool's queues. Later calls may grow a network's memory when more bands than before
@@ -180,6 +181,27 @@ fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
     }
 }
 
+/// Tests frames of a video in which a part changes, on the current thread pool.
+fn what_stands_still(frame: &RgbdFrame) {
+    let method = Method::Sweep(Sweep::for_display(&Display::default()));
+    let plan = Pipeline::new(frame.size(), method, &Target::default(), &Encoding::ANTI_ALIAS.into()).unwrap();
+    let mut scratch = plan.scratch();
+    plan.keep_standing(&mut scratch);
+    let past = Some(Past {
+        scale: 1.0,
+        elapsed: Duration::from_millis(33),
+    });
+    let (mut frame, mut levels) = (frame.clone(), vec![0; 3 * frame.size().pixels()]);
+    let mut process = || {
+        frame.planes_mut().0[..200].iter_mut().for_each(|a| *a = 1.0 - *a);
+        plan.process_after(past, &frame, LevelsMut::Bytes(&mut levels), &mut scratch)
+            .unwrap();
+    };
+    // The first frame allocates the field.
+    process();
+    assert_eq!(count(process), 0, "what stands still");
+}
+
 #[test]
 fn hot_calls_allocate_nothing() {
     let (h, w) = (61, 47);
@@ -250,6 +272,7 @@ fn hot_calls_allocate_nothing() {
                 let sweep = || plan.field(&swept, &mut field, &mut scratch).unwrap();
                 assert_eq!(count(sweep), 0, "{method:?}");
             }
+            what_stands_still(&swept);
             camera_frames_and_previews();
         });
     }

@@ -18,11 +18,12 @@ use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, T
 use phasefront_core::display::levels::LevelsMut;
 use phasefront_core::frame::light_to_srgb;
 use phasefront_core::method::MethodPlan;
+use phasefront_core::method::mean_phase::remove_mean_phase;
 use phasefront_core::method::network::InputKind;
 use phasefront_core::method::seeded::SeededPlan;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::optics::aperture::{Aperture, Opening};
-use phasefront_core::pipeline::display_plan::{DisplayPlan, remove_mean_phase};
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::view::colours::ViewColours;
 use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use phasefront_exact::incoherent::{self, Natural, Pupil};

@@ -1,6 +1,7 @@
 //! Resampling along one axis: the part of a camera image that the display covers, and the taps of each output sample.
 
 use crate::Size;
+use std::ops::Range;
 
 /// The displayed part of an upright image: the largest centred rectangle with the display's aspect ratio.
 ///
@@ -58,6 +59,7 @@ pub struct Axis {
     /// The weights of each output sample: `taps` weights that sum to 1.
     weights: Vec<f32>,
     taps: usize,
+    needed: Range<usize>,
     is_kept: bool,
 }
 
@@ -101,6 +103,7 @@ impl Axis {
             start: Vec::with_capacity(out),
             weights: vec![0.0; out * taps],
             taps,
+            needed: 0..0,
             is_kept: false,
         };
         for (o, (first, weights)) in rows.into_iter().enumerate() {
@@ -111,6 +114,9 @@ impl Axis {
                 axis.weights[o * taps + first - start + k] = weight as f32;
             }
         }
+        let first = axis.start.iter().min().copied().unwrap_or(0);
+        let last = axis.start.iter().max().copied().unwrap_or(0);
+        axis.needed = first as usize..last as usize + taps;
         axis.is_kept = taps == 1 && axis.start.is_sorted_by(|a, b| a + 1 == *b);
         axis
     }
@@ -130,10 +136,8 @@ impl Axis {
     }
 
     /// Returns the range of needed input samples.
-    pub fn needed(&self) -> std::ops::Range<usize> {
-        let first = self.start.iter().min().copied().unwrap_or(0);
-        let last = self.start.iter().max().copied().unwrap_or(0);
-        first as usize..last as usize + self.taps
+    pub fn needed(&self) -> Range<usize> {
+        self.needed.clone()
     }
 
     /// Returns whether the output samples are neighbouring input samples as they are.

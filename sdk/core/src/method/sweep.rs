@@ -30,6 +30,7 @@ mod workers;
 use crate::Size;
 use crate::display::Display;
 use crate::frame::{Past, RgbdFrame};
+use crate::method::mean_phase::{self, MeanPhase};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use filters::Filters;
@@ -37,7 +38,7 @@ pub use filters::Optics;
 use hidden::{Hidden, HiddenScratch};
 use num_complex::Complex32;
 use phasefront_kernels::Isa;
-use phasefront_kernels::fir::Fir;
+use phasefront_kernels::fir::{Fir, Pixel};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 pub use shares::MEET;
@@ -186,6 +187,8 @@ pub struct SweepScratch {
     sources: Vec<u32>,
     hidden: HiddenScratch,
     tiles: Workers<TileScratch>,
+    /// The swept wave, (C, H, W).
+    wave: Vec<Pixel>,
     /// What stands still, if it keeps its wave.
     standing: Option<Box<Standing>>,
     cancel: Cancel,
@@ -287,13 +290,14 @@ impl SweepPlan {
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
+            wave: vec![Pixel::ZERO; self.filters.len() * size],
             standing: None,
             cancel: Cancel::default(),
         }
     }
 
     /// Lets what stands still in a video keep its wave, in [`SweepPlan::field_after`]. This takes memory for another
-    /// frame and its wave.
+    /// frame.
     pub(crate) fn keep_standing(&self, scratch: &mut SweepScratch) {
         scratch.standing = Some(Box::new(Standing::new(self.filters.len(), self.size)));
     }
@@ -307,15 +311,17 @@ impl SweepPlan {
     /// # Panics
     /// Panics if `field` does not have C·H·W values or `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
-        self.field_after(None, frame, field, scratch)
+        self.field_after(None, frame, MeanPhase::Kept, field, scratch)
     }
 
     /// Works like [`Self::field`] for a frame that follows another if there is a `past`. What stands still since then
-    /// keeps its wave after [`Self::keep_standing`].
+    /// keeps its wave after [`Self::keep_standing`]. The mean phase of each colour can be removed. A frame that is given
+    /// up leaves `field` as it is.
     pub(crate) fn field_after(
         &self,
         past: Option<Past>,
         frame: &RgbdFrame,
+        mean_phase: MeanPhase,
         field: &mut [Complex32],
         scratch: &mut SweepScratch,
     ) -> Result<()> {
@@ -328,15 +334,16 @@ impl SweepPlan {
             sources,
             hidden,
             tiles,
+            wave,
             standing,
             cancel,
         } = scratch;
         if let Some(standing) = standing {
             standing.show(frame, past.is_some(), self.sweep.planes);
         }
-        let (frame, changes, wave) = match standing.as_deref_mut() {
-            Some(standing) => (&standing.frame, Some(&standing.changes), &mut standing.wave[..]),
-            None => (frame, None, &mut [][..]),
+        let (frame, changes) = match standing.as_deref() {
+            Some(standing) => (&standing.frame, Some(&standing.changes)),
+            None => (frame, None),
         };
         let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows, 0..self.size.width));
         let (rgb, depth) = frame.values();
@@ -363,11 +370,9 @@ impl SweepPlan {
             hidden: &sources[..layers * size],
             size: self.size,
         };
-        let mut planes = field.chunks_exact_mut(size);
         let mut waves = wave.chunks_exact_mut(size);
-        // An array of the largest number of planes avoids an allocation.
-        let planes: [_; 3] =
-            std::array::from_fn(|_| Mutex::new((planes.next().unwrap_or_default(), waves.next().unwrap_or_default())));
+        // An array of the largest number of colours avoids an allocation.
+        let waves: [_; 3] = std::array::from_fn(|_| Mutex::new(waves.next().unwrap_or_default()));
         let (down, across) = self.layout.count(self.size);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
             if cancel.requested() {
@@ -378,25 +383,26 @@ impl SweepPlan {
                 let (rows, columns) = tile.around(self.hidden.dependence());
                 !changes.any(rows, columns)
             });
+            if stands {
+                return;
+            }
             tiles.with(|scratch| {
-                if !stands {
-                    scratch.points.gather(&tile);
-                }
+                scratch.points.gather(&tile);
                 for (colour, filters) in self.filters.iter().enumerate() {
-                    if !stands {
-                        tile.sweep(colour, filters, scratch);
-                    }
-                    let mut plane = planes[colour].lock().unwrap_or_else(PoisonError::into_inner);
-                    let (plane, wave) = &mut *plane;
-                    match stands {
-                        true => tile.restore(plane, wave),
-                        false => tile.store(plane, wave, scratch),
-                    }
+                    tile.sweep(colour, filters, scratch);
+                    let mut wave = waves[colour].lock().unwrap_or_else(PoisonError::into_inner);
+                    tile.store(&mut wave, scratch);
                 }
             });
         });
+        let is_whole = !cancel.requested();
         if let Some(standing) = standing {
-            standing.finish(!cancel.requested());
+            standing.finish(is_whole);
+        }
+        if is_whole {
+            for (wave, plane) in wave.chunks_exact(size).zip(field.chunks_exact_mut(size)) {
+                mean_phase::write(mean_phase, wave, tile::value, plane);
+            }
         }
         Ok(())
     }

@@ -20,9 +20,7 @@ use crate::optics::fft::ConvolveScratch;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::stage::stage;
-use num_complex::{Complex32, Complex64};
-use phasefront_kernels::wide;
-use rayon::prelude::*;
+use num_complex::Complex32;
 use std::time::Duration;
 
 /// A plan for one shape, target and encoding. It is immutable and can be shared between threads.
@@ -143,7 +141,8 @@ impl DisplayPlan {
         })
     }
 
-    /// Returns whether the encoding was trained on the phase of a network's field, which [`remove_mean_phase`] would
+    /// Returns whether the encoding was trained on the phase of a network's field, which [`remove_mean_phase`](crate::method::mean_phase::remove_mean_phase)
+    /// would
     /// change.
     pub fn keeps_phase(&self) -> bool {
         self.keeps_phase
@@ -302,66 +301,5 @@ impl DisplayPlan {
             panel.add(phases);
         }
         scale
-    }
-}
-
-/// Rotates each of the `colours` planes of `field`, (C, H, W), by its mean phase arg Σu, so that its phase is centred
-/// on 0. A network's constant phase is arbitrary, and double phase wraps least around 0.
-pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
-    let size = field.len() / colours;
-    if size == 0 {
-        return;
-    }
-    for plane in field.chunks_exact_mut(size) {
-        let turn = Complex64::from_polar(1.0, -sum(plane).arg());
-        let turn = Complex32::new(turn.re as f32, turn.im as f32);
-        plane.par_chunks_mut(PART).for_each(|part| {
-            wide!({
-                for value in part {
-                    *value *= turn;
-                }
-            });
-        });
-    }
-}
-
-/// The number of values that one thread sums at a time.
-const PART: usize = 1 << 14;
-
-/// Sums `values` by repeated halving at fixed places, so that the result has the same bits on any number of threads.
-fn sum(values: &[Complex32]) -> Complex64 {
-    if values.len() > PART {
-        let (first, second) = values.split_at(values.len().div_ceil(PART).div_ceil(2) * PART);
-        let (first, second) = rayon::join(|| sum(first), || sum(second));
-        return first + second;
-    }
-    const LANES: usize = 16;
-    wide!({
-        let (runs, rest) = values.as_chunks::<LANES>();
-        let mut sums = [Complex32::ZERO; LANES];
-        for run in runs {
-            for (sum, value) in sums.iter_mut().zip(run) {
-                *sum += value;
-            }
-        }
-        let all = sums.iter().chain(rest);
-        all.map(|v| Complex64::new(v.re.into(), v.im.into())).sum()
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_mean_phase_is_taken_from_each_colour() {
-        let mut field: Vec<_> = (0..3 * 20_000)
-            .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i / 20_000) as f32 + 0.1 * (i % 3) as f32))
-            .collect();
-        remove_mean_phase(&mut field, 3);
-        for plane in field.chunks_exact(20_000) {
-            let sum: Complex32 = plane.iter().sum();
-            assert!(sum.arg().abs() < 1e-4);
-        }
     }
 }

@@ -1,5 +1,5 @@
 //! Finds the mean phase of a network's field on the GPU. The counterpart of
-//! [`phasefront_core::pipeline::display_plan::remove_mean_phase`].
+//! [`phasefront_core::method::mean_phase::remove_mean_phase`].
 
 use crate::Result;
 use crate::device::{Device, Dispatch};
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
     use crate::device::testing::{apart, device, field, read, run, upload};
     use num_complex::Complex32;
-    use phasefront_core::pipeline::display_plan::remove_mean_phase;
+    use phasefront_core::method::mean_phase::remove_mean_phase;
 
     #[test]
     fn the_mean_phase_is_that_of_the_cpu() {

@@ -24,11 +24,24 @@ const SENSOR: Size = Size {
 /// The largest error of the sensor, as a share of the distance.
 const NOISE: f64 = 0.005;
 
+/// The largest error of the camera, in levels of a byte.
+const COLOUR_NOISE: usize = 3;
+
 /// The distances of the near and the far end of normalized depth, in metres.
 const RANGE_M: (f32, f32) = (0.5, 3.0);
 
 /// The number of frames where no time is given.
 const FRAMES: usize = 30;
+
+/// What the camera does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Camera {
+    /// It stands, as the scene does, so that only noise differs from frame to frame.
+    Stands,
+    /// It moves, so that every frame is computed whole.
+    Moves,
+}
 
 /// A scene that stands still before a camera and a depth sensor.
 #[derive(Debug, Clone)]
@@ -124,9 +137,18 @@ impl Scene {
             .collect()
     }
 
-    /// Returns the camera's frame with these `readings`.
-    fn frame<'a>(&'a self, timestamp_ns: u64, readings: &'a [u8]) -> Result<CameraFrame<'a>> {
-        let plane = Plane::new(&self.colour, 3 * self.size.width, 3);
+    /// Returns what the camera sees of the scene: rows of RGB bytes.
+    fn colours(&self, dice: &mut Dice) -> Vec<u8> {
+        let mut noisy = |byte: &u8| {
+            let error = dice.integer(0, 2 * COLOUR_NOISE);
+            (usize::from(*byte) + error).saturating_sub(COLOUR_NOISE).min(255) as u8
+        };
+        self.colour.iter().map(&mut noisy).collect()
+    }
+
+    /// Returns the camera's frame of these `colours` and `readings`.
+    fn frame<'a>(&self, timestamp_ns: u64, colours: &'a [u8], readings: &'a [u8]) -> Result<CameraFrame<'a>> {
+        let plane = Plane::new(colours, 3 * self.size.width, 3);
         let colour = ColourImage::new(ColourFormat::Rgb, self.size, &[plane])?.with_encoding(self.encoding);
         let plane = Plane::new(readings, 4 * self.sensor.width, 4);
         let depth = DepthImage::new(DepthFormat::MetresF32, self.sensor, plane)?;
@@ -150,6 +172,8 @@ fn sensor_of(colour: Size) -> Size {
 pub struct SessionRow {
     /// The name of the scene, or that of its picture's file.
     pub scene: String,
+    /// What the camera does.
+    pub camera: Camera,
     /// The method: `network`, `sweep`, `seeded` or `auto`.
     pub method: &'static str,
     /// The number of convolution layers; 0 without a network.
@@ -174,13 +198,18 @@ pub struct SessionRow {
 }
 
 /// Measures a session with `options` on `scene`: processes frames until `budget` is spent, at least five, or 30 without
-/// a budget. The sensor's noise differs from frame to frame, and is the same in every run.
+/// a budget. The noise differs from frame to frame, and is the same in every run.
 ///
 /// # Errors
 /// Returns an error if the session cannot be opened or refuses the frames.
-pub fn measure(mut options: SessionOptions, scene: &Scene, budget: Option<Duration>) -> Result<SessionRow> {
+pub fn measure(
+    mut options: SessionOptions,
+    scene: &Scene,
+    camera: Camera,
+    budget: Option<Duration>,
+) -> Result<SessionRow> {
     // The scene stands still, but a frame is to take as long as one in which all moves.
-    options.keep_standing = false;
+    options.keep_standing &= camera == Camera::Stands;
     forget_peak_memory();
     let (asked, threads) = (options.backend, options.threads);
     let (method, network) = named(&options.quality_levels[0].method);
@@ -198,12 +227,14 @@ pub fn measure(mut options: SessionOptions, scene: &Scene, budget: Option<Durati
         Some(budget) => times.len() < 5 || start.elapsed() < budget,
         None => times.len() < FRAMES,
     } {
-        let readings = scene.readings(&mut dice);
+        let (colours, readings) = (scene.colours(&mut dice), scene.readings(&mut dice));
         let timestamp_ns = times.len() as u64 * 1_000_000_000 / 30;
-        times.push(session.process(&scene.frame(timestamp_ns, &readings)?)?.times());
+        let frame = scene.frame(timestamp_ns, &colours, &readings)?;
+        times.push(session.process(&frame)?.times());
     }
     Ok(SessionRow {
         scene: scene.name.clone(),
+        camera,
         method,
         layers,
         precision,
@@ -223,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sensor_shows_the_colours_part_and_its_noise_changes() {
+    fn the_sensor_shows_the_colours_part_and_noise_changes() {
         let size = |width, height| Size { width, height };
         assert_eq!(sensor_of(size(1920, 1080)), size(256, 144));
         assert_eq!(sensor_of(size(1600, 1200)), SENSOR);
@@ -236,6 +267,10 @@ mod tests {
                 values.map(|bytes| f32::from_le_bytes(*bytes)).collect()
             };
             let mut dice = Dice::new(0);
+            let [one, other] = [0; 2].map(|_| scene.colours(&mut dice));
+            assert_ne!(one, other);
+            let is_near = |(byte, right): (&u8, &u8)| usize::from(byte.abs_diff(*right)) <= COLOUR_NOISE;
+            assert!(one.iter().zip(&scene.colour).all(is_near));
             let [one, other] = [0; 2].map(|_| metres(scene.readings(&mut dice)));
             assert_ne!(one, other);
             let (near_m, far_m) = RANGE_M;

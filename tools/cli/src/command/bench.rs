@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use phasefront::Size;
 use phasefront::{Method, Network, Sweep, Target};
 use phasefront_cli::bench::gpu::{GpuCase, GpuRow};
-use phasefront_cli::bench::session::{self, Scene, SessionRow};
+use phasefront_cli::bench::session::{self, Camera, Scene, SessionRow};
 use phasefront_cli::bench::{self, Case, Machine, Row};
 use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
@@ -43,7 +43,8 @@ pub(crate) struct Bench {
     #[arg(long, value_name = "NAME|FILE", conflicts_with = "layers", help_heading = "Method")]
     network: Option<String>,
     /// Measure sessions: 8-bit colour of a camera with a sensor's depth of 256×192 in metres, whose noise differs from
-    /// frame to frame, to levels. Reports the first frame, and the median and 95th percentile of each stage
+    /// frame to frame, to levels. Reports the first frame, and the median and 95th percentile of each stage, before a
+    /// camera that stands and one that moves, where every frame is computed whole
     #[arg(long, conflicts_with_all = ["layers", "fusion", "plot"])]
     session: bool,
     /// Method of --session [default: auto; network with --network or --encoder deep]
@@ -162,7 +163,7 @@ impl Bench {
         budget.map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))
     }
 
-    /// Measures sessions, one for each scene.
+    /// Measures sessions on each scene, before a camera that stands and one that moves.
     fn of_sessions(&self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
         let flags = HologramFlags {
             network: self.network.clone(),
@@ -175,10 +176,11 @@ impl Bench {
         let (options, encoder) = make::session::options(&flags, self.method, (&file, size), &self.backend, threads)?;
         let budget = self.budget()?;
         let scenes = self.scenes(size)?;
-        let bar = progress_bar(scenes.len() as u64, "scenes");
+        let cameras = [Camera::Stands, Camera::Moves];
+        let bar = progress_bar((scenes.len() * cameras.len()) as u64, "sessions");
         let mut rows = Vec::new();
-        for scene in &scenes {
-            rows.push(session::measure(options.clone(), scene, budget)?);
+        for (scene, camera) in scenes.iter().flat_map(|scene| cameras.map(|camera| (scene, camera))) {
+            rows.push(session::measure(options.clone(), scene, camera, budget)?);
             bar.inc(1);
         }
         bar.finish_and_clear();
@@ -418,14 +420,18 @@ fn as_session_table(machine: &Machine, encoder: &str, rows: &[SessionRow]) -> St
         "{}, {} cores; {encoder}; medians, 95th percentiles in brackets\n\n",
         machine.cpu, machine.cores
     );
-    text += "| scene | method | layers | precision | size | threads | frames | start ms | first frame ms | colour ms | depth ms | method ms | propagate ms | encode ms | frame ms | memory MB |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| scene | camera | method | layers | precision | size | threads | frames | start ms | first frame ms | colour ms | depth ms | method ms | propagate ms | encode ms | frame ms | memory MB |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let frames = &row.frames;
         let stage = |name| format!("{:.1} ({:.1})", frames.median_ms[name], frames.p95_ms[name]);
         text += &format!(
-            "\n| {} | {} | {} | {} | {}×{} | {} | {} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | {} |",
+            "\n| {} | {} | {} | {} | {} | {}×{} | {} | {} | {:.0} | {:.1} | {} | {} | {} | {} | {} | {} | {} |",
             row.scene,
+            match row.camera {
+                Camera::Stands => "stands",
+                Camera::Moves => "moves",
+            },
             row.method,
             row.layers,
             row.precision,

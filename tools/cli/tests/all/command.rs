@@ -1105,10 +1105,15 @@ fn the_bench_measures_sessions_of_scenes_and_pictures() {
         value["rows"].take()
     };
     let rows = measured(&["--method", "sweep"]);
-    assert_eq!(
-        (&rows[0]["scene"], &rows[1]["scene"]),
-        (&"balls".into(), &"leaves".into())
-    );
+    let measured_of: Vec<_> = (rows.as_array().unwrap().iter())
+        .map(|row| [row["scene"].as_str().unwrap(), row["camera"].as_str().unwrap()])
+        .collect();
+    let scenes = ["balls", "leaves"];
+    let right: Vec<_> = (scenes
+        .iter()
+        .flat_map(|scene| ["stands", "moves"].map(|camera| [*scene, camera])))
+    .collect();
+    assert_eq!(measured_of, right);
     for row in rows.as_array().unwrap() {
         assert_eq!((&row["method"], &row["frames"]), (&"sweep".into(), &30.into()), "{row}");
         assert_eq!((&row["width"], &row["height"]), (&40.into(), &30.into()), "{row}");
@@ -1124,7 +1129,7 @@ fn the_bench_measures_sessions_of_scenes_and_pictures() {
     let picture = ["--rgb", "rgb.png", "--depth", "depth.png"];
     let millimetres = ["--seconds", "0", "--depth-unit", "mm"];
     let rows = measured(&[&picture[..], &picture, &millimetres].concat());
-    assert_eq!(rows.as_array().unwrap().len(), 2);
+    assert_eq!(rows.as_array().unwrap().len(), 4);
     assert_eq!(
         (&rows[1]["scene"], &rows[1]["method"], &rows[1]["frames"]),
         (&"rgb.png".into(), &"auto".into(), &5.into())

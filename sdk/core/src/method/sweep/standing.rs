@@ -11,7 +11,6 @@
 
 use crate::Size;
 use crate::frame::RgbdFrame;
-use phasefront_kernels::fir::Pixel;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -53,9 +52,7 @@ pub(super) struct Standing {
     /// The shown frame.
     pub(super) frame: RgbdFrame,
     pub(super) changes: Changes,
-    /// The wave of the shown frame, (C, H, W).
-    pub(super) wave: Vec<Pixel>,
-    /// Whether `wave` is that of `frame`.
+    /// Whether the sweep's wave is that of `frame`.
     is_whole: bool,
 }
 
@@ -69,7 +66,6 @@ impl Standing {
                 blocks: vec![true; across * down],
                 across,
             },
-            wave: vec![Pixel::ZERO; colours * size.pixels()],
             is_whole: false,
         }
     }
@@ -116,21 +112,25 @@ impl Standing {
     }
 }
 
+/// The number of blocks that are compared together, so that each row is read in long runs.
+const TOGETHER: usize = 16;
+
 /// Sets which blocks of a row of blocks differ between two frames by more than the tolerance.
 #[inline(always)]
 fn compare(frame: &RgbdFrame, shown: &RgbdFrame, rows: Range<usize>, planes: f32, blocks: &mut [bool]) {
-    let width = frame.size().width;
+    let Size { width, .. } = frame.size();
     let size = frame.size().pixels();
     let colours = frame.colours();
     let ((rgb, depth), (shown_rgb, shown_depth)) = (frame.values(), shown.values());
     let weight = DEPTH_WEIGHT * planes * planes;
-    for (block, changed) in blocks.iter_mut().enumerate() {
-        let left = block * BLOCK;
-        let count = BLOCK.min(width - left);
-        let (mut of_colour, mut of_depth) = ([0.0; BLOCK], [0.0; BLOCK]);
+    for (run, blocks) in blocks.chunks_mut(TOGETHER).enumerate() {
+        let left = run * TOGETHER * BLOCK;
+        let count = (TOGETHER * BLOCK).min(width - left);
+        // Each column of a block has sums of its own, so that the loops vectorise.
+        let (mut of_colour, mut of_depth) = ([0.0; TOGETHER * BLOCK], [0.0; TOGETHER * BLOCK]);
         for y in rows.clone() {
             let at = y * width + left;
-            let mut moved = [0.0; BLOCK];
+            let mut moved = [0.0; TOGETHER * BLOCK];
             for ((moved, new), old) in moved.iter_mut().zip(&depth[at..at + count]).zip(&shown_depth[at..]) {
                 let share = weight * (new - old) * (new - old);
                 *moved = if share < 1.0 { share } else { 1.0 };
@@ -145,9 +145,12 @@ fn compare(frame: &RgbdFrame, shown: &RgbdFrame, rows: Range<usize>, planes: f32
                 }
             }
         }
-        let is_above =
-            |sums: [f32; BLOCK], most: f32| sums.iter().sum::<f32>() > most * (colours * rows.len() * count) as f32;
-        *changed = is_above(of_colour, COLOUR_TOLERANCE) || is_above(of_depth, DEPTH_TOLERANCE);
+        let sums = (of_colour.as_chunks::<BLOCK>().0.iter()).zip(of_depth.as_chunks::<BLOCK>().0);
+        for (block, (changed, (of_colour, of_depth))) in blocks.iter_mut().zip(sums).enumerate() {
+            let values = (colours * rows.len() * BLOCK.min(count - block * BLOCK)) as f32;
+            let is_above = |sums: &[f32; BLOCK], most: f32| sums.iter().sum::<f32>() > most * values;
+            *changed = is_above(of_colour, COLOUR_TOLERANCE) || is_above(of_depth, DEPTH_TOLERANCE);
+        }
     }
 }
 
@@ -157,6 +160,7 @@ mod tests {
     use super::*;
     use crate::display::Display;
     use crate::frame::Past;
+    use crate::method::mean_phase::MeanPhase;
     use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
     use crate::runtime::cancel::Cancel;
     use num_complex::Complex32;
@@ -212,7 +216,8 @@ mod tests {
 
     fn field(plan: &SweepPlan, past: Option<Past>, frame: &RgbdFrame, scratch: &mut SweepScratch) -> Vec<Complex32> {
         let mut field = vec![Complex32::new(f32::NAN, f32::NAN); 3 * SIZE.pixels()];
-        plan.field_after(past, frame, &mut field, scratch).unwrap();
+        plan.field_after(past, frame, MeanPhase::Kept, &mut field, scratch)
+            .unwrap();
         field
     }
 

@@ -326,34 +326,22 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Writes the swept tile into a colour's plane of the frame, and into `wave` if it has that plane too.
-    pub(super) fn store(&self, plane: &mut [Complex32], wave: &mut [Pixel], scratch: &mut TileScratch) {
+    /// Writes the swept tile into a colour's plane of the frame's wave.
+    pub(super) fn store(&self, wave: &mut [Pixel], scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let field = scratch.field.pixels();
         for (i, y) in self.rows.clone().enumerate() {
             let row = &field[(border + i) * stride + border..][..self.columns.len()];
             let at = y * self.surfaces.size.width + self.columns.start;
-            values(row, &mut plane[at..]);
-            if !wave.is_empty() {
-                wave[at..][..row.len()].copy_from_slice(row);
-            }
-        }
-    }
-
-    /// Writes the tile into a colour's plane of the frame as [`Self::store`] wrote it into `wave`.
-    pub(super) fn restore(&self, plane: &mut [Complex32], wave: &[Pixel]) {
-        for y in self.rows.clone() {
-            let at = y * self.surfaces.size.width + self.columns.start;
-            values(&wave[at..][..self.columns.len()], &mut plane[at..]);
+            wave[at..][..row.len()].copy_from_slice(row);
         }
     }
 }
 
-/// Writes the values of pixels.
-fn values(pixels: &[Pixel], out: &mut [Complex32]) {
-    wide!(for (out, pixel) in out.iter_mut().zip(pixels) {
-        *out = Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT);
-    });
+/// Returns the value of a pixel.
+#[inline(always)]
+pub(super) fn value(pixel: Pixel) -> Complex32 {
+    Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT)
 }
 
 /// Returns an amplitude in units of [`UNIT`].
