@@ -315,8 +315,8 @@ impl SweepPlan {
     }
 
     /// Works like [`Self::field`] for a frame that follows another if there is a `past`. What stands still since then
-    /// keeps its wave after [`Self::keep_standing`]. The mean phase of each colour can be removed. A frame that is given
-    /// up leaves `field` as it is.
+    /// keeps its wave after [`Self::keep_standing`]. The mean phase of each colour can be removed. A frame that is
+    /// given up leaves `field` as it is.
     pub(crate) fn field_after(
         &self,
         past: Option<Past>,

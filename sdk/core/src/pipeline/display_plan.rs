@@ -141,9 +141,8 @@ impl DisplayPlan {
         })
     }
 
-    /// Returns whether the encoding was trained on the phase of a network's field, which [`remove_mean_phase`](crate::method::mean_phase::remove_mean_phase)
-    /// would
-    /// change.
+    /// Returns whether the encoding was trained on the phase of a network's field, which
+    /// [`remove_mean_phase`](crate::method::mean_phase::remove_mean_phase) would change.
     pub fn keeps_phase(&self) -> bool {
         self.keeps_phase
     }

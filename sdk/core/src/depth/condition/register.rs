@@ -39,8 +39,6 @@ pub(super) const DISTINCT: f32 = 2.0;
 pub(super) const LEAST_EDGES: f32 = 8.0;
 /// The best shift and growth without evidence.
 const NONE: (usize, usize) = (SHIFTS / 2, 0);
-/// The number of frames from one search to the next. Cameras do not move against each other.
-const INTERVAL: u32 = 4;
 /// The share of the evidence that remains in the next search.
 const MEMORY: f32 = 0.7;
 /// The relative gain in evidence at which the first search shifts at all, and at which a later one replaces what was
@@ -55,6 +53,16 @@ pub struct Misfit {
     pub shift: (f64, f64),
     /// The number of readings by which near surfaces are too wide on every side.
     pub growth: usize,
+}
+
+/// The steps of a search. The first frame takes all of them, and each later frame one, so that no frame takes much
+/// longer than others: cameras do not move against each other.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Begin,
+    FindEdges,
+    Compare,
+    Decide,
 }
 
 /// Finds the misfit of a sequence of frames.
@@ -77,8 +85,10 @@ pub(super) struct Registration {
     evidence: [f32; SUMS],
     /// The index of the best shift, and the best growth.
     best: (usize, usize),
-    /// The number of frames since the last search, or `None` before the first.
-    age: Option<u32>,
+    /// The depth of the frame that is searched.
+    depth: Vec<f32>,
+    /// The next step of the search, or `None` before the first search.
+    next: Option<Step>,
     found: Misfit,
 }
 
@@ -110,7 +120,8 @@ impl Registration {
             rows: vec![[0.0; SUMS]; size.height],
             evidence: [0.0; SUMS],
             best: NONE,
-            age: None,
+            depth: vec![0.0; size.pixels()],
+            next: None,
             found: Misfit::default(),
         }
     }
@@ -119,22 +130,41 @@ impl Registration {
     pub(super) fn reset(&mut self) {
         self.evidence.fill(0.0);
         self.best = NONE;
-        self.age = None;
+        self.next = None;
     }
 
     /// Returns how `depth`, which may contain NaN, lies beside `rgb`, (3, H, W). Without evidence it does not.
     pub(super) fn misfit(&mut self, depth: &[f32], rgb: &[f32]) -> Misfit {
-        self.age = self.age.map(|age| age + 1).filter(|age| *age < INTERVAL).or(Some(0));
-        if self.age == Some(0) {
-            self.found = self.search(depth, rgb);
-        }
+        self.next = Some(match self.next {
+            None => {
+                self.begin(depth, rgb);
+                self.find_edges();
+                self.compare();
+                self.decide();
+                Step::Begin
+            }
+            Some(Step::Begin) => {
+                self.begin(depth, rgb);
+                Step::FindEdges
+            }
+            Some(Step::FindEdges) => {
+                self.find_edges();
+                Step::Compare
+            }
+            Some(Step::Compare) => {
+                self.compare();
+                Step::Decide
+            }
+            Some(Step::Decide) => {
+                self.decide();
+                Step::Begin
+            }
+        });
         self.found
     }
 
-    fn search(&mut self, depth: &[f32], rgb: &[f32]) -> Misfit {
-        self.sample(rgb);
-        self.find_edges();
-        self.compare(depth);
+    /// Decides by the evidence of the frames so far.
+    fn decide(&mut self) {
         let is_first = self.evidence[SUMS - 1] == 0.0;
         self.evidence.iter_mut().for_each(|v| *v *= MEMORY);
         for row in &self.rows {
@@ -148,10 +178,10 @@ impl Registration {
         }
         let (shift, growth) = self.best;
         let steps = |i: usize| (i as f64 - REACH as f64) / self.samples as f64;
-        Misfit {
+        self.found = Misfit {
             shift: (steps(shift / SIDE), steps(shift % SIDE)),
             growth,
-        }
+        };
     }
 
     /// Returns whether there is enough evidence, and for `found` much more than for shifts in general.
@@ -189,8 +219,9 @@ impl Registration {
         best
     }
 
-    /// Samples the colours. Samples outside the display are NaN.
-    fn sample(&mut self, rgb: &[f32]) {
+    /// Takes the depth and samples of the colours. Samples outside the display are NaN.
+    fn begin(&mut self, depth: &[f32], rgb: &[f32]) {
+        self.depth.copy_from_slice(depth);
         let [rows, columns] = &self.pixels;
         let Size { width, height } = self.out;
         let samples = self.colour.par_chunks_exact_mut(columns.len()).enumerate();
@@ -266,7 +297,8 @@ impl Registration {
     }
 
     /// Sums the colour edges under the depth edges of each row, for each direction and shift.
-    fn compare(&mut self, depth: &[f32]) {
+    fn compare(&mut self) {
+        let depth = &self.depth;
         let Size { width: w, height: h } = self.size;
         let (samples, width, height) = (self.samples, self.samples * w, self.samples * h);
         let edges = &self.edges;
