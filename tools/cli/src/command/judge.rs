@@ -10,8 +10,7 @@ use crate::make::{HologramRequest, HologramResult, Image, ImageFlags, Method, in
 use clap::{Args, ValueHint};
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::EncoderOptions;
-use phasefront::Size;
+use phasefront::{EncoderOptions, RgbdFrame, Size};
 use phasefront_cli::viewer::{self, Depth, Scene};
 use phasefront_command::flags::{DisplayFlags, EncoderName, PrecisionName};
 use phasefront_command::networks;
@@ -169,7 +168,8 @@ impl Judge {
         }
         bar.finish_and_clear();
         if let Some(path) = &self.output {
-            write_page(path, &file, &truth, &what, &image, &rows)?;
+            let frame = image.picture().expect("an RGB-D image");
+            write_page(path, &references, (&truth, &what), frame, &rows)?;
         }
         let value = json!({
             "truth": what, "width": width, "height": height, "output": self.output.as_ref().map(|path| path.display().to_string()),
@@ -401,6 +401,43 @@ impl References<'_> {
 }
 
 impl Row {
+    /// Returns the names and values that a page shows.
+    fn page_figures(&self) -> Vec<(String, String)> {
+        let Figures {
+            amplitude_psnr,
+            amplitude_ssim,
+            focal_psnr,
+            focal_ssim,
+            ..
+        } = self.figures;
+        let natural = &self.natural;
+        let mut figures = vec![
+            (
+                "At the middle".into(),
+                format!("{amplitude_psnr:.2} dB, SSIM {amplitude_ssim:.3}"),
+            ),
+            (
+                "Over depths".into(),
+                format!("{focal_psnr:.2} dB, SSIM {focal_ssim:.3}"),
+            ),
+            (
+                "As incoherent light".into(),
+                format!(
+                    "{:.2} dB, in focus {}, out of focus {}, SSIM {:.3}",
+                    natural.psnr,
+                    figure(natural.in_focus_psnr, 2),
+                    figure(natural.out_of_focus_psnr, 2),
+                    natural.ssim
+                ),
+            ),
+        ];
+        figures.extend(
+            self.brightness
+                .map(|brightness| ("Brightness".into(), format!("{brightness:.3} of that of the reference"))),
+        );
+        figures
+    }
+
     fn json(&self) -> serde_json::Value {
         let [wave_ms, encode_ms] = self.judged.ms();
         json!({
@@ -457,32 +494,28 @@ fn colour_difference(shown: &Array3<f32>, wanted: &Array3<f32>, colours: &ViewCo
     Some(difference::of_pictures(light(shown)?.view(), light(wanted)?.view()))
 }
 
-/// Writes a page that shows the displayed images of each combination and the reference.
+/// Writes a page that shows the displayed images of each combination and both references: the wave `truth`, and what
+/// incoherent light shows.
 fn write_page(
     path: &Path,
-    file: &DisplayFile,
-    truth: &Hologram,
-    what: &str,
-    image: &Image,
+    references: &References<'_>,
+    (truth, what): (&Hologram, &str),
+    frame: &RgbdFrame,
     rows: &[Row],
 ) -> Result<()> {
+    let file = references.file;
     let last = (PAGE_VIEWS - 1) as f64;
     let z_m: Vec<f64> = (0..PAGE_VIEWS)
         .map(|i| file.target.display.z_of_depth(i as f64 / last))
         .collect();
-    let budget = PAGE_BYTES / (rows.len() + 1);
-    let Image::Rgbd(frame) = image else {
-        return Err(Error::Input("a page needs an RGB-D image".into()));
-    };
-    let depth = Depth::known(&frame.depth().to_owned(), |d| (f64::from(d) * last).round() as u8);
-    let scene = |title: String, hologram: &Hologram, figures: Vec<(String, String)>| -> Result<Scene> {
-        let Size { width, height } = hologram.size();
-        let views = hologram.views_on(file, &z_m)?;
-        let colours = hologram.info().view_colours();
+    let budget = PAGE_BYTES / (rows.len() + 2);
+    let depth = frame.depth().to_owned();
+    let Size { width, height } = frame.size();
+    let scene = |title: String, z_m: &[f64], views: &[Array3<f32>], colours: &ViewColours, depth: Depth| {
         let views: Vec<_> = (views.iter())
-            .map(|view| viewer::picture(view.view(), &colours))
+            .map(|view| viewer::picture(view.view(), colours))
             .collect();
-        Ok(Scene {
+        Ok::<_, Error>(Scene {
             title,
             width,
             height,
@@ -491,42 +524,29 @@ fn write_page(
             shown: viewer::pack(&views, budget)?,
             field: Vec::new(),
             phase: None,
-            depth: depth.clone(),
-            figures,
+            depth,
+            figures: Vec::new(),
         })
     };
-    let mut scenes = vec![scene(format!("Judged by {what}"), truth, Vec::new())?];
+    let of_hologram = |title: String, hologram: &Hologram| {
+        let nearest = Depth::known(&depth, |d| (f64::from(d) * last).round() as u8);
+        let views = hologram.views_on(file, &z_m)?;
+        scene(title, &z_m, &views, &hologram.info().view_colours(), nearest)
+    };
+    let (z_of_light_m, views_of_light) = references.natural.shown();
+    let count = z_of_light_m.len();
+    let nearest = Depth::known(&depth, |d| {
+        ((f64::from(d) * count as f64) as usize).min(count - 1) as u8
+    });
+    let title = "Judged by what incoherent light shows".to_owned();
+    let mut scenes = vec![
+        of_hologram(format!("Judged by {what}"), truth)?,
+        scene(title, z_of_light_m, views_of_light, &references.colours, nearest)?,
+    ];
     for row in rows {
-        let Figures {
-            amplitude_psnr,
-            amplitude_ssim,
-            ..
-        } = row.figures;
-        let mut figures = vec![
-            (
-                "At the middle".into(),
-                format!("{amplitude_psnr:.2} dB, SSIM {amplitude_ssim:.3}"),
-            ),
-            (
-                "Over depths".into(),
-                format!("{:.2} dB, SSIM {:.3}", row.figures.focal_psnr, row.figures.focal_ssim),
-            ),
-            (
-                "As incoherent light".into(),
-                format!(
-                    "{:.2} dB, in focus {}, out of focus {}, SSIM {:.3}",
-                    row.natural.psnr,
-                    figure(row.natural.in_focus_psnr, 2),
-                    figure(row.natural.out_of_focus_psnr, 2),
-                    row.natural.ssim
-                ),
-            ),
-        ];
-        figures.extend(
-            row.brightness
-                .map(|brightness| ("Brightness".into(), format!("{brightness:.3} of that of the reference"))),
-        );
-        scenes.push(scene(row.judged.name(), &row.judged.hologram, figures)?);
+        let mut shown = of_hologram(row.judged.name(), &row.judged.hologram)?;
+        shown.figures = row.page_figures();
+        scenes.push(shown);
     }
     viewer::write(path, &scenes).map(|_| ())
 }

@@ -169,7 +169,12 @@ fn ways_are_judged_by_the_best_wave_at_hand() {
         );
     }
     assert!(rows.iter().all(|row| row["wave_ms"].as_f64().unwrap() > 0.0));
-    assert_eq!(viewer::read(&folder.path("j.html")).unwrap().len(), 8);
+    let scenes = viewer::read(&folder.path("j.html")).unwrap();
+    assert_eq!(scenes.len(), 9);
+    assert_eq!(
+        (scenes[1].title.as_str(), scenes[1].shown.len()),
+        ("Judged by what incoherent light shows", 6)
+    );
     ldi::write(&folder.path("ldi"), 5, Size { width: 64, height: 48 }, 2);
     let said = judged(&["--ldi", "ldi", "--method", "sweep", "--encoder", "double,band-limit"]);
     assert!(

@@ -85,6 +85,11 @@ impl Judge {
         })
     }
 
+    /// Returns z, in metres, of the depths of focus, and what incoherent light shows at each: amplitudes, (C, H, W).
+    pub fn shown(&self) -> (&[f64], &[Array3<f32>]) {
+        (&self.z_m, &self.truth)
+    }
+
     /// Judges `views`, amplitudes (C, H, W) at each of [`Self::z_m`]. `margin` pixels at the border do not count.
     ///
     /// # Errors
