@@ -26,6 +26,7 @@ const LAYERS: &[&str] = &[
     "display::target",
     "frame",
     "depth",
+    "method::mean_phase",
     "method::sweep",
     "method::network",
     "method::seeded",

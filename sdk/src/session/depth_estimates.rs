@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 /// The estimates of a session.
 pub(super) enum DepthEstimates {
-    EachFrame(Planned),
+    EachFrame(Box<Planned>),
     OwnThread(Arc<Exchange>),
 }
 
@@ -73,7 +73,7 @@ impl DepthEstimates {
     /// Returns estimates for each frame, or `None` if the options have no depth network.
     pub(super) fn for_each_frame(options: &SessionOptions) -> Option<Self> {
         let network = options.depth_network.clone()?;
-        Some(DepthEstimates::EachFrame(Planned::new(network)))
+        Some(DepthEstimates::EachFrame(Box::new(Planned::new(network))))
     }
 
     /// Starts the network's thread, or returns `None` if the options have no depth network.

@@ -13,7 +13,7 @@ use crate::Result;
 use crate::input::decode::{self, Reading};
 use crate::output::Pending;
 use image::{DynamicImage, RgbImage};
-use ndarray::{Array3, ArrayView3};
+use ndarray::{Array3, ArrayView3, s};
 use phasefront::Size;
 use std::path::Path;
 
@@ -43,23 +43,25 @@ pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
 
 /// Converts `image` to amplitudes, (3, H, W) in \[0, 1].
 pub fn amplitudes(image: DynamicImage) -> Array3<f32> {
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    let amplitudes =
-        |at: &dyn Fn(usize) -> f32| Array3::from_shape_fn((3, height, width), |(c, y, x)| at(3 * (y * width + x) + c));
+    let shape = (3, image.height() as usize, image.width() as usize);
     // A conversion through float images would need twice the memory.
-    match image {
+    let values = match image {
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
         | DynamicImage::ImageRgb16(_)
-        | DynamicImage::ImageRgba16(_) => {
-            let pixels = image.into_rgb16().into_raw();
-            amplitudes(&|i| f32::from(pixels[i]) / 65535.0)
-        }
-        image => {
-            let pixels = image.into_rgb8().into_raw();
-            amplitudes(&|i| f32::from(pixels[i]) / 255.0)
-        }
+        | DynamicImage::ImageRgba16(_) => planar(&image.into_rgb16(), |v| f32::from(v) / 65535.0),
+        image => planar(&image.into_rgb8(), |v| f32::from(v) / 255.0),
+    };
+    Array3::from_shape_vec(shape, values).expect("three values for each pixel")
+}
+
+/// Returns the values of interleaved pixels of three colours, one plane after the other.
+fn planar<T: Copy>(pixels: &[T], value: impl Fn(T) -> f32) -> Vec<f32> {
+    let mut values = Vec::with_capacity(pixels.len());
+    for colour in 0..3 {
+        values.extend(pixels.as_chunks::<3>().0.iter().map(|pixel| value(pixel[colour])));
     }
+    values
 }
 
 /// Reads the size of an image, upright, and its pixels as rows of RGB bytes. Grey images give three equal colours.
@@ -89,7 +91,9 @@ pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()
 
 /// Converts amplitudes, (C, H, W), to rows of RGB bytes. One laser's are grey.
 pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
-    interleaved(as_rgb(&amplitude), |v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+    // The whole part of a value plus the largest number below ½ is what `f32::round` gives by a call.
+    const HALF: f32 = 0.499_999_97;
+    interleaved(as_rgb(&amplitude), |v| (v.clamp(0.0, 1.0) * 255.0 + HALF) as u8)
 }
 
 /// Views a stack of (C, H, W) as (3, H, W). A single plane is repeated for all three colours.
@@ -99,8 +103,17 @@ pub fn as_rgb<'a, T>(stack: &'a ArrayView3<'_, T>) -> ArrayView3<'a, T> {
 }
 
 pub(crate) fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec<u8> {
-    let pixels = stack.permuted_axes([1, 2, 0]);
-    pixels.iter().map(|v| byte(*v)).collect()
+    let (colours, height, width) = stack.dim();
+    let mut bytes = vec![0; colours * height * width];
+    for (y, row) in bytes.chunks_exact_mut((colours * width).max(1)).enumerate() {
+        for colour in 0..colours {
+            let values = stack.slice(s![colour, y, ..]);
+            for (to, value) in row[colour..].iter_mut().step_by(colours).zip(values) {
+                *to = byte(*value);
+            }
+        }
+    }
+    bytes
 }
 
 /// Writes an 8-bit RGB PNG.
@@ -183,4 +196,27 @@ pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], texts: &[
         writer.write_image_data(pixels).map_err(other)?;
         writer.finish().map_err(other)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_rounded_and_interleaved_and_come_back() {
+        let value = |i: usize| (i % 256) as f32 / 255.0;
+        let stack = Array3::from_shape_fn((3, 40, 9), |(c, y, x)| value(c * 91 + y * 9 + x));
+        let bytes = amplitude_bytes(stack.view());
+        for ((c, y, x), value) in stack.indexed_iter() {
+            assert_eq!(bytes[3 * (9 * y + x) + c], (value * 255.0).round() as u8);
+        }
+        let image = RgbImage::from_raw(9, 40, bytes).expect("its bytes");
+        assert_eq!(amplitudes(image.into()), stack);
+        let below = 0.5f32.next_down() / 255.0;
+        let edges = [below, 0.5 / 255.0, 1.5 / 255.0, 254.499 / 255.0, -1.0, 2.0, f32::NAN];
+        let edges = Array3::from_shape_fn((1, 1, edges.len()), |(_, _, x)| edges[x]);
+        let expected: Vec<u8> = (edges.iter().map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)).collect();
+        let pixels = amplitude_bytes(edges.view());
+        assert!(pixels.as_chunks::<3>().0.iter().map(|pixel| pixel[0]).eq(expected));
+    }
 }

@@ -1,5 +1,6 @@
 //! Runs the commands of README and of guides as a reader pastes them: in a clone, after `samples/run`.
 use crate::folder::Folder;
+use image::imageops::FilterType;
 use std::path::Path;
 
 /// Returns the arguments of the commands `phasefront` in the blocks of shell code of a document.
@@ -28,14 +29,22 @@ fn files(folder: &Folder) -> impl Iterator<Item = (String, u64)> {
     of(".", "").chain(of("out", "out/"))
 }
 
-/// Runs the commands of `document` in a folder that has the samples, and what `samples/run` makes of them.
-fn runs(document: &str, least: usize) {
+/// Runs the commands of `document` in a folder that has the samples, a third as wide and high if `small`, and what
+/// `samples/run` makes of them.
+fn runs(document: &str, least: usize, small: bool) {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("samples")).unwrap();
     std::fs::create_dir(folder.path("out")).unwrap();
     for name in ["scene_rgb.jpg", "scene_depth.png"] {
         let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../samples").join(name);
-        std::fs::copy(sample, folder.path("samples").join(name)).unwrap();
+        let to = folder.path("samples").join(name);
+        match small {
+            false => std::fs::copy(sample, to).map(|_| ()).unwrap(),
+            true => (image::open(sample).unwrap())
+                .resize_exact(640, 360, FilterType::Nearest)
+                .save(to)
+                .unwrap(),
+        }
     }
     let colour = [
         "hologram",
@@ -67,19 +76,19 @@ fn runs(document: &str, least: usize) {
 #[test]
 #[ignore = "slow: 40 seconds of a core"]
 fn the_first_commands_run_as_they_stand() {
-    runs("README.md", 3);
+    runs("README.md", 3, false);
 }
 
 #[test]
-#[ignore = "slow: minutes of a core"]
+#[ignore = "slow: a minute of a core"]
 fn the_commands_of_the_guide_to_pages_run_as_they_stand() {
-    runs("docs/view.md", 6);
+    runs("docs/view.md", 6, true);
 }
 
 #[test]
-#[ignore = "slow: minutes of a core"]
+#[ignore = "slow: a minute of a core"]
 fn the_commands_of_the_reference_pages_run_as_they_stand() {
     for (page, least) in [("docs/command.md", 2), ("docs/devices.md", 3), ("docs/focus.md", 1)] {
-        runs(page, least);
+        runs(page, least, true);
     }
 }
