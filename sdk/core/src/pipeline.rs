@@ -145,7 +145,7 @@ impl Pipeline {
     }
 
     /// Lets what stands still in a video keep its wave where the plane sweep makes it, from [`Self::process_after`] to
-    /// the next. This takes memory for another frame and its wave.
+    /// the next. This takes memory for another frame.
     #[doc(hidden)]
     pub fn keep_standing(&self, scratch: &mut PipelineScratch) {
         self.method.keep_standing(&mut scratch.method);

@@ -208,7 +208,7 @@ pub fn measure(
     camera: Camera,
     budget: Option<Duration>,
 ) -> Result<SessionRow> {
-    // The scene stands still, but a frame is to take as long as one in which all moves.
+    // The scene stands still. Before a camera that moves, a frame is to take as long as one in which all moves.
     options.keep_standing &= camera == Camera::Stands;
     forget_peak_memory();
     let (asked, threads) = (options.backend, options.threads);

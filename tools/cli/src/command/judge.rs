@@ -510,6 +510,7 @@ fn write_page(
         .collect();
     let budget = PAGE_BYTES / (rows.len() + 2);
     let depth = frame.depth().to_owned();
+    let nearest_view = Depth::known(&depth, |d| (f64::from(d) * last).round() as u8);
     let Size { width, height } = frame.size();
     let scene = |title: String, z_m: &[f64], views: &[Array3<f32>], colours: &ViewColours, depth: Depth| {
         let views: Vec<_> = (views.iter())
@@ -529,19 +530,25 @@ fn write_page(
         })
     };
     let of_hologram = |title: String, hologram: &Hologram| {
-        let nearest = Depth::known(&depth, |d| (f64::from(d) * last).round() as u8);
         let views = hologram.views_on(file, &z_m)?;
-        scene(title, &z_m, &views, &hologram.info().view_colours(), nearest)
+        let colours = hologram.info().view_colours();
+        scene(title, &z_m, &views, &colours, nearest_view.clone())
     };
     let (z_of_light_m, views_of_light) = references.natural.shown();
     let count = z_of_light_m.len();
-    let nearest = Depth::known(&depth, |d| {
+    let nearest_of_light = Depth::known(&depth, |d| {
         ((f64::from(d) * count as f64) as usize).min(count - 1) as u8
     });
     let title = "Judged by what incoherent light shows".to_owned();
     let mut scenes = vec![
         of_hologram(format!("Judged by {what}"), truth)?,
-        scene(title, z_of_light_m, views_of_light, &references.colours, nearest)?,
+        scene(
+            title,
+            z_of_light_m,
+            views_of_light,
+            &references.colours,
+            nearest_of_light,
+        )?,
     ];
     for row in rows {
         let mut shown = of_hologram(row.judged.name(), &row.judged.hologram)?;
