@@ -404,6 +404,7 @@ fn whole_frames_are_those_of_the_cpu() {
 
 /// Checks sweeps to the midpoint with propagation, sweeps to the modulator, and seeded networks in all number formats.
 #[test]
+#[ignore = "slow: 20 seconds of a core in software"]
 fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     let device = device();
     let display = Display::from_toml("volume_depth_mm = 5").unwrap();

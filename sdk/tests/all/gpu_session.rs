@@ -110,6 +110,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
 
 /// Runs the plane sweep, alone and under a network, at separate quality levels, on camera frames.
 #[test]
+#[ignore = "slow: 20 seconds of a core in software"]
 fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(Size { width: W, height: H });
     let seeded = Network::from_onnx(include_bytes!("../../../models/unbundled/seeded-8-80.onnx")).unwrap();
@@ -135,6 +136,7 @@ fn sweeps_are_those_of_the_cpu() {
 
 /// Chooses the method of each frame as the CPU does, from depth of the frame's size and from readings.
 #[test]
+#[ignore = "slow: 15 seconds of a core in software"]
 fn the_automatic_choice_is_that_of_the_cpu() {
     let size = Size { width: 128, height: 96 };
     let mut plain = options(size);
@@ -283,6 +285,7 @@ fn video_is_as_smooth_as_on_the_cpu() {
 
 /// The levels of coarse and of full-size depth, in a video in which something moves. A frame that is replayed counts.
 #[test]
+#[ignore = "slow: 30 seconds of a core in software"]
 fn depth_is_conditioned_on_the_gpu_as_on_the_cpu() {
     for size @ Size { width, height } in [
         Size {

@@ -893,6 +893,7 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
 }
 
 #[test]
+#[ignore = "slow: 30 seconds of a core in software"]
 fn a_gpu_is_measured() {
     let folder = Folder::new();
     let bench = |more: &[&str]| {

@@ -819,6 +819,7 @@ fn what_ffmpeg_complains_about_stops_nothing() {
 }
 
 #[test]
+#[ignore = "slow: 15 seconds of a core"]
 fn films_have_any_names_and_are_films_alone() {
     let (dir, input) = folder(2);
     let at = |name: &str| dir.path().join(name);

@@ -338,6 +338,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "slow: 15 seconds of a core"]
     fn brightness_and_depth_are_spread_as_photographs_have_them() {
         let (mut means, mut deciles, mut steps) = (Vec::new(), [0.0f64; 10], [0usize; 4]);
         for seed in 0..60 {

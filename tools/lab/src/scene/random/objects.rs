@@ -271,6 +271,7 @@ pub(super) mod tests {
     }
 
     #[test]
+    #[ignore = "slow: 8 seconds of a core"]
     fn what_is_seen_is_spread_over_the_volume() {
         let mut deciles = [0.0f64; 10];
         let mut layers = [0; 5];
