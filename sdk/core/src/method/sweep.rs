@@ -38,7 +38,7 @@ pub use filters::Optics;
 use hidden::{Hidden, HiddenScratch};
 use num_complex::Complex32;
 use phasefront_kernels::Isa;
-use phasefront_kernels::fir::{Fir, Pixel};
+use phasefront_kernels::fir::{Fir, Pixel, RUN};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 pub use shares::MEET;
@@ -345,7 +345,7 @@ impl SweepPlan {
             Some(standing) => (&standing.frame, Some(&standing.changes)),
             None => (frame, None),
         };
-        let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows, 0..self.size.width));
+        let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
         let (rgb, depth) = frame.values();
         let part = BLOCK * self.size.width;
         let parts = (slots.par_chunks_mut(part)).zip(positions.par_chunks_mut(part));
@@ -373,18 +373,20 @@ impl SweepPlan {
         let mut waves = wave.chunks_exact_mut(size);
         // An array of the largest number of colours avoids an allocation.
         let waves: [_; 3] = std::array::from_fn(|_| Mutex::new(waves.next().unwrap_or_default()));
+        let reach = self.layout.reach() + self.hidden.dependence();
         let (down, across) = self.layout.count(self.size);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
             if cancel.requested() {
                 return;
             }
-            let tile = Tile::of(&self.layout, self.fir, surfaces, index);
-            let stands = changes.is_some_and(|changes| {
-                let (rows, columns) = tile.around(self.hidden.dependence());
-                !changes.any(rows, columns)
-            });
-            if stands {
-                return;
+            let mut tile = Tile::of(&self.layout, self.fir, surfaces, index);
+            if let Some(changes) = changes {
+                let Some([rows, columns]) = changes.affected([&tile.rows, &tile.columns], reach) else {
+                    return;
+                };
+                // Tiles start at whole registers.
+                let columns = columns.start / RUN * RUN..columns.end;
+                tile = Tile { rows, columns, ..tile };
             }
             tiles.with(|scratch| {
                 scratch.points.gather(&tile);

@@ -184,7 +184,7 @@ impl Points {
 
     fn find_front(&mut self, tile: &Tile<'_>) {
         let Size { width, .. } = tile.surfaces.size;
-        let (rows, columns) = tile.around(0);
+        let (rows, columns) = tile.around();
         for y in rows {
             let slots = &tile.surfaces.slots[y * width..][..width];
             let planes = |x: usize| match slots.get(x..).and_then(<[Slot]>::first_chunk::<RUN>) {
@@ -241,7 +241,7 @@ impl Points {
 
     fn find_hidden(&mut self, tile: &Tile<'_>, sources: &[u32]) {
         let Size { width, .. } = tile.surfaces.size;
-        let (rows, columns) = tile.around(0);
+        let (rows, columns) = tile.around();
         for y in rows {
             let sources = &sources[y * width..][columns.clone()];
             for (block, sources) in sources.chunks(RUN).enumerate() {

@@ -104,6 +104,11 @@ impl Layout {
         self.first_planes.get(away).copied().unwrap_or(self.widest.len())
     }
 
+    /// Returns the distance from a pixel within which points may matter.
+    pub(super) fn reach(&self) -> usize {
+        self.widest.last().copied().unwrap_or(0)
+    }
+
     /// Returns the number of rows of the buffer.
     pub(super) fn rows(&self) -> usize {
         self.tile.height + 2 * self.border
@@ -159,12 +164,12 @@ impl TileScratch {
     }
 }
 
-/// A tile of a frame.
+/// A tile of a frame, or a part of it.
 pub(super) struct Tile<'a> {
     pub(super) layout: &'a Layout,
     pub(super) fir: Fir,
     pub(super) surfaces: Surfaces<'a>,
-    /// The tile's position in the frame.
+    /// The tile's position in the frame. Its first column is a multiple of [`RUN`].
     pub(super) rows: Range<usize>,
     pub(super) columns: Range<usize>,
 }
@@ -183,11 +188,10 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Returns the rows and columns of the frame whose points may matter, and of what is up to `more` pixels beside.
-    pub(super) fn around(&self, more: usize) -> (Range<usize>, Range<usize>) {
-        let widest = self.layout.widest.last().copied().unwrap_or(0) + more;
-        let around =
-            |side: &Range<usize>, size: usize| side.start.saturating_sub(widest)..(side.end + widest).min(size);
+    /// Returns the rows and columns of the frame whose points may matter.
+    pub(super) fn around(&self) -> (Range<usize>, Range<usize>) {
+        let reach = self.layout.reach();
+        let around = |side: &Range<usize>, size: usize| side.start.saturating_sub(reach)..(side.end + reach).min(size);
         let Size { width, height } = self.surfaces.size;
         (around(&self.rows, height), around(&self.columns, width))
     }
