@@ -14,6 +14,7 @@ pub mod local;
 pub mod midpoint;
 pub mod modelled;
 pub mod natural;
+mod source;
 mod start;
 mod still;
 
@@ -21,6 +22,7 @@ use crate::encode::brightness::Brightness;
 use crate::runtime::error::{Error, Result};
 pub use encoder::{Encoder, EncoderScratch};
 pub use encoding::{Encoding, anti_alias, band_limit, deep};
+pub(crate) use source::Source;
 
 /// Options for encoding a field into levels.
 #[derive(Debug, Clone)]

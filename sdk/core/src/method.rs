@@ -12,7 +12,7 @@ use crate::frame::{Past, RgbdFrame};
 use crate::method::mean_phase::{MeanPhase, remove_mean_phase};
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::method::seeded::{SeededPlan, SeededScratch};
-use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
+use crate::method::sweep::{Sweep, SweepPlan, SweepScratch, Wave};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -227,7 +227,8 @@ impl MethodPlan {
     /// # Panics
     /// Panics if `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut MethodScratch) -> Result<()> {
-        self.field_after(None, frame, MeanPhase::Kept, field, scratch)
+        self.choose(None, frame, scratch)?;
+        self.field_as_chosen(None, frame, MeanPhase::Kept, field, scratch)
     }
 
     /// Lets what stands still in a video keep its wave where the plane sweep makes it.
@@ -239,10 +240,23 @@ impl MethodPlan {
         }
     }
 
-    /// Works like [`Self::field`] for a frame that follows another if there is a `past`, as in video, which keeps
-    /// [`Method::Auto`] from switching back and forth between its methods; and can remove the mean phase of each
-    /// colour.
-    pub(crate) fn field_after(
+    /// Chooses the method of `frame` where the depth decides ([`Method::Auto`]). The `past` of a frame in a video keeps
+    /// the choice from switching back and forth. Afterwards [`MethodScratch::is_swept`] tells the choice.
+    ///
+    /// # Errors
+    /// Returns an error if the frame has another shape or other colours.
+    pub(crate) fn choose(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
+        frame.check(self.size, self.colours)?;
+        if let Scratch::Auto { was_soft, .. } = &mut scratch.0 {
+            let was = was_soft.filter(|_| past.is_some());
+            *was_soft = Some(softness::is_soft(softness::sharp_edges(frame), was));
+        }
+        Ok(())
+    }
+
+    /// Works like [`Self::field`] after [`Self::choose`], for a frame that follows another if there is a `past`, and can
+    /// remove the mean phase of each colour.
+    pub(crate) fn field_as_chosen(
         &self,
         past: Option<Past>,
         frame: &RgbdFrame,
@@ -250,26 +264,16 @@ impl MethodPlan {
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
-        frame.check(self.size, self.colours)?;
+        let is_swept = scratch.is_swept();
         match (&self.plan, &mut scratch.0) {
             (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch)?,
             (Plan::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch)?,
-            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => {
-                return plan.field_after(past, frame, mean_phase, field, scratch);
+            (Plan::Sweep(plan), Scratch::Sweep(sweep)) | (Plan::Auto(plan, _), Scratch::Auto { sweep, .. })
+                if is_swept =>
+            {
+                return plan.field_after(past, frame, mean_phase, field, sweep);
             }
-            (
-                Plan::Auto(sweep, trained),
-                Scratch::Auto {
-                    sweep: of_sweep,
-                    trained: of_trained,
-                    was_soft,
-                },
-            ) => {
-                if !choose(was_soft, past, frame) {
-                    return sweep.field_after(past, frame, mean_phase, field, of_sweep);
-                }
-                trained.field(frame, field, of_trained)?;
-            }
+            (Plan::Auto(_, plan), Scratch::Auto { trained, .. }) => plan.field(frame, field, trained)?,
             _ => panic!("the scratch is another plan's"),
         }
         if mean_phase == MeanPhase::Removed {
@@ -278,21 +282,25 @@ impl MethodPlan {
         Ok(())
     }
 
-    /// Updates the state in `scratch` as [`Self::field_after`] does, without computing the field of `frame`.
-    pub(crate) fn skip(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
-        frame.check(self.size, self.colours)?;
-        if let Scratch::Auto { was_soft, .. } = &mut scratch.0 {
-            choose(was_soft, past, frame);
+    /// Returns the wave of `frame`, without the mean phase of each colour, after [`Self::choose`] has chosen the plane
+    /// sweep.
+    ///
+    /// # Panics
+    /// Panics if it has not.
+    pub(crate) fn wave_as_chosen<'a>(
+        &self,
+        past: Option<Past>,
+        frame: &RgbdFrame,
+        scratch: &'a mut MethodScratch,
+    ) -> Result<Wave<'a>> {
+        assert!(scratch.is_swept());
+        match (&self.plan, &mut scratch.0) {
+            (Plan::Sweep(plan), Scratch::Sweep(sweep)) | (Plan::Auto(plan, _), Scratch::Auto { sweep, .. }) => {
+                plan.wave_after(past, frame, sweep)
+            }
+            _ => panic!("the scratch is another plan's"),
         }
-        Ok(())
     }
-}
-
-/// Returns whether the depth of `frame` is soft, where the previous frame `was_soft` if it counts.
-fn choose(was_soft: &mut Option<bool>, past: Option<Past>, frame: &RgbdFrame) -> bool {
-    let is_soft = softness::is_soft(softness::sharp_edges(frame), was_soft.filter(|_| past.is_some()));
-    *was_soft = Some(is_soft);
-    is_soft
 }
 
 /// Checks that `network` takes `input`.

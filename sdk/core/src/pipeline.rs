@@ -3,6 +3,7 @@
 
 pub mod display_plan;
 pub mod field;
+mod shown;
 
 use crate::Size;
 use crate::display::levels::LevelsMut;
@@ -149,6 +150,7 @@ impl Pipeline {
     #[doc(hidden)]
     pub fn keep_standing(&self, scratch: &mut PipelineScratch) {
         self.method.keep_standing(&mut scratch.method);
+        self.display.keep_standing(&mut scratch.display);
     }
 
     /// Writes the field at the modulator into `field`, (C, H, W), and returns the times of the method and of the
@@ -163,11 +165,12 @@ impl Pipeline {
         field: &mut [Complex32],
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
-        self.field_after(None, frame, field, scratch)
+        self.method.choose(None, frame, &mut scratch.method)?;
+        self.field_as_chosen(None, frame, field, scratch)
     }
 
-    /// Works like [`Self::field`] for a frame that follows another if there is a `past`.
-    fn field_after(
+    /// Works like [`Self::field`] for a frame that follows another if there is a `past`, after its method is chosen.
+    fn field_as_chosen(
         &self,
         past: Option<Past>,
         frame: &RgbdFrame,
@@ -179,7 +182,7 @@ impl Pipeline {
             true => MeanPhase::Kept,
             false => MeanPhase::Removed,
         };
-        (self.method).field_after(past, frame, mean_phase, field, &mut scratch.method)?;
+        (self.method).field_as_chosen(past, frame, mean_phase, field, &mut scratch.method)?;
         self.display.aim(frame, &mut scratch.display);
         let method = stage.end();
         let stage = stage!("propagate");
@@ -223,21 +226,24 @@ impl Pipeline {
         levels: LevelsMut<'_>,
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
+        self.method.choose(past, frame, &mut scratch.method)?;
+        let levels = match levels {
+            LevelsMut::Bytes(levels) if scratch.method.is_swept() && self.display.takes_waves() => {
+                let stage = stage!("method");
+                let wave = self.method.wave_as_chosen(past, frame, &mut scratch.method)?;
+                let method = stage.end();
+                let modulation = (self.display).modulate_wave(past, wave, levels, &mut scratch.display);
+                return Ok(report(method, Duration::ZERO, modulation));
+            }
+            levels => levels,
+        };
         let mut field = std::mem::take(&mut scratch.field);
         let Size { width, height } = self.size();
         field.resize(self.colours() * height * width, Complex32::ZERO);
-        let made = self.field_after(past, frame, &mut field, scratch);
+        let made = self.field_as_chosen(past, frame, &mut field, scratch);
         let report = made.map(|(method, propagate)| {
             let modulation = (self.display).modulate(past, &mut field, levels, &mut scratch.display);
-            FrameReport {
-                scale: modulation.scale,
-                times: FrameTimes {
-                    method,
-                    propagate,
-                    encode: modulation.encode,
-                    ..FrameTimes::default()
-                },
-            }
+            report(method, propagate, modulation)
         });
         scratch.field = field;
         report
@@ -249,7 +255,7 @@ impl Pipeline {
     /// Returns an error if the frame has another shape.
     #[doc(hidden)]
     pub fn skip(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut PipelineScratch) -> Result<()> {
-        self.method.skip(past, frame, &mut scratch.method)
+        self.method.choose(past, frame, &mut scratch.method)
     }
 
     /// Returns the levels of `frame`, (C, H, W), in new memory. For many frames, [`Self::process`] is faster.
@@ -261,6 +267,18 @@ impl Pipeline {
         let mut levels = vec![0; self.colours() * height * width];
         self.process(frame, &mut levels, &mut self.scratch())?;
         Ok(levels)
+    }
+}
+
+fn report(method: Duration, propagate: Duration, modulation: Modulation) -> FrameReport {
+    FrameReport {
+        scale: modulation.scale,
+        times: FrameTimes {
+            method,
+            propagate,
+            encode: modulation.encode,
+            ..FrameTimes::default()
+        },
     }
 }
 
@@ -283,13 +301,142 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::display::Display;
+    use crate::display::illumination::Illumination;
     use crate::encode::Encoding;
+    use crate::encode::brightness::Brightness;
     use crate::method::network::Network;
     use crate::method::sweep::Sweep;
+    use ndarray::Array3;
     use std::sync::Arc;
 
     fn network(bytes: &[u8]) -> Arc<Network> {
         Arc::new(Network::from_onnx(bytes).unwrap())
+    }
+
+    const PAST: Past = Past {
+        scale: 0.9,
+        elapsed: Duration::from_millis(33),
+    };
+
+    /// Returns a textured wall and a ball before it whose centre is in column `x`, with noise in colour.
+    fn scene(size: Size, x: usize, seed: u32) -> RgbdFrame {
+        let mut state = seed;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut frame = RgbdFrame::black(3, size);
+        let (rgb, depth) = frame.planes_mut();
+        for (i, depth) in depth.iter_mut().enumerate() {
+            let (row, column) = (i / size.width, i % size.width);
+            let is_ball = column.abs_diff(x).pow(2) + row.abs_diff(20).pow(2) < 80;
+            *depth = if is_ball { 0.2 } else { 0.7 };
+            for (colour, rgb) in rgb.chunks_exact_mut(size.pixels()).enumerate() {
+                let texture = (row * 3 + column * (2 + colour)) % 7;
+                rgb[i] = if is_ball { 0.9 } else { 0.1 * texture as f32 } + 0.004 * noise();
+            }
+        }
+        frame
+    }
+
+    /// Checks the way from the 16-bit wave to levels against the one by a field in memory.
+    #[test]
+    fn levels_of_a_wave_are_those_of_its_field() {
+        let size = Size { width: 83, height: 61 };
+        let display = Display::default().with_size(size).unwrap();
+        let mut lit = Target::from(display.clone());
+        let beam = Array3::from_shape_fn((3, 2, 3), |(c, y, x)| 1.0 - 0.1 * (c + y + x) as f32);
+        lit.illumination = Some(Illumination::new(beam.view()).unwrap());
+        let frame = scene(size, 40, 1);
+        for target in [&Target::from(display.clone()), &lit] {
+            for (encoding, local_steps) in [
+                (Encoding::DoublePhase, 0),
+                (Encoding::DoublePhase, 2),
+                (Encoding::ANTI_ALIAS, 0),
+                (Encoding::ANTI_ALIAS, 1),
+                (Encoding::BAND_LIMIT, 1),
+            ] {
+                for brightness in [Brightness::Smoothed, Brightness::Fixed(0.8), Brightness::FrameMax] {
+                    let takes_waves = !matches!(encoding, Encoding::BandLimit { .. });
+                    let options = EncoderOptions {
+                        encoding: encoding.clone(),
+                        local_steps,
+                        brightness,
+                        ..EncoderOptions::default()
+                    };
+                    let method = Method::Sweep(Sweep::for_display(&display));
+                    let pipeline = Pipeline::new(size, method, target, &options).unwrap();
+                    assert_eq!(pipeline.display.takes_waves(), takes_waves);
+                    for past in [None, Some(PAST)] {
+                        let mut scratch = pipeline.scratch();
+                        let mut field = vec![Complex32::ZERO; 3 * size.pixels()];
+                        pipeline.field(&frame, &mut field, &mut scratch).unwrap();
+                        let mut expected = vec![0; field.len()];
+                        let of_field =
+                            pipeline.modulate(past, &mut field, LevelsMut::Bytes(&mut expected), &mut scratch);
+                        let mut levels = vec![0; field.len()];
+                        let report = pipeline
+                            .process_after(past, &frame, LevelsMut::Bytes(&mut levels), &mut scratch)
+                            .unwrap();
+                        assert_eq!(report.scale, of_field.scale);
+                        assert!(levels == expected, "{encoding:?} {local_steps} {brightness:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Checks kept levels against those that are made anew of the same wave.
+    #[test]
+    fn levels_that_stand_are_those_of_the_whole_wave() {
+        let size = Size { width: 83, height: 461 };
+        let display = Display::from_toml("volume_depth_mm = 1.5\nwidth = 83\nheight = 461").unwrap();
+        let method = Method::Sweep(Sweep::of_planes(&display, 9));
+        for brightness in [Brightness::Smoothed, Brightness::Fixed(0.8), Brightness::FrameMax] {
+            let options = EncoderOptions {
+                brightness,
+                ..EncoderOptions::default()
+            };
+            let pipeline = Pipeline::new(size, method.clone(), &display.clone().into(), &options).unwrap();
+            let (mut kept, mut anew) = (pipeline.scratch(), pipeline.scratch());
+            pipeline.keep_standing(&mut kept);
+            pipeline.method.keep_standing(&mut anew.method);
+            let cancel = Cancel::default();
+            let mut past = None;
+            let (mut before, mut stood) = (Vec::new(), 0);
+            for i in 0..16_u32 {
+                let frame = scene(size, if i < 8 { 20 } else { 20 + 4 * (i as usize - 8) }, i);
+                // Other ways to make a frame come between: without levels, and given up.
+                if i == 5 {
+                    let mut field = vec![Complex32::ZERO; 3 * size.pixels()];
+                    for scratch in [&mut kept, &mut anew] {
+                        pipeline.field(&scene(size, 60, 9), &mut field, scratch).unwrap();
+                    }
+                }
+                if i == 11 {
+                    cancel.request();
+                    for scratch in [&mut kept, &mut anew] {
+                        scratch.set_cancel(&cancel);
+                        let levels = &mut vec![0; 3 * size.pixels()];
+                        let frame = scene(size, 70, 3);
+                        (pipeline.process_after(past, &frame, LevelsMut::Bytes(levels), scratch)).unwrap();
+                    }
+                    cancel.clear();
+                }
+                let run = |scratch: &mut PipelineScratch| {
+                    let mut levels = vec![0; 3 * size.pixels()];
+                    let report = pipeline.process_after(past, &frame, LevelsMut::Bytes(&mut levels), scratch);
+                    (report.unwrap().scale, levels)
+                };
+                let (of_kept, of_anew) = (run(&mut kept), run(&mut anew));
+                assert!(of_kept == of_anew, "{brightness:?} {i}: {} {}", of_kept.0, of_anew.0);
+                stood += usize::from(of_kept.1 == before);
+                let scale;
+                (scale, before) = of_kept;
+                past = Some(Past { scale, ..PAST });
+            }
+            assert!((4..8).contains(&stood), "{brightness:?} {stood}");
+        }
     }
 
     /// Checks that no stage computes a cancelled frame and that the next frame sees nothing of it.

@@ -52,6 +52,23 @@ pub fn share(past: Past) -> f32 {
     1.0 - (-past.elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp()
 }
 
+/// Returns the scale that moves from that of the `past` toward the frame's own percentile.
+pub(crate) fn smoothed(past: Past, now: f32) -> f32 {
+    past.scale + share(past) * (now - past.scale)
+}
+
+/// The largest share by which a held scale may differ from the frame's own percentile.
+const HELD: f32 = 0.02;
+
+/// Works like the smoothed scale, but stays at that of the `past` if it is near enough, so that what stands still keeps
+/// its levels.
+pub(crate) fn held(past: Past, now: f32) -> f32 {
+    match (past.scale - now).abs() <= HELD * now {
+        true => past.scale,
+        false => smoothed(past, now),
+    }
+}
+
 /// The share of amplitudes that are clipped.
 pub const CLIPPED: f64 = 1e-3;
 /// The sampling step in values. It is odd so that both colours of a checkerboard are sampled.
@@ -92,17 +109,22 @@ impl Percentile {
     /// Returns the percentile of `field`. If `past` is given, the result moves from the previous scale toward it.
     /// Allocates nothing.
     pub fn scale(&mut self, field: &[Complex32], past: Option<Past>) -> f32 {
+        let now = self.of(field.len(), |at| field[at]);
+        past.map_or(now, |past| smoothed(past, now))
+    }
+
+    /// Returns the percentile of `len` values.
+    pub(crate) fn of(&mut self, len: usize, value: impl Fn(usize) -> Complex32 + Sync) -> f32 {
         self.histograms.fill(0);
-        let (count, mut over) = looked_at(field.len());
+        let (count, mut over) = looked_at(len);
         let part = (count.div_ceil(PARTS) * STEP).max(1);
-        (self.histograms.par_chunks_exact_mut(BINS))
-            .zip(field.par_chunks(part))
-            .for_each(|(histogram, field)| {
-                for value in field.iter().step_by(STEP) {
-                    let bin = value.norm_sqr().sqrt() * (BINS as f32 / MOST);
-                    histogram[(bin as usize).min(BINS - 1)] += 1;
-                }
-            });
+        let histograms = self.histograms.par_chunks_exact_mut(BINS).enumerate();
+        histograms.for_each(|(i, histogram)| {
+            for at in (i * part..((i + 1) * part).min(len)).step_by(STEP) {
+                let bin = value(at).norm_sqr().sqrt() * (BINS as f32 / MOST);
+                histogram[(bin as usize).min(BINS - 1)] += 1;
+            }
+        });
         let (histogram, rest) = self.histograms.split_at_mut(BINS);
         for part in rest.chunks_exact(BINS) {
             histogram.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
@@ -113,8 +135,7 @@ impl Percentile {
             is
         }))
         .unwrap_or(0);
-        let now = ((last + 1) as f32 * (MOST / BINS as f32)).max(LEAST);
-        past.map_or(now, |past| past.scale + share(past) * (now - past.scale))
+        ((last + 1) as f32 * (MOST / BINS as f32)).max(LEAST)
     }
 }
 
@@ -147,6 +168,22 @@ mod tests {
         }
         assert!((scale(&field(9.0, 0), None) - MOST).abs() < 0.01);
         assert!((scale(&field(0.0, 0), None) - LEAST).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_held_scale_stays_near_the_percentile_and_follows_it_when_it_is_far() {
+        let past = |scale| Past {
+            scale,
+            elapsed: Duration::from_millis(33),
+        };
+        for scale in [0.5, 0.495, 0.509] {
+            assert_eq!(held(past(scale), 0.5), scale);
+        }
+        let mut scale = 0.4;
+        for _ in 0..200 {
+            scale = held(past(scale), 0.5);
+        }
+        assert!((0.49..0.4904).contains(&scale), "{scale}");
     }
 
     #[test]

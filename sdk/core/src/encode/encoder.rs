@@ -2,15 +2,18 @@
 //! pass over memory, row by row.
 
 use super::Encoding;
+use super::anti_alias::AntiAlias;
 use super::dark_threshold::DarkThreshold;
 use super::encoding::{Prefilter, PrefilterScratch};
-use super::local::{LocalFilter, LocalScratch, Wanted};
+use super::local::{LocalFilter, LocalScratch, REACH, Wanted};
+use super::source::Source;
 use super::start::{Start, StartScratch};
 use super::{EncoderOptions, double_phase};
 use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::response::Response;
 use crate::display::target::Target;
+use crate::method::sweep::{ChangedRows, Wave};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -122,7 +125,7 @@ impl Encoder {
             _ => Vec::new(),
         };
         let part = || PartScratch {
-            start: StartScratch::new(self.prefilter.blur(), self.width),
+            start: StartScratch::new(self.prefilter.blur(), self.correction_reach(), self.width),
             local: self
                 .local
                 .as_ref()
@@ -151,10 +154,13 @@ impl Encoder {
         phase: &mut [f32],
         scratch: &mut EncoderScratch,
     ) -> f32 {
-        let scale = self.prepare(field, scale, scratch);
+        self.filter(field, scratch);
+        let source = Source::Field(field);
+        let scale = scale.unwrap_or_else(|| self.most(source, scratch));
         self.rows(
-            field,
+            source,
             self.work(scale),
+            None,
             phase,
             scratch,
             |row, shown, phases| match shown {
@@ -178,8 +184,46 @@ impl Encoder {
         levels: &mut [u8],
         scratch: &mut EncoderScratch,
     ) -> f32 {
-        let scale = self.prepare(field, scale, scratch);
-        self.rows(field, self.work(scale), levels, scratch, |row, shown, levels| {
+        self.filter(field, scratch);
+        let source = Source::Field(field);
+        let scale = scale.unwrap_or_else(|| self.most(source, scratch));
+        self.levels_of(source, scale, None, levels, scratch);
+        scale
+    }
+
+    /// Returns whether [`Self::encode_wave`] works, that is, no filter needs the whole field.
+    pub(crate) fn takes_waves(&self) -> bool {
+        !self.is_phase && !self.prefilter.is_of_whole_field()
+    }
+
+    /// Encodes `wave` like [`Self::encode_levels`], with the scale that [`Self::most`] or the caller gives. If `changed`
+    /// is given, `levels` hold those of the wave before at the same scale and turns, and only the rows that differ are
+    /// computed.
+    ///
+    /// # Panics
+    /// Panics if the wave does not have C·H·W values, or if this encoder takes no waves.
+    pub(crate) fn encode_wave(
+        &self,
+        wave: Wave<'_>,
+        scale: f32,
+        changed: Option<ChangedRows<'_>>,
+        levels: &mut [u8],
+        scratch: &mut EncoderScratch,
+    ) {
+        assert!(self.takes_waves());
+        self.levels_of(Source::Wave(wave), scale, changed, levels, scratch);
+    }
+
+    fn levels_of(
+        &self,
+        source: Source<'_>,
+        scale: f32,
+        changed: Option<ChangedRows<'_>>,
+        levels: &mut [u8],
+        scratch: &mut EncoderScratch,
+    ) {
+        let work = self.work(scale);
+        self.rows(source, work, changed, levels, scratch, |row, shown, levels| {
             let (y, first) = (row % self.height, row * self.width);
             match shown {
                 Row::Field(values) if !self.is_phase => {
@@ -190,7 +234,6 @@ impl Encoder {
                 }
             }
         });
-        scale
     }
 
     /// Writes the target's levels of `phases`, (C, H, W) in \[0, 2π).
@@ -206,6 +249,16 @@ impl Encoder {
             .for_each(|(row, (phases, levels))| self.response.levels(phases, row * self.width, levels));
     }
 
+    /// Returns how many rows above and below a row the steps of the local correction read.
+    fn correction_reach(&self) -> usize {
+        self.local.as_ref().map_or(0, |local| REACH * local.steps)
+    }
+
+    /// Returns how many rows above and below a row its phases depend on.
+    fn reach(&self) -> usize {
+        self.correction_reach() + self.prefilter.blur().map_or(0, AntiAlias::half)
+    }
+
     fn work(&self, scale: f32) -> Work<'_> {
         // Darkness needs no correction.
         let local = self.local.as_ref().filter(|_| scale > 0.0);
@@ -215,39 +268,41 @@ impl Encoder {
         }
     }
 
-    /// Applies the filters that need the whole field and returns the scale.
-    fn prepare(&self, field: &mut [Complex32], scale: Option<f32>, scratch: &mut EncoderScratch) -> f32 {
-        let plane = self.height * self.width;
-        assert_eq!(field.len(), self.colours * plane);
+    /// Applies the filters that need the whole field.
+    fn filter(&self, field: &mut [Complex32], scratch: &mut EncoderScratch) {
+        assert_eq!(field.len(), self.colours * self.height * self.width);
         if !scratch.wanted.is_empty() {
             scratch.wanted.copy_from_slice(field);
         }
         if let Some(scratch) = &mut scratch.prefilter {
             self.prefilter.filter(field, scratch);
         }
-        scale.unwrap_or_else(|| {
-            let mut most = std::mem::take(&mut scratch.most);
-            let nothing = Work {
-                dark_threshold: None,
-                local: None,
-            };
-            self.rows(field, nothing, &mut most, scratch, |_, row, most| {
-                if let Row::Field(values) = row {
-                    most[0] = double_phase::max_norm_sqr(values);
-                }
-            });
-            let scale = most.iter().copied().fold(0.0, f32::max).sqrt();
-            scratch.most = most;
-            scale
-        })
     }
 
-    /// Processes each row of `field` and calls `then` with its index in the stack, the row and its part of `out`. `out`
-    /// is divided into C·H parts of equal size.
+    /// Returns the largest amplitude of the filtered field.
+    pub(crate) fn most(&self, source: Source<'_>, scratch: &mut EncoderScratch) -> f32 {
+        let mut most = std::mem::take(&mut scratch.most);
+        let nothing = Work {
+            dark_threshold: None,
+            local: None,
+        };
+        self.rows(source, nothing, None, &mut most, scratch, |_, row, most| {
+            if let Row::Field(values) = row {
+                most[0] = double_phase::max_norm_sqr(values);
+            }
+        });
+        let scale = most.iter().copied().fold(0.0, f32::max).sqrt();
+        scratch.most = most;
+        scale
+    }
+
+    /// Processes each row of `source`, or each that `changed` affects, and calls `then` with its index in the stack, the
+    /// row and its part of `out`. `out` is divided into C·H parts of equal size.
     fn rows<T: Send>(
         &self,
-        field: &[Complex32],
+        source: Source<'_>,
         work: Work<'_>,
+        changed: Option<ChangedRows<'_>>,
         out: &mut [T],
         scratch: &mut EncoderScratch,
         then: impl Fn(usize, Row<'_>, &mut [T]) + Sync,
@@ -258,47 +313,51 @@ impl Encoder {
         let EncoderScratch {
             wanted, parts, cancel, ..
         } = scratch;
-        let wanted: &[Complex32] = if wanted.is_empty() { field } else { wanted };
+        assert_eq!(source.len(), self.colours * height * width);
+        let reach = self.reach();
+        let is_needed = |y: usize| changed.is_none_or(|changed| changed.any(y.saturating_sub(reach)..y + reach + 1));
         let band = height.div_ceil(parts.len());
         for (colour, out) in out.chunks_exact_mut(height * per_row).enumerate() {
             if cancel.requested() {
                 return;
             }
-            let plane = |stack| &<[Complex32]>::as_ref(stack)[colour * height * width..][..height * width];
             let start = Start {
-                plane: plane(field),
+                plane: source.plane(colour, height * width),
                 height,
                 colour,
                 dark_threshold: work.dark_threshold,
                 blur: self.prefilter.blur(),
                 light: (self.illumination.as_ref()).map(|(light, modulator)| (light, *modulator)),
             };
-            let wanted = plane(wanted);
+            let wanted = (!wanted.is_empty()).then(|| &wanted[colour * height * width..][..height * width]);
             out.par_chunks_mut(band * per_row)
                 .zip(&mut *parts)
                 .enumerate()
                 .for_each(|(part, (out, scratch))| {
-                    let rows = part * band..part * band + out.len() / per_row;
-                    let first = rows.start;
+                    let (first, end) = (part * band, part * band + out.len() / per_row);
                     let mut then = |y: usize, row: Row<'_>| {
                         then(colour * height + y, row, &mut out[(y - first) * per_row..][..per_row]);
                     };
-                    match (work.local, &mut scratch.local) {
-                        (Some((local, per_scale)), Some(of_local)) => {
-                            let wanted = Wanted {
-                                plane: wanted,
-                                per_scale,
-                            };
-                            let then = |y: usize, row: &[Complex32]| then(y, Row::Corrected(row));
-                            local
-                                .filter
-                                .correct(rows, &start, wanted, &mut scratch.start, of_local, then);
-                        }
-                        _ => {
-                            scratch.start.begin(&start, rows.start);
-                            for y in rows {
-                                start.row(y, &mut scratch.row, &mut scratch.start);
-                                then(y, Row::Field(&scratch.row));
+                    let mut next = first;
+                    while let Some(from) = (next..end).find(|y| is_needed(*y)) {
+                        let rows = from..(from..end).find(|y| !is_needed(*y)).unwrap_or(end);
+                        next = rows.end;
+                        match (work.local, &mut scratch.local) {
+                            (Some((local, per_scale)), Some(of_local)) => {
+                                let wanted = Wanted {
+                                    plane: wanted,
+                                    per_scale,
+                                };
+                                let then = |y: usize, row: &[Complex32]| then(y, Row::Corrected(row));
+                                let filter = &local.filter;
+                                filter.correct(rows, &start, wanted, &mut scratch.start, of_local, then);
+                            }
+                            _ => {
+                                scratch.start.begin(&start, rows.start);
+                                for y in rows {
+                                    start.row(y, &mut scratch.row, &mut scratch.start);
+                                    then(y, Row::Field(&scratch.row));
+                                }
                             }
                         }
                     }

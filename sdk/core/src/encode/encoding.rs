@@ -116,6 +116,11 @@ impl Prefilter {
         }
     }
 
+    /// Returns whether the filter needs the whole field.
+    pub(super) fn is_of_whole_field(&self) -> bool {
+        matches!(self, Prefilter::BandLimit(..) | Prefilter::Deep(_))
+    }
+
     /// Returns the blur if there is one. It is applied row by row.
     pub(super) fn blur(&self) -> Option<&AntiAlias> {
         match self {

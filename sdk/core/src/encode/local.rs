@@ -74,10 +74,19 @@ impl LocalFilter {
 /// The target of the correction for a part of a plane.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted<'a> {
-    /// The target field at the modulator, (H, W).
-    pub(super) plane: &'a [Complex32],
+    /// The target field at the modulator, (H, W), or `None` if it is the plane of the start.
+    pub(super) plane: Option<&'a [Complex32]>,
     /// The reciprocal of the amplitude that maps to full light.
     pub(super) per_scale: f32,
+}
+
+impl Wanted<'_> {
+    fn row<'a>(&'a self, y: usize, width: usize, start: &'a Start<'_>, of_start: &'a StartScratch) -> &'a [Complex32] {
+        match self.plane {
+            Some(plane) => &plane[y * width..][..width],
+            None => start.source(y, width, of_start),
+        }
+    }
 }
 
 /// The working memory of a part of a plane.
@@ -123,7 +132,7 @@ impl LocalFilter {
             row,
             light,
         } = scratch;
-        let Wanted { plane, per_scale } = wanted;
+        let per_scale = wanted.per_scale;
         let (height, width) = (start.height, row.len());
         let padded = width + 2 * REACH;
         let steps = rings.len() / (KEPT * padded);
@@ -133,7 +142,7 @@ impl LocalFilter {
             if front < height {
                 start.row(front, row, of_start);
                 start.light_row(front, light);
-                let goal = &plane[front * width..][..width];
+                let goal = wanted.row(front, width, start, of_start);
                 let to = &mut rings[front % KEPT * padded..][..padded];
                 let sign = if front.is_multiple_of(2) { 1.0 } else { -1.0 };
                 wide!(begin(row, goal, light, per_scale, sign, &mut to[REACH..][..width]));
@@ -155,7 +164,7 @@ impl LocalFilter {
                     let (y, i) = (y as isize, i as isize + 1);
                     [of_ring(y - i), of_ring(y + i)]
                 });
-                let goal = &plane[y * width..][..width];
+                let goal = wanted.row(y, width, start, of_start);
                 self.draw(of_ring(y as isize), around, goal, per_scale, sums, row);
                 if step < steps {
                     start.light_row(y, light);

@@ -3,6 +3,7 @@
 
 use super::anti_alias::AntiAlias;
 use super::dark_threshold::DarkThreshold;
+use super::source::Plane;
 use crate::Size;
 use crate::display::illumination::Illumination;
 use num_complex::Complex32;
@@ -12,7 +13,7 @@ use phasefront_kernels::wide;
 #[derive(Clone, Copy)]
 pub(super) struct Start<'a> {
     /// The plane, (H, W).
-    pub(super) plane: &'a [Complex32],
+    pub(super) plane: Plane<'a>,
     pub(super) height: usize,
     /// 0 red, 1 green, 2 blue. 0 for one laser.
     pub(super) colour: usize,
@@ -24,6 +25,8 @@ pub(super) struct Start<'a> {
 
 /// The working memory for the rows of a part of a plane.
 pub(super) struct StartScratch {
+    /// A ring of the latest rows of a plane that is not in memory as values.
+    read: Vec<Complex32>,
     /// A ring of rows that are blurred along themselves.
     ring: Vec<Complex32>,
     damped: Vec<Complex32>,
@@ -32,9 +35,12 @@ pub(super) struct StartScratch {
 }
 
 impl StartScratch {
-    pub(super) fn new(blur: Option<&AntiAlias>, width: usize) -> Self {
+    /// Creates working memory for rows of `width`. [`Start::source`] returns the latest row and `before` rows before it.
+    pub(super) fn new(blur: Option<&AntiAlias>, before: usize, width: usize) -> Self {
         let kept = blur.map_or(0, |blur| 2 * blur.half() + 1);
+        let read = before + 1 + blur.map_or(0, AntiAlias::half);
         StartScratch {
+            read: vec![Complex32::ZERO; read * width],
             ring: vec![Complex32::ZERO; kept * width],
             damped: vec![Complex32::ZERO; width],
             next: 0,
@@ -51,19 +57,27 @@ impl Start<'_> {
     /// Writes row `y` into `out`. Rows must be requested in order.
     pub(super) fn row(&self, y: usize, out: &mut [Complex32], scratch: &mut StartScratch) {
         let width = out.len();
-        let source = |y: usize| &self.plane[y * width..][..width];
-        let StartScratch { ring, damped, next } = scratch;
+        let StartScratch {
+            read,
+            ring,
+            damped,
+            next,
+        } = scratch;
         match (self.blur, self.dark_threshold) {
-            (None, None) => out.copy_from_slice(source(y)),
-            (None, Some(threshold)) => wide!(threshold.draw(source(y), out)),
+            (None, None) => out.copy_from_slice(self.read(y, width, read)),
+            (None, Some(threshold)) => {
+                let row = self.read(y, width, read);
+                wide!(threshold.draw(row, out));
+            }
             (Some(blur), threshold) => wide!({
                 let (half, kept) = (blur.half(), ring.len() / width);
                 while *next <= (y + half).min(self.height - 1) {
+                    let row = self.read(*next, width, read);
                     let to = &mut ring[*next % kept * width..][..width];
                     match threshold {
-                        None => blur.blur_row(source(*next), to),
+                        None => blur.blur_row(row, to),
                         Some(threshold) => {
-                            threshold.draw(source(*next), damped);
+                            threshold.draw(row, damped);
                             blur.blur_row(damped, to);
                         }
                     }
@@ -74,6 +88,28 @@ impl Start<'_> {
         }
         if let Some((light, modulator)) = self.light {
             light.divide_row(out, self.colour * self.height + y, self.height, modulator);
+        }
+    }
+
+    /// Returns row `y` of the plane, in `read` if it is not in memory as values.
+    fn read<'a>(&'a self, y: usize, width: usize, read: &'a mut [Complex32]) -> &'a [Complex32] {
+        match self.plane {
+            Plane::Field(values) => &values[y * width..][..width],
+            Plane::Wave(wave) => {
+                let kept = read.len() / width;
+                let row = &mut read[y % kept * width..][..width];
+                wave.write(y * width, row);
+                row
+            }
+        }
+    }
+
+    /// Returns row `y` of the plane. It is the row of the latest call of [`Self::row`], or one of those before that the
+    /// scratch was made for.
+    pub(super) fn source<'a>(&'a self, y: usize, width: usize, scratch: &'a StartScratch) -> &'a [Complex32] {
+        match self.plane {
+            Plane::Field(values) => &values[y * width..][..width],
+            Plane::Wave(_) => &scratch.read[y % (scratch.read.len() / width) * width..][..width],
         }
     }
 

@@ -54,7 +54,7 @@ pub(super) fn write<T: Copy + Sync>(
 }
 
 /// Returns the factor that removes the mean phase of a field with these values.
-fn turn_of<T: Copy + Sync>(values: &[T], value: impl Fn(T) -> Complex32 + Copy + Sync) -> Complex32 {
+pub(super) fn turn_of<T: Copy + Sync>(values: &[T], value: impl Fn(T) -> Complex32 + Copy + Sync) -> Complex32 {
     let turn = Complex64::from_polar(1.0, -sum(values, value).arg());
     Complex32::new(turn.re as f32, turn.im as f32)
 }

@@ -25,6 +25,7 @@ mod shares;
 mod spans;
 mod standing;
 mod tile;
+mod wave;
 mod workers;
 
 use crate::Size;
@@ -48,6 +49,7 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 pub use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
+pub(crate) use wave::{ChangedRows, Wave, WavePlane};
 use workers::Workers;
 
 /// The largest number of planes of a sweep.
@@ -325,9 +327,60 @@ impl SweepPlan {
         field: &mut [Complex32],
         scratch: &mut SweepScratch,
     ) -> Result<()> {
-        frame.check(self.size(), self.filters.len())?;
         let size = self.size.pixels();
         assert_eq!(field.len(), self.filters.len() * size);
+        if self.sweep_after(past, frame, scratch)? {
+            for (wave, plane) in scratch.wave.chunks_exact(size).zip(field.chunks_exact_mut(size)) {
+                mean_phase::write(mean_phase, wave, tile::value, plane);
+            }
+        }
+        Ok(())
+    }
+
+    /// Works like [`Self::field_after`], but returns the wave, without the mean phase of each colour. The wave of a
+    /// frame that is given up is unspecified.
+    pub(crate) fn wave_after<'a>(
+        &self,
+        past: Option<Past>,
+        frame: &RgbdFrame,
+        scratch: &'a mut SweepScratch,
+    ) -> Result<Wave<'a>> {
+        let size = self.size.pixels();
+        let is_whole = self.sweep_after(past, frame, scratch)?;
+        let SweepScratch { wave, standing, .. } = scratch;
+        let mut turns = [Complex32::ONE; 3];
+        let mut changed = None;
+        match standing {
+            Some(standing) => {
+                if is_whole {
+                    turns = standing.turns(wave);
+                }
+                changed = Some(ChangedRows {
+                    number: standing.number(),
+                    changes: &standing.changes,
+                    reach: self.layout.reach() + self.hidden.dependence(),
+                });
+            }
+            None if is_whole => {
+                for (turn, wave) in turns.iter_mut().zip(wave.chunks_exact(size)) {
+                    *turn = mean_phase::turn_of(wave, tile::value);
+                }
+            }
+            None => {}
+        }
+        Ok(Wave {
+            pixels: wave,
+            size,
+            turns,
+            changed,
+        })
+    }
+
+    /// Sweeps `frame` into the wave of `scratch`. Returns whether the wave is whole, which it is unless the frame is
+    /// given up.
+    fn sweep_after(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut SweepScratch) -> Result<bool> {
+        frame.check(self.size(), self.filters.len())?;
+        let size = self.size.pixels();
         let SweepScratch {
             positions,
             slots,
@@ -401,12 +454,7 @@ impl SweepPlan {
         if let Some(standing) = standing {
             standing.finish(is_whole);
         }
-        if is_whole {
-            for (wave, plane) in wave.chunks_exact(size).zip(field.chunks_exact_mut(size)) {
-                mean_phase::write(mean_phase, wave, tile::value, plane);
-            }
-        }
-        Ok(())
+        Ok(is_whole)
     }
 }
 

@@ -13,10 +13,12 @@ use crate::encode::brightness::{Brightness, Percentile};
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::modelled::{ModelScratch, ModelSteps};
 use crate::encode::natural::{NaturalScratch, NaturalSteps};
-use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
+use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding, Source};
 use crate::frame::{Past, RgbdFrame};
+use crate::method::sweep::Wave;
 use crate::optics::asm::Propagator;
 use crate::optics::fft::ConvolveScratch;
+use crate::pipeline::shown::Shown;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use crate::runtime::stage::stage;
@@ -55,6 +57,8 @@ pub struct DisplayScratch {
     /// Phases in memory before they are converted to levels. Empty if the encoder writes levels directly.
     phases: Vec<f32>,
     percentile: Percentile,
+    /// The levels of the latest frame, if what stands still keeps them.
+    shown: Option<Shown>,
     cancel: Cancel,
 }
 
@@ -178,6 +182,7 @@ impl DisplayPlan {
                 Vec::new()
             },
             percentile: Percentile::default(),
+            shown: None,
             cancel: Cancel::default(),
         }
     }
@@ -185,6 +190,21 @@ impl DisplayPlan {
     /// Returns whether bytes are made from phases in memory rather than directly from the field.
     fn needs_phases(&self) -> bool {
         self.midpoint.is_some() || self.modelled.is_some() || self.natural.is_some() || self.panel.is_some()
+    }
+
+    /// Lets what stands still in a video keep its levels, in [`Self::modulate_wave`]. This takes memory for another
+    /// hologram.
+    pub(super) fn keep_standing(&self, scratch: &mut DisplayScratch) {
+        if self.takes_waves() {
+            scratch.shown = Some(Shown::new(self.colours * self.height * self.width));
+        }
+    }
+
+    /// Returns whether [`Self::modulate_wave`] works: bytes are made row by row from a field that is already at the
+    /// modulator.
+    pub(super) fn takes_waves(&self) -> bool {
+        let is_there = self.offset.is_none() && self.registration.is_none();
+        is_there && self.bits <= 8 && !self.needs_phases() && self.encoder.takes_waves()
     }
 
     /// Stores the frame of the next field for the steps of natural focus.
@@ -253,6 +273,48 @@ impl DisplayPlan {
                 scale
             }
         };
+        Modulation {
+            scale,
+            encode: stage.end(),
+        }
+    }
+
+    /// Works like [`Self::modulate`] for the wave of a plane sweep. What stands still keeps its levels after
+    /// [`Self::keep_standing`]. If the frame is given up, levels may be old.
+    ///
+    /// # Panics
+    /// Panics if this plan takes no waves, or `levels` or the wave does not have C·H·W values.
+    pub(super) fn modulate_wave(
+        &self,
+        past: Option<Past>,
+        wave: Wave<'_>,
+        levels: &mut [u8],
+        scratch: &mut DisplayScratch,
+    ) -> Modulation {
+        assert!(self.takes_waves());
+        let stage = stage!("encode");
+        let DisplayScratch {
+            encoder,
+            percentile,
+            shown,
+            cancel,
+            ..
+        } = scratch;
+        let mut of_frame = Shown::default();
+        let of = shown.as_mut().unwrap_or(&mut of_frame);
+        let most = || self.encoder.most(Source::Wave(wave), encoder);
+        let (scale, changed) = of.begin(past, &wave, self.brightness, percentile, most);
+        match shown {
+            None => self.encoder.encode_wave(wave, scale, None, levels, encoder),
+            Some(shown) => {
+                (self.encoder).encode_wave(wave, scale, changed, &mut shown.levels, encoder);
+                if cancel.requested() {
+                    shown.give_up();
+                } else {
+                    levels.copy_from_slice(&shown.levels);
+                }
+            }
+        }
         Modulation {
             scale,
             encode: stage.end(),

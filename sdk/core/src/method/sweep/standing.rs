@@ -11,10 +11,15 @@
 //! order, so that all instruction sets decide alike.
 
 use super::spans::{NOWHERE, Span, join};
+use super::tile;
 use crate::Size;
 use crate::frame::RgbdFrame;
+use crate::method::mean_phase;
+use num_complex::Complex32;
+use phasefront_kernels::fir::Pixel;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
+use std::f32::consts::PI;
 use std::ops::Range;
 
 /// The number of pixels along each side of a block.
@@ -30,6 +35,9 @@ const DEPTH_TOLERANCE: f32 = 4e-3;
 /// The share of a point's light that counts as different if its depth changes by the distance of two planes: its image
 /// becomes a little more or less sharp.
 const DEPTH_WEIGHT: f32 = 0.05;
+
+/// The largest difference of a colour's mean phase from 0 while it is kept: four levels of 8 bits.
+const TURN_TOLERANCE: f32 = 2.0 * PI / 64.0;
 
 /// The blocks of a frame that have changed.
 pub(super) struct Changes {
@@ -76,6 +84,12 @@ pub(super) struct Standing {
     pub(super) changes: Changes,
     /// Whether the sweep's wave is that of `frame`.
     is_whole: bool,
+    /// Whether the wave of the frame before is kept where nothing changes.
+    keeps: bool,
+    /// The factor that removes the mean phase of each colour.
+    turns: [Complex32; 3],
+    /// The number of shown frames.
+    number: u64,
 }
 
 impl Standing {
@@ -89,6 +103,9 @@ impl Standing {
                 across,
             },
             is_whole: false,
+            keeps: false,
+            turns: [Complex32::ONE; 3],
+            number: 0,
         }
     }
 
@@ -96,7 +113,8 @@ impl Standing {
     /// is that of the shown frame again after [`Self::finish`].
     pub(super) fn show(&mut self, frame: &RgbdFrame, has_past: bool, planes: usize) {
         let keeps = has_past && self.is_whole;
-        self.is_whole = false;
+        (self.keeps, self.is_whole) = (keeps, false);
+        self.number += 1;
         let Size { width, height } = frame.size();
         let across = self.changes.across;
         let shown = &self.frame;
@@ -126,6 +144,26 @@ impl Standing {
                     }
                 });
         }
+    }
+
+    /// Returns the number of shown frames.
+    pub(super) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Returns the factor that removes the mean phase of each colour of `wave`, (C, H, W). It stays as it was while its
+    /// phase is within [`TURN_TOLERANCE`] of the wave's own.
+    pub(super) fn turns(&mut self, wave: &[Pixel]) -> [Complex32; 3] {
+        let size = self.frame.size().pixels();
+        if !self.keeps || self.changes.blocks.contains(&true) {
+            for (turn, wave) in self.turns.iter_mut().zip(wave.chunks_exact(size)) {
+                let own = mean_phase::turn_of(wave, tile::value);
+                if !self.keeps || (own * turn.conj()).arg().abs() > TURN_TOLERANCE {
+                    *turn = own;
+                }
+            }
+        }
+        self.turns
     }
 
     /// Notes whether the wave of the shown frame was computed to its end.
@@ -288,7 +326,13 @@ mod tests {
     #[test]
     fn the_affected_rectangle_holds_all_pixels_within_reach_and_no_more() {
         let [down, across] = [5, 7];
-        for (changed, reach) in [(vec![], 9), (vec![9], 0), (vec![9], 21), (vec![1, 19], 5), (vec![34], 200)] {
+        for (changed, reach) in [
+            (vec![], 9),
+            (vec![9], 0),
+            (vec![9], 21),
+            (vec![1, 19], 5),
+            (vec![34], 200),
+        ] {
             let blocks = (0..down * across).map(|block| changed.contains(&block)).collect();
             let changes = Changes { blocks, across };
             for (rows, columns) in [(0..70, 0..100), (20..41, 48..61), (65..70, 3..30)] {
@@ -305,7 +349,11 @@ mod tests {
                     Some(within.iter().map(of).min()?..within.iter().map(of).max()? + 1)
                 };
                 let expected = range(&|(y, _)| *y).zip(range(&|(_, x)| *x)).map(|(y, x)| [y, x]);
-                assert_eq!(changes.affected([&rows, &columns], reach), expected, "{changed:?} {reach}");
+                assert_eq!(
+                    changes.affected([&rows, &columns], reach),
+                    expected,
+                    "{changed:?} {reach}"
+                );
             }
         }
     }

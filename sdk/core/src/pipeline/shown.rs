@@ -1,0 +1,81 @@
+//! The levels of a video's latest frame, which stay where its wave stays.
+
+use crate::encode::brightness::{self, Brightness, Percentile};
+use crate::frame::Past;
+use crate::method::sweep::{ChangedRows, Wave};
+use num_complex::Complex32;
+
+/// The levels of the latest wave that keeps what stands still.
+#[derive(Default)]
+pub(super) struct Shown {
+    /// The levels, (C, H, W).
+    pub(super) levels: Vec<u8>,
+    /// What they were made with, if they are whole.
+    made: Option<Made>,
+}
+
+#[derive(Clone, Copy)]
+struct Made {
+    /// The number of the wave.
+    number: u64,
+    turns: [Complex32; 3],
+    scale: f32,
+    /// The wave's own percentile.
+    percentile: f32,
+}
+
+impl Shown {
+    /// Creates memory for `len` levels.
+    pub(super) fn new(len: usize) -> Self {
+        Shown {
+            levels: vec![0; len],
+            made: None,
+        }
+    }
+
+    /// Prepares for the levels of `wave`, whose largest amplitude is `most`. Returns the scale, and the rows that differ
+    /// from [`Self::levels`] if the others stay.
+    pub(super) fn begin<'a>(
+        &mut self,
+        past: Option<Past>,
+        wave: &Wave<'a>,
+        brightness: Brightness,
+        percentile: &mut Percentile,
+        most: impl FnOnce() -> f32,
+    ) -> (f32, Option<ChangedRows<'a>>) {
+        let before = (self.made.take().zip(wave.changed))
+            .filter(|(made, changed)| past.is_some() && made.number + 1 == changed.number && made.turns == wave.turns);
+        let same = before.filter(|(_, changed)| !changed.any(0..usize::MAX));
+        let own = match (brightness, same) {
+            (Brightness::Smoothed, Some((made, _))) => made.percentile,
+            (Brightness::Smoothed, None) => percentile.of(wave.len(), |at| wave.value(at)),
+            _ => 0.0,
+        };
+        let scale = match (brightness, same) {
+            (Brightness::Smoothed, _) => past.map_or(own, |past| match wave.changed {
+                Some(_) => brightness::held(past, own),
+                None => brightness::smoothed(past, own),
+            }),
+            (Brightness::Fixed(scale), _) => scale,
+            (Brightness::FrameMax, Some((made, _))) => made.scale,
+            (Brightness::FrameMax, None) => most(),
+        };
+        self.made = wave.changed.map(|changed| Made {
+            number: changed.number,
+            turns: wave.turns,
+            scale,
+            percentile: own,
+        });
+        (
+            scale,
+            before
+                .filter(|(made, _)| made.scale == scale)
+                .map(|(_, changed)| changed),
+        )
+    }
+
+    /// Forgets the levels, which are not whole.
+    pub(super) fn give_up(&mut self) {
+        self.made = None;
+    }
+}
