@@ -136,7 +136,7 @@ namespace Phasefront
         public float LeastConfidence { set => Check(Native.pf_options_set_least_confidence(this, value)); }
 
         /// <summary>Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame
-        /// computes only the tiles in which colour or depth have changed by more than a camera's noise.</summary>
+        /// computes only the parts where colour or depth have changed by more than a camera's noise.</summary>
         public bool KeepStanding { set => Check(Native.pf_options_set_keep_standing(this, value)); }
 
         /// <summary>The number of threads, 1 to 256.</summary>

@@ -254,7 +254,7 @@ impl MethodPlan {
         Ok(())
     }
 
-    /// Works like [`Self::field`] after [`Self::choose`], for a frame that follows another if there is a `past`, and can
+    /// Works like [`Self::field`] after [`Self::choose`], for a frame that follows another if there is a `past`. It can
     /// remove the mean phase of each colour.
     pub(crate) fn field_as_chosen(
         &self,

@@ -35,6 +35,7 @@ const LAYERS: &[&str] = &[
     "depth_network",
     "encode::brightness",
     "encode",
+    "pipeline::shown",
     "pipeline::display_plan",
     "pipeline::field",
     "pipeline",

@@ -44,7 +44,7 @@ pub struct SessionOptions {
     /// The conversion of fields to levels.
     pub encoder: EncoderOptions,
     /// Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-    /// only the tiles in which colour or depth have changed by more than a camera's noise.
+    /// only the parts where colour or depth have changed by more than a camera's noise.
     pub keep_standing: bool,
     /// The processing of depth.
     pub depth: DepthOptions,

@@ -5414,7 +5414,7 @@ public struct SessionOptions {
     public var leastConfidence: Float
     /**
      * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-     * only the tiles in which colour or depth have changed by more than a camera's noise.
+     * only the parts where colour or depth have changed by more than a camera's noise.
      */
     public var keepStanding: Bool
     /**
@@ -5481,7 +5481,7 @@ public struct SessionOptions {
          */leastConfidence: Float, 
         /**
          * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-         * only the tiles in which colour or depth have changed by more than a camera's noise.
+         * only the parts where colour or depth have changed by more than a camera's noise.
          */keepStanding: Bool = true, 
         /**
          * The number of threads to compute with, at most 256; none for as many as the device has.

@@ -196,9 +196,8 @@ impl Encoder {
         !self.is_phase && !self.prefilter.is_of_whole_field()
     }
 
-    /// Encodes `wave` like [`Self::encode_levels`], with the scale that [`Self::most`] or the caller gives. If `changed`
-    /// is given, `levels` hold those of the wave before at the same scale and turns, and only the rows that differ are
-    /// computed.
+    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, `levels` hold those of the wave before at the
+    /// same scale and turns, and only the rows that differ are computed.
     ///
     /// # Panics
     /// Panics if the wave does not have C·H·W values, or if this encoder takes no waves.
@@ -296,8 +295,8 @@ impl Encoder {
         scale
     }
 
-    /// Processes each row of `source`, or each that `changed` affects, and calls `then` with its index in the stack, the
-    /// row and its part of `out`. `out` is divided into C·H parts of equal size.
+    /// Processes each row of `source`, or each that `changed` affects. Calls `then` with the row's index in the stack,
+    /// the row and its part of `out`, which is divided into C·H parts of equal size.
     fn rows<T: Send>(
         &self,
         source: Source<'_>,

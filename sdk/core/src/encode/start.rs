@@ -35,7 +35,7 @@ pub(super) struct StartScratch {
 }
 
 impl StartScratch {
-    /// Creates working memory for rows of `width`. [`Start::source`] returns the latest row and `before` rows before it.
+    /// Creates memory for rows of `width`. [`Start::source`] returns the latest row and `before` rows above it.
     pub(super) fn new(blur: Option<&AntiAlias>, before: usize, width: usize) -> Self {
         let kept = blur.map_or(0, |blur| 2 * blur.half() + 1);
         let read = before + 1 + blur.map_or(0, AntiAlias::half);

@@ -33,8 +33,8 @@ impl Shown {
         }
     }
 
-    /// Prepares for the levels of `wave`, whose largest amplitude is `most`. Returns the scale, and the rows that differ
-    /// from [`Self::levels`] if the others stay.
+    /// Prepares for the levels of `wave`, whose largest amplitude is `most`. Returns the scale and, if only some rows
+    /// differ from [`Self::levels`], these rows.
     pub(super) fn begin<'a>(
         &mut self,
         past: Option<Past>,
