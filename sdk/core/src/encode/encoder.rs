@@ -196,8 +196,8 @@ impl Encoder {
         !self.is_phase && !self.prefilter.is_of_whole_field()
     }
 
-    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, `levels` hold those of the wave before at the
-    /// same scale and turns, and only the rows that differ are computed.
+    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, only the rows that differ are computed, and
+    /// `levels` hold those of the wave before at the same scale and turns.
     ///
     /// # Panics
     /// Panics if the wave does not have C·H·W values, or if this encoder takes no waves.

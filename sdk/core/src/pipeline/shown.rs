@@ -20,8 +20,8 @@ struct Made {
     number: u64,
     turns: [Complex32; 3],
     scale: f32,
-    /// The wave's own percentile.
-    percentile: f32,
+    /// The scale of the wave alone, without a past.
+    own_scale: f32,
 }
 
 impl Shown {
@@ -46,32 +46,25 @@ impl Shown {
         let before = (self.made.take().zip(wave.changed))
             .filter(|(made, changed)| past.is_some() && made.number + 1 == changed.number && made.turns == wave.turns);
         let same = before.filter(|(_, changed)| !changed.any(0..usize::MAX));
-        let own = match (brightness, same) {
-            (Brightness::Smoothed, Some((made, _))) => made.percentile,
-            (Brightness::Smoothed, None) => percentile.of(wave.len(), |at| wave.value(at)),
-            _ => 0.0,
+        let own_scale = match (same, brightness) {
+            (Some((made, _)), _) => made.own_scale,
+            (None, Brightness::Smoothed) => percentile.of(wave.len(), |at| wave.value(at)),
+            (None, Brightness::Fixed(scale)) => scale,
+            (None, Brightness::FrameMax) => most(),
         };
-        let scale = match (brightness, same) {
-            (Brightness::Smoothed, _) => past.map_or(own, |past| match wave.changed {
-                Some(_) => brightness::held(past, own),
-                None => brightness::smoothed(past, own),
-            }),
-            (Brightness::Fixed(scale), _) => scale,
-            (Brightness::FrameMax, Some((made, _))) => made.scale,
-            (Brightness::FrameMax, None) => most(),
+        let scale = match (brightness, past) {
+            (Brightness::Smoothed, Some(past)) if wave.changed.is_some() => brightness::held(past, own_scale),
+            (Brightness::Smoothed, Some(past)) => brightness::smoothed(past, own_scale),
+            _ => own_scale,
         };
         self.made = wave.changed.map(|changed| Made {
             number: changed.number,
             turns: wave.turns,
             scale,
-            percentile: own,
+            own_scale,
         });
-        (
-            scale,
-            before
-                .filter(|(made, _)| made.scale == scale)
-                .map(|(_, changed)| changed),
-        )
+        let stays = before.filter(|(made, _)| made.scale == scale);
+        (scale, stays.map(|(_, changed)| changed))
     }
 
     /// Forgets the levels, which are not whole.
