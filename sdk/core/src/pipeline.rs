@@ -232,8 +232,10 @@ impl Pipeline {
                 let stage = stage!("method");
                 let wave = self.method.wave_as_chosen(past, frame, &mut scratch.method)?;
                 let method = stage.end();
+                // The wave is at the modulator, but whoever listens to stages hears all of them.
+                let propagate = stage!("propagate").end();
                 let modulation = (self.display).modulate_wave(past, wave, levels, &mut scratch.display);
-                return Ok(report(method, Duration::ZERO, modulation));
+                return Ok(report(method, propagate, modulation));
             }
             levels => levels,
         };
