@@ -334,11 +334,15 @@ mod interrupt {
     use signal_hook::consts::{SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::{Mutex, Once, PoisonError};
     use std::time::{Duration, Instant};
 
     /// The time that the program has to end after an interrupt.
     const LAST: Duration = Duration::from_secs(2);
+
+    /// Whether an interrupt is ending this process.
+    static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
     /// The program that runs.
     static PROGRAM: Mutex<Option<Pid>> = Mutex::new(None);
@@ -352,6 +356,7 @@ mod interrupt {
             Ok(mut signals) => {
                 std::thread::spawn(move || {
                     for signal in signals.forever() {
+                        IS_ENDING.store(true, Ordering::SeqCst);
                         end(signal);
                         let _ = emulate_default_handler(signal);
                     }
@@ -360,8 +365,12 @@ mod interrupt {
         });
     }
 
-    /// Forgets the program, which has ended.
+    /// Forgets the program, which has ended. If an interrupt ended it, this leaves it to the interrupt to end this
+    /// process too, so that the process does not end with a status of its own before.
     pub(super) fn forget() {
+        if IS_ENDING.load(Ordering::SeqCst) {
+            std::thread::sleep(2 * LAST);
+        }
         *PROGRAM.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
