@@ -134,8 +134,9 @@ export async function run() {
   const notices = await thirdPartyNotices();
   if (!notices.startsWith("# Third-party notices")) throw new Error(`notices: ${notices.slice(0, 40)}`);
 
-  // A request for too much memory ends the module cleanly: this call and every later one report it.
-  const huge = { target: { width: 8192, height: 8192 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
+  // The largest hologram for a distant modulator needs more memory than a module can have. That ends the module cleanly:
+  // this call and every later one report it.
+  const huge = { target: { width: 8192, height: 8192, offsetMm: 6 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
   refused("internal", "the module cannot go on", () => new Session(huge).process(new Frame(colour(), depth())));
   refused("internal", "the module cannot go on", () => version());
   return said;

@@ -145,7 +145,7 @@ export async function run() {
   await ends();
 
   // A module that runs out of memory ends its worker; another worker is not affected.
-  const huge = { target: { width: 8192, height: 8192 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
+  const huge = { target: { width: 8192, height: 8192, offsetMm: 6 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
   const full = await WorkerSession.open(huge);
   await refused("internal", "the module cannot go on", full.process(frame()));
   const again = await WorkerSession.open({ target });
