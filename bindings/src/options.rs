@@ -222,8 +222,8 @@ pub struct SessionOptions {
     pub depth_range: DepthRange,
     /// The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
     pub least_confidence: f32,
-    /// Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-    /// only the parts where colour or depth have changed by more than a camera's noise.
+    /// Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or
+    /// depth have changed by more than a camera's noise.
     #[uniffi(default = true)]
     pub keep_standing: bool,
     /// The number of threads to compute with, at most 256; none for as many as the device has.

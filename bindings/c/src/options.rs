@@ -325,8 +325,8 @@ pub unsafe extern "C" fn pf_options_set_least_confidence(options: *mut PfOptions
     unsafe { set(options, |options| options.least_confidence = confidence) }
 }
 
-/// Sets whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame
-/// computes only the parts where colour or depth have changed by more than a camera's noise. The default is true.
+/// Sets whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or
+/// depth have changed by more than a camera's noise. The default is true.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_keep_standing(options: *mut PfOptions, keep: bool) -> PfStatus {
     // SAFETY: the rules of this border.

@@ -135,8 +135,8 @@ namespace Phasefront
         /// <summary>The confidence, 0 to 1, below which depth readings are ignored.</summary>
         public float LeastConfidence { set => Check(Native.pf_options_set_least_confidence(this, value)); }
 
-        /// <summary>Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame
-        /// computes only the parts where colour or depth have changed by more than a camera's noise.</summary>
+        /// <summary>Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where
+        /// colour or depth have changed by more than a camera's noise.</summary>
         public bool KeepStanding { set => Check(Native.pf_options_set_keep_standing(this, value)); }
 
         /// <summary>The number of threads, 1 to 256.</summary>

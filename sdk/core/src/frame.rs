@@ -192,9 +192,31 @@ impl RgbdFrame {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    /// Returns a textured wall and a ball before it whose centre is in column `x` of row 20, with noise of these
+    /// amplitudes in colour and depth.
+    pub(crate) fn scene(size: Size, x: usize, [of_colour, of_depth]: [f32; 2], seed: u32) -> RgbdFrame {
+        let mut frame = RgbdFrame::black(3, size);
+        let mut state = seed;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let (rgb, depth) = frame.planes_mut();
+        for (i, depth) in depth.iter_mut().enumerate() {
+            let (row, column) = (i / size.width, i % size.width);
+            let is_ball = column.abs_diff(x).pow(2) + row.abs_diff(20).pow(2) < 60;
+            *depth = (if is_ball { 0.2 } else { 0.7 } + of_depth * noise()).clamp(0.0, 1.0);
+            for (colour, rgb) in rgb.chunks_exact_mut(size.pixels()).enumerate() {
+                let texture = (row * 3 + column * (2 + colour)) % 7;
+                rgb[i] = (if is_ball { 0.9 } else { 0.1 * texture as f32 } + of_colour * noise()).clamp(0.0, 1.0);
+            }
+        }
+        frame
+    }
 
     fn message(rgb: Array3<f32>, depth: Array2<f32>) -> String {
         RgbdFrame::new(rgb, depth).unwrap_err().to_string()

@@ -3,7 +3,9 @@
 pub mod mean_phase;
 pub mod network;
 pub mod seeded;
+pub(crate) mod standing;
 pub mod sweep;
+pub(crate) mod wave;
 
 use crate::Size;
 use crate::depth::softness;
@@ -12,7 +14,9 @@ use crate::frame::{Past, RgbdFrame};
 use crate::method::mean_phase::{MeanPhase, remove_mean_phase};
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::method::seeded::{SeededPlan, SeededScratch};
-use crate::method::sweep::{Sweep, SweepPlan, SweepScratch, Wave};
+use crate::method::standing::Standing;
+use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
+use crate::method::wave::{Pixels, Wave};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -85,6 +89,8 @@ pub fn sweep_plan(size: Size, sweep: Sweep, display: &Display) -> Result<SweepPl
 pub struct MethodPlan {
     size: Size,
     colours: usize,
+    /// The number of planes of a sweep for the display.
+    planes: usize,
     plan: Plan,
 }
 
@@ -92,38 +98,110 @@ enum Plan {
     Network(Box<NetworkPlan>),
     Sweep(Box<SweepPlan>),
     Seeded(Box<SeededPlan>),
-    Auto(Box<SweepPlan>, Box<MethodPlan>),
+    Auto(Box<SweepPlan>, Box<Plan>),
 }
 
 /// The working memory of a [`MethodPlan`] for one frame at a time.
-pub struct MethodScratch(Scratch);
+pub struct MethodScratch {
+    of_plan: Scratch,
+    /// What stands still, if it keeps its wave.
+    standing: Option<Box<Standing>>,
+}
 
 enum Scratch {
-    Network(NetworkScratch),
+    Network {
+        network: NetworkScratch,
+        /// The field of the shown frame, (C, H, W). Empty if nothing is kept.
+        kept: Vec<Complex32>,
+    },
     Sweep(SweepScratch),
     Seeded(SeededScratch),
     Auto {
         sweep: SweepScratch,
-        trained: Box<MethodScratch>,
+        trained: Box<Scratch>,
         /// Whether the depth of the previous frame was soft.
         was_soft: Option<bool>,
     },
 }
 
-impl MethodScratch {
-    /// Returns whether the plane sweep alone made the last frame, without a network.
-    pub(crate) fn is_swept(&self) -> bool {
-        match &self.0 {
-            Scratch::Network(_) | Scratch::Seeded(_) => false,
+/// The plan that makes a frame, and its memory.
+enum Chosen<'a, 'b> {
+    Network(&'a NetworkPlan, &'b mut NetworkScratch, &'b mut Vec<Complex32>),
+    Sweep(&'a SweepPlan, &'b mut SweepScratch),
+    Seeded(&'a SeededPlan, &'b mut SeededScratch),
+}
+
+impl Plan {
+    fn engine(&self) -> Option<&Engine> {
+        match self {
+            Plan::Network(plan) => Some(plan.engine()),
+            Plan::Seeded(plan) => Some(plan.engine()),
+            Plan::Auto(_, trained) => trained.engine(),
+            Plan::Sweep(_) => None,
+        }
+    }
+
+    fn scratch(&self) -> Scratch {
+        match self {
+            Plan::Network(plan) => Scratch::Network {
+                network: plan.scratch(),
+                kept: Vec::new(),
+            },
+            Plan::Sweep(plan) => Scratch::Sweep(plan.scratch()),
+            Plan::Seeded(plan) => Scratch::Seeded(plan.scratch()),
+            Plan::Auto(sweep, trained) => Scratch::Auto {
+                sweep: sweep.scratch(),
+                trained: Box::new(trained.scratch()),
+                was_soft: None,
+            },
+        }
+    }
+
+    /// Lets a network keep a field of `values`. One on tract cannot.
+    fn keep(&self, values: usize, scratch: &mut Scratch) {
+        match (self, scratch) {
+            (Plan::Network(plan), Scratch::Network { kept, .. }) if plan.reach().is_some() => {
+                kept.resize(values, Complex32::ZERO);
+            }
+            (Plan::Auto(_, trained), Scratch::Auto { trained: scratch, .. }) => trained.keep(values, scratch),
+            _ => {}
+        }
+    }
+
+    fn chosen<'a, 'b>(&'a self, scratch: &'b mut Scratch) -> Chosen<'a, 'b> {
+        let is_swept = scratch.is_swept();
+        match (self, scratch) {
+            (Plan::Network(plan), Scratch::Network { network, kept }) => Chosen::Network(plan, network, kept),
+            (Plan::Seeded(plan), Scratch::Seeded(scratch)) => Chosen::Seeded(plan, scratch),
+            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => Chosen::Sweep(plan, scratch),
+            (Plan::Auto(plan, _), Scratch::Auto { sweep, .. }) if is_swept => Chosen::Sweep(plan, sweep),
+            (Plan::Auto(_, plan), Scratch::Auto { trained, .. }) => plan.chosen(trained),
+            _ => panic!("the scratch is another plan's"),
+        }
+    }
+}
+
+impl Scratch {
+    fn is_swept(&self) -> bool {
+        match self {
+            Scratch::Network { .. } | Scratch::Seeded(_) => false,
             Scratch::Sweep(_) => true,
             Scratch::Auto { was_soft, .. } => *was_soft != Some(true),
         }
     }
 
-    /// Makes the computation stop early once `cancel` is requested.
-    pub fn set_cancel(&mut self, cancel: &Cancel) {
-        match &mut self.0 {
-            Scratch::Network(scratch) => scratch.set_cancel(cancel),
+    fn makes_waves(&self) -> bool {
+        match self {
+            Scratch::Network { kept, .. } => !kept.is_empty(),
+            Scratch::Sweep(_) => true,
+            Scratch::Seeded(_) => false,
+            Scratch::Auto { trained, .. } => self.is_swept() || trained.makes_waves(),
+        }
+    }
+
+    fn set_cancel(&mut self, cancel: &Cancel) {
+        match self {
+            Scratch::Network { network, .. } => network.set_cancel(cancel),
             Scratch::Sweep(scratch) => scratch.set_cancel(cancel),
             Scratch::Seeded(scratch) => scratch.set_cancel(cancel),
             Scratch::Auto { sweep, trained, .. } => {
@@ -131,6 +209,24 @@ impl MethodScratch {
                 trained.set_cancel(cancel);
             }
         }
+    }
+}
+
+impl MethodScratch {
+    /// Returns whether the plane sweep alone made the last frame, without a network.
+    pub(crate) fn is_swept(&self) -> bool {
+        self.of_plan.is_swept()
+    }
+
+    /// Returns whether [`MethodPlan::wave_as_chosen`] works for the chosen frame: the plane sweep makes it, or a network
+    /// that keeps what stands still.
+    pub(crate) fn makes_waves(&self) -> bool {
+        self.of_plan.makes_waves()
+    }
+
+    /// Makes the computation stop early once `cancel` is requested.
+    pub fn set_cancel(&mut self, cancel: &Cancel) {
+        self.of_plan.set_cancel(cancel);
     }
 }
 
@@ -142,6 +238,10 @@ impl MethodPlan {
     /// for this size.
     pub fn new(size: Size, method: Method, display: &Display) -> Result<Self> {
         method.check(display)?;
+        let planes = match &method {
+            Method::Sweep(sweep) | Method::Auto(sweep, _) => sweep.planes,
+            Method::Network(_) | Method::Seeded(_) => Sweep::for_display(display).planes,
+        };
         let plan = match method {
             Method::Network(network) => Plan::Network(Box::new(network.plan_for(size, display)?)),
             Method::Seeded(network) => {
@@ -153,12 +253,13 @@ impl MethodPlan {
                 // Both methods end at the midpoint, as the network does.
                 let sweep = SweepPlan::new(size, display, sweep, 0.0)?;
                 let trained = MethodPlan::new(size, Method::trained(network), display)?;
-                Plan::Auto(Box::new(sweep), Box::new(trained))
+                Plan::Auto(Box::new(sweep), Box::new(trained.plan))
             }
         };
         Ok(MethodPlan {
             size,
             colours: display.colours(),
+            planes,
             plan,
         })
     }
@@ -188,12 +289,7 @@ impl MethodPlan {
 
     /// Returns the engine that runs the network and why it was chosen. Returns `None` for a method without a network.
     pub fn engine(&self) -> Option<&Engine> {
-        match &self.plan {
-            Plan::Network(plan) => Some(plan.engine()),
-            Plan::Seeded(plan) => Some(plan.engine()),
-            Plan::Auto(_, trained) => trained.engine(),
-            Plan::Sweep(_) => None,
-        }
+        self.plan.engine()
     }
 
     /// Returns the instruction set of the plane sweep. Returns `None` for a method without one.
@@ -207,16 +303,10 @@ impl MethodPlan {
 
     /// Returns working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
-        MethodScratch(match &self.plan {
-            Plan::Network(plan) => Scratch::Network(plan.scratch()),
-            Plan::Sweep(plan) => Scratch::Sweep(plan.scratch()),
-            Plan::Seeded(plan) => Scratch::Seeded(plan.scratch()),
-            Plan::Auto(sweep, trained) => Scratch::Auto {
-                sweep: sweep.scratch(),
-                trained: Box::new(trained.scratch()),
-                was_soft: None,
-            },
-        })
+        MethodScratch {
+            of_plan: self.plan.scratch(),
+            standing: None,
+        }
     }
 
     /// Writes the hologram of `frame`, without the carrier, at [`MethodPlan::z_m`] into `field`, (C, H, W).
@@ -231,13 +321,10 @@ impl MethodPlan {
         self.field_as_chosen(None, frame, MeanPhase::Kept, field, scratch)
     }
 
-    /// Lets what stands still in a video keep its wave where the plane sweep makes it.
+    /// Lets what stands still in a video keep its wave. Seeded networks and those on tract compute all of each frame.
     pub(crate) fn keep_standing(&self, scratch: &mut MethodScratch) {
-        match (&self.plan, &mut scratch.0) {
-            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.keep_standing(scratch),
-            (Plan::Auto(plan, _), Scratch::Auto { sweep, .. }) => plan.keep_standing(sweep),
-            _ => {}
-        }
+        self.plan.keep(self.colours * self.size.pixels(), &mut scratch.of_plan);
+        scratch.standing = Some(Box::new(Standing::new(self.colours, self.size, self.planes)));
     }
 
     /// Chooses the method of `frame` where the depth decides ([`Method::Auto`]). The `past` of a frame in a video keeps
@@ -247,9 +334,13 @@ impl MethodPlan {
     /// Returns an error if the frame has another shape or other colours.
     pub(crate) fn choose(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Result<()> {
         frame.check(self.size, self.colours)?;
-        if let Scratch::Auto { was_soft, .. } = &mut scratch.0 {
+        let MethodScratch { of_plan, standing } = scratch;
+        if let Scratch::Auto { was_soft, .. } = of_plan {
             let was = was_soft.filter(|_| past.is_some());
-            *was_soft = Some(softness::is_soft(softness::sharp_edges(frame), was));
+            let is_soft = softness::is_soft(softness::sharp_edges(frame), was);
+            if let (Some(standing), true) = (standing, was_soft.replace(is_soft) != Some(is_soft)) {
+                standing.forget();
+            }
         }
         Ok(())
     }
@@ -264,17 +355,14 @@ impl MethodPlan {
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
-        let is_swept = scratch.is_swept();
-        match (&self.plan, &mut scratch.0) {
-            (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch)?,
-            (Plan::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch)?,
-            (Plan::Sweep(plan), Scratch::Sweep(sweep)) | (Plan::Auto(plan, _), Scratch::Auto { sweep, .. })
-                if is_swept =>
-            {
-                return plan.field_after(past, frame, mean_phase, field, sweep);
-            }
-            (Plan::Auto(_, plan), Scratch::Auto { trained, .. }) => plan.field(frame, field, trained)?,
-            _ => panic!("the scratch is another plan's"),
+        if scratch.makes_waves() {
+            self.wave_as_chosen(past, frame, mean_phase, scratch)?.write(field);
+            return Ok(());
+        }
+        match self.plan.chosen(&mut scratch.of_plan) {
+            Chosen::Network(plan, scratch, _) => plan.field(frame, field, scratch)?,
+            Chosen::Sweep(plan, scratch) => plan.field(frame, field, scratch)?,
+            Chosen::Seeded(plan, scratch) => plan.field(frame, field, scratch)?,
         }
         if mean_phase == MeanPhase::Removed {
             remove_mean_phase(field, self.colours);
@@ -282,24 +370,62 @@ impl MethodPlan {
         Ok(())
     }
 
-    /// Returns the wave of `frame`, without the mean phase of each colour, after [`Self::choose`] has chosen the plane
-    /// sweep.
+    /// Returns the wave of `frame` after [`Self::choose`], like [`Self::field_as_chosen`]. What stands still keeps its
+    /// wave after [`Self::keep_standing`]. The wave of a frame that is given up is unspecified.
     ///
     /// # Panics
-    /// Panics if it has not.
+    /// Panics if the choice makes no wave ([`MethodScratch::makes_waves`]).
     pub(crate) fn wave_as_chosen<'a>(
         &self,
         past: Option<Past>,
         frame: &RgbdFrame,
+        mean_phase: MeanPhase,
         scratch: &'a mut MethodScratch,
     ) -> Result<Wave<'a>> {
-        assert!(scratch.is_swept());
-        match (&self.plan, &mut scratch.0) {
-            (Plan::Sweep(plan), Scratch::Sweep(sweep)) | (Plan::Auto(plan, _), Scratch::Auto { sweep, .. }) => {
-                plan.wave_after(past, frame, sweep)
-            }
-            _ => panic!("the scratch is another plan's"),
+        let MethodScratch { of_plan, standing } = scratch;
+        let (mut shown, mut changes) = (frame, None);
+        if let Some(standing) = standing {
+            standing.show(frame, past.is_some());
+            (shown, changes) = (&standing.frame, Some(&standing.changes));
         }
+        let (is_whole, pixels, reach) = match self.plan.chosen(of_plan) {
+            Chosen::Sweep(plan, scratch) => {
+                let is_whole = plan.sweep_where(changes, shown, scratch)?;
+                (is_whole, scratch.wave(), plan.reach())
+            }
+            Chosen::Network(plan, scratch, kept) => {
+                let reach = plan.reach().unwrap_or(self.size.width.max(self.size.height));
+                let is_whole = plan.field_where(changes, shown, kept, scratch)?;
+                (is_whole, Pixels::Float(kept), reach)
+            }
+            Chosen::Seeded(..) => panic!("a seeded network makes no wave"),
+        };
+        let size = self.size.pixels();
+        let own_turn = |colour| pixels.turn_of(colour, size);
+        let mut turns = [Complex32::ONE; 3];
+        let is_turned = is_whole && mean_phase == MeanPhase::Removed;
+        let changed = match standing {
+            Some(standing) => {
+                standing.finish(is_whole);
+                if is_turned {
+                    turns = standing.turns(own_turn);
+                }
+                Some(standing.changed(reach))
+            }
+            None => {
+                if is_turned {
+                    (turns[..self.colours].iter_mut().enumerate()).for_each(|(colour, turn)| *turn = own_turn(colour));
+                }
+                None
+            }
+        };
+        Ok(Wave {
+            pixels,
+            size,
+            turns,
+            changed,
+            is_whole,
+        })
     }
 }
 

@@ -145,8 +145,8 @@ impl Pipeline {
         }
     }
 
-    /// Lets what stands still in a video keep its wave where the plane sweep makes it, from [`Self::process_after`] to
-    /// the next. This takes memory for another frame.
+    /// Lets what stands still in a video keep its wave and its levels, from [`Self::process_after`] to the next. This
+    /// takes memory for another frame and another hologram. Seeded networks and those on tract keep nothing.
     #[doc(hidden)]
     pub fn keep_standing(&self, scratch: &mut PipelineScratch) {
         self.method.keep_standing(&mut scratch.method);
@@ -228,9 +228,9 @@ impl Pipeline {
     ) -> Result<FrameReport> {
         self.method.choose(past, frame, &mut scratch.method)?;
         let levels = match levels {
-            LevelsMut::Bytes(levels) if scratch.method.is_swept() && self.display.takes_waves() => {
+            LevelsMut::Bytes(levels) if scratch.method.makes_waves() && self.display.takes_waves() => {
                 let stage = stage!("method");
-                let wave = self.method.wave_as_chosen(past, frame, &mut scratch.method)?;
+                let wave = (self.method).wave_as_chosen(past, frame, MeanPhase::Removed, &mut scratch.method)?;
                 let method = stage.end();
                 // The wave is at the modulator, but whoever listens to stages hears all of them.
                 let propagate = stage!("propagate").end();
@@ -306,6 +306,7 @@ mod tests {
     use crate::display::illumination::Illumination;
     use crate::encode::Encoding;
     use crate::encode::brightness::Brightness;
+    use crate::frame::tests::scene;
     use crate::method::network::Network;
     use crate::method::sweep::Sweep;
     use ndarray::Array3;
@@ -315,31 +316,12 @@ mod tests {
         Arc::new(Network::from_onnx(bytes).unwrap())
     }
 
+    /// Noise in colour alone.
+    const NOISE: [f32; 2] = [0.002, 0.0];
     const PAST: Past = Past {
         scale: 0.9,
         elapsed: Duration::from_millis(33),
     };
-
-    /// Returns a textured wall and a ball before it whose centre is in column `x`, with noise in colour.
-    fn scene(size: Size, x: usize, seed: u32) -> RgbdFrame {
-        let mut state = seed;
-        let mut noise = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32
-        };
-        let mut frame = RgbdFrame::black(3, size);
-        let (rgb, depth) = frame.planes_mut();
-        for (i, depth) in depth.iter_mut().enumerate() {
-            let (row, column) = (i / size.width, i % size.width);
-            let is_ball = column.abs_diff(x).pow(2) + row.abs_diff(20).pow(2) < 80;
-            *depth = if is_ball { 0.2 } else { 0.7 };
-            for (colour, rgb) in rgb.chunks_exact_mut(size.pixels()).enumerate() {
-                let texture = (row * 3 + column * (2 + colour)) % 7;
-                rgb[i] = if is_ball { 0.9 } else { 0.1 * texture as f32 } + 0.004 * noise();
-            }
-        }
-        frame
-    }
 
     /// Checks the way from the 16-bit wave to levels against the one by a field in memory.
     #[test]
@@ -349,7 +331,7 @@ mod tests {
         let mut lit = Target::from(display.clone());
         let beam = Array3::from_shape_fn((3, 2, 3), |(c, y, x)| 1.0 - 0.1 * (c + y + x) as f32);
         lit.illumination = Some(Illumination::new(beam.view()).unwrap());
-        let frame = scene(size, 40, 1);
+        let frame = scene(size, 40, NOISE, 1);
         for target in [&Target::from(display.clone()), &lit] {
             for (encoding, local_steps) in [
                 (Encoding::DoublePhase, 0),
@@ -391,54 +373,72 @@ mod tests {
     /// Checks kept levels against those that are made anew of the same wave.
     #[test]
     fn levels_that_stand_are_those_of_the_whole_wave() {
-        let size = Size { width: 83, height: 461 };
-        let display = Display::from_toml("volume_depth_mm = 1.5\nwidth = 83\nheight = 461").unwrap();
-        let method = Method::Sweep(Sweep::of_planes(&display, 9));
-        for brightness in [Brightness::Smoothed, Brightness::Fixed(0.8), Brightness::FrameMax] {
-            let options = EncoderOptions {
-                brightness,
-                ..EncoderOptions::default()
+        for size in [Size { width: 83, height: 461 }, Size { width: 461, height: 83 }] {
+            let display = Display::from_toml("volume_depth_mm = 1.5").unwrap();
+            let display = display.with_size(size).unwrap();
+            let sweep = Method::Sweep(Sweep::of_planes(&display, 9));
+            let trained = Method::Network(network(include_bytes!("../../../models/natural-8-int8.onnx")));
+            let beam = Array3::from_shape_fn((3, 2, 3), |(c, y, x)| 1.0 - 0.1 * (c + y + x) as f32);
+            let even = Target::from(display.clone());
+            let lit = Target {
+                illumination: Some(Illumination::new(beam.view()).unwrap()),
+                ..even.clone()
             };
-            let pipeline = Pipeline::new(size, method.clone(), &display.clone().into(), &options).unwrap();
-            let (mut kept, mut anew) = (pipeline.scratch(), pipeline.scratch());
-            pipeline.keep_standing(&mut kept);
-            pipeline.method.keep_standing(&mut anew.method);
-            let cancel = Cancel::default();
-            let mut past = None;
-            let (mut before, mut stood) = (Vec::new(), 0);
-            for i in 0..16_u32 {
-                let frame = scene(size, if i < 8 { 20 } else { 20 + 4 * (i as usize - 8) }, i);
-                // Other ways to make a frame come between: without levels, and given up.
-                if i == 5 {
-                    let mut field = vec![Complex32::ZERO; 3 * size.pixels()];
-                    for scratch in [&mut kept, &mut anew] {
-                        pipeline.field(&scene(size, 60, 9), &mut field, scratch).unwrap();
-                    }
-                }
-                if i == 11 {
-                    cancel.request();
-                    for scratch in [&mut kept, &mut anew] {
-                        scratch.set_cancel(&cancel);
-                        let levels = &mut vec![0; 3 * size.pixels()];
-                        let frame = scene(size, 70, 3);
-                        (pipeline.process_after(past, &frame, LevelsMut::Bytes(levels), scratch)).unwrap();
-                    }
-                    cancel.clear();
-                }
-                let run = |scratch: &mut PipelineScratch| {
-                    let mut levels = vec![0; 3 * size.pixels()];
-                    let report = pipeline.process_after(past, &frame, LevelsMut::Bytes(&mut levels), scratch);
-                    (report.unwrap().scale, levels)
-                };
-                let (of_kept, of_anew) = (run(&mut kept), run(&mut anew));
-                assert!(of_kept == of_anew, "{brightness:?} {i}: {} {}", of_kept.0, of_anew.0);
-                stood += usize::from(of_kept.1 == before);
-                let scale;
-                (scale, before) = of_kept;
-                past = Some(Past { scale, ..PAST });
+            for (method, target, brightness) in [
+                (&sweep, &even, Brightness::Smoothed),
+                (&sweep, &even, Brightness::FrameMax),
+                (&sweep, &lit, Brightness::Fixed(0.8)),
+                (&trained, &even, Brightness::Fixed(0.8)),
+            ] {
+                check_levels_that_stand(size, method.clone(), target, brightness);
             }
-            assert!((4..8).contains(&stood), "{brightness:?} {stood}");
         }
+    }
+
+    fn check_levels_that_stand(size: Size, method: Method, target: &Target, brightness: Brightness) {
+        let options = EncoderOptions {
+            brightness,
+            ..EncoderOptions::default()
+        };
+        let pipeline = Pipeline::new(size, method, target, &options).unwrap();
+        let (mut kept, mut anew) = (pipeline.scratch(), pipeline.scratch());
+        pipeline.keep_standing(&mut kept);
+        pipeline.method.keep_standing(&mut anew.method);
+        let cancel = Cancel::default();
+        let mut past = None;
+        let (mut before, mut stood) = (Vec::new(), 0);
+        for i in 0..16_u32 {
+            let frame = scene(size, if i < 8 { 20 } else { 20 + 4 * (i as usize - 8) }, NOISE, i);
+            // Other ways to make a frame come between: without levels, and given up.
+            if i == 5 {
+                let mut field = vec![Complex32::ZERO; 3 * size.pixels()];
+                for scratch in [&mut kept, &mut anew] {
+                    pipeline.field(&scene(size, 60, NOISE, 9), &mut field, scratch).unwrap();
+                }
+            }
+            if i == 11 {
+                cancel.request();
+                for scratch in [&mut kept, &mut anew] {
+                    scratch.set_cancel(&cancel);
+                    let levels = &mut vec![0; 3 * size.pixels()];
+                    let frame = scene(size, 70, NOISE, 3);
+                    (pipeline.process_after(past, &frame, LevelsMut::Bytes(levels), scratch)).unwrap();
+                }
+                cancel.clear();
+            }
+            let run = |scratch: &mut PipelineScratch| {
+                let mut levels = vec![0; 3 * size.pixels()];
+                let report = pipeline.process_after(past, &frame, LevelsMut::Bytes(&mut levels), scratch);
+                (report.unwrap().scale, levels)
+            };
+            let (of_kept, of_anew) = (run(&mut kept), run(&mut anew));
+            assert!(of_kept == of_anew, "{brightness:?} {i}: {} {}", of_kept.0, of_anew.0);
+            stood += usize::from(of_kept.1 == before);
+            let scale;
+            (scale, before) = of_kept;
+            past = Some(Past { scale, ..PAST });
+        }
+        assert!((4..8).contains(&stood), "{brightness:?} {stood}");
     }
 
     /// Checks that no stage computes a cancelled frame and that the next frame sees nothing of it.

@@ -27,6 +27,8 @@ const LAYERS: &[&str] = &[
     "frame",
     "depth",
     "method::mean_phase",
+    "method::standing",
+    "method::wave",
     "method::sweep",
     "method::network",
     "method::seeded",

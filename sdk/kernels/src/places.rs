@@ -7,6 +7,7 @@
 use crate::OUTPUTS;
 use crate::Size;
 use crate::rows::{Band, Rows, grown};
+use std::ops::Range;
 
 /// The places of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -26,10 +27,14 @@ impl Places {
         }
     }
 
-    /// Returns the first column and the number of pixels in a row of `count` places from place `from` on.
-    fn columns(&self, from: usize, count: usize) -> (usize, usize) {
-        let left = self.side * from;
-        (left, (self.side * count).min(self.frame.width - left))
+    /// Returns the rows or columns of the places that hold these rows or columns of pixels.
+    pub(crate) fn of(&self, pixels: Range<usize>) -> Range<usize> {
+        pixels.start / self.side..pixels.end.div_ceil(self.side)
+    }
+
+    /// Returns the columns of pixels of these columns of places.
+    pub(crate) fn pixels(&self, places: Range<usize>) -> Range<usize> {
+        self.side * places.start..(self.side * places.end).min(self.frame.width)
     }
 
     /// Fills `into`, a run of `count` places for each of the chain's channels, with the places of `row` from `from` on.
@@ -44,7 +49,8 @@ impl Places {
         if self.side == 1 {
             return rows.read(row, from, band, into);
         }
-        let (left, width) = self.columns(from, count);
+        let columns = self.pixels(from..from + count);
+        let (left, width) = (columns.start, columns.len());
         let row_values = into.len() / 2;
         let pixels = grown(pixels, row_values / (2 * count) * width);
         for (lower, into) in into.chunks_exact_mut(row_values).enumerate() {
@@ -75,7 +81,8 @@ impl Places {
         if self.side == 1 {
             return rows.write(row, from, runs(values, count), band);
         }
-        let (left, width) = self.columns(from, count);
+        let columns = self.pixels(from..from + count);
+        let (left, width) = (columns.start, columns.len());
         let pixels = grown(pixels, OUTPUTS * width);
         for (lower, values) in values.chunks_exact(2 * OUTPUTS * count).enumerate() {
             let row = 2 * row + lower;

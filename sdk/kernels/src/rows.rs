@@ -1,6 +1,7 @@
 //! The input and output rows of a chain.
 
 use crate::OUTPUTS;
+use std::ops::Range;
 
 /// Provides the input rows of a chain and receives its output rows while it runs. Neither needs to be stored as planes.
 /// Output goes to `PLANES` planes of one size, which are cut into bands of rows; each band is passed to one thread.
@@ -20,6 +21,12 @@ pub trait Rows<const PLANES: usize>: Sync {
     /// place.
     fn write(&self, row: usize, from: usize, values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Self::Value, PLANES>);
 
+    /// Returns the rectangle of `rows` and `columns` of pixels that the run computes, or `None` if it computes none of
+    /// them. Other pixels keep what the output planes hold. The result of a pixel does not depend on it.
+    fn needed(&self, rows: Range<usize>, columns: Range<usize>) -> Option<[Range<usize>; 2]> {
+        Some([rows, columns])
+    }
+
     /// Checks whether the run is cancelled. Called before each row of a strip; the remaining rows are then skipped.
     fn given_up(&self) -> bool {
         false
@@ -35,7 +42,7 @@ pub struct Band<'a, T, const PLANES: usize> {
 
 impl<T, const PLANES: usize> Band<'_, T, PLANES> {
     /// Returns the rows of the frame in this band.
-    pub fn rows(&self) -> std::ops::Range<usize> {
+    pub fn rows(&self) -> Range<usize> {
         self.top..self.top + self.planes[0].len() / self.width
     }
 

@@ -455,14 +455,23 @@ impl<C: Chain, R> Frame<'_, C, R> {
         let columns = self.tiling.strip_columns.max(1);
         for left in (0..self.width).step_by(columns) {
             let right = (left + columns).min(self.width);
-            self.strip((left, right), &mut band, &mut memory);
+            let pixels = self.places.pixels(left..right);
+            if let Some(needed) = self.rows.needed(band.rows(), pixels) {
+                let [rows, columns] = needed.map(|pixels| self.places.of(pixels));
+                self.strip(rows, columns, &mut band, &mut memory);
+            }
         }
         free().push(memory);
     }
 
+    /// Computes these rows and columns of places.
     fn strip<const PLANES: usize>(
         &self,
-        (left, right): (usize, usize),
+        rows: Range<usize>,
+        Range {
+            start: left,
+            end: right,
+        }: Range<usize>,
         band: &mut Band<'_, R::Value, PLANES>,
         Memory {
             rings,
@@ -491,8 +500,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
         let count = right - left;
         let row_values = side * side * OUTPUTS * count;
         let output = grown(output, advance * row_values);
-        let rows = band.rows();
-        let (top, bottom) = ((rows.start / side) as isize, rows.end.div_ceil(side) as isize);
+        let (top, bottom) = (rows.start as isize, rows.end as isize);
         let (height, depth) = (self.height as isize, layers as isize);
         for step in (top - depth..bottom + depth).step_by(advance) {
             if self.rows.given_up() {

@@ -6,6 +6,7 @@ mod skip;
 
 use phasefront_kernels::Size;
 use phasefront_kernels::*;
+use std::ops::Range;
 
 /// The frame sizes. The widths 128 and 192 are whole blocks of pixels, which no kernel may exceed.
 const SIZES: [Size; 7] = [
@@ -420,27 +421,116 @@ fn pixels(values: &[f32], Size { width, height }: Size) -> Vec<f32> {
     (0..OUTPUTS * height * width).map(at).collect()
 }
 
+/// Rows in memory, of which only a rectangle is needed.
+struct InRectangle<'a> {
+    input: &'a [f32],
+    size: Size,
+    needed: [Range<usize>; 2],
+}
+
+impl Rows<OUTPUTS> for InRectangle<'_> {
+    type Value = f32;
+
+    fn read(&self, row: usize, from: usize, _: &Band<'_, f32, OUTPUTS>, into: &mut [f32]) {
+        let planes = self.input.chunks_exact(self.size.pixels());
+        let count = into.len() / planes.len();
+        for (into, plane) in into.chunks_exact_mut(count).zip(planes) {
+            into.copy_from_slice(&plane[row * self.size.width + from..][..count]);
+        }
+    }
+
+    fn write(&self, row: usize, from: usize, values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, f32, OUTPUTS>) {
+        for (out, values) in band.rows_mut(row, from, values[0].len()).into_iter().zip(values) {
+            out.copy_from_slice(values);
+        }
+    }
+
+    fn needed(&self, rows: Range<usize>, columns: Range<usize>) -> Option<[Range<usize>; 2]> {
+        let both = |a: &Range<usize>, b: Range<usize>| a.start.max(b.start)..a.end.min(b.end);
+        let part = [both(&self.needed[0], rows), both(&self.needed[1], columns)];
+        part.iter().all(|side| !side.is_empty()).then_some(part)
+    }
+}
+
+/// Checks that a part of the output has the bits of the whole output, and that the rest stays as it was.
+#[test]
+fn only_what_is_needed_is_computed() {
+    let size = Size { width: 301, height: 41 };
+    for side in [1, 2] {
+        let (case, layers) = of_side(side, 4, 8, 5);
+        let input = frame(4, size, 3);
+        let places = Size {
+            width: size.width.div_ceil(side),
+            height: size.height.div_ceil(side),
+        };
+        for needed in [[3..4, 200..201], [11..33, 17..150], [40..41, 300..301], [0..41, 0..301], [7..30, 0..90]] {
+            let rows = InRectangle {
+                input: &input,
+                size,
+                needed: needed.clone(),
+            };
+            // Squares of pixels are whole.
+            let [down, across] = needed.map(|pixels| pixels.start / side * side..pixels.end.next_multiple_of(side));
+            let check = |whole: &[f32], run: &dyn Fn([&mut [f32]; OUTPUTS]), what: &str| {
+                let mut part = vec![f32::INFINITY; whole.len()];
+                let mut planes = part.chunks_exact_mut(size.pixels());
+                run(std::array::from_fn(|_| planes.next().unwrap()));
+                for (at, (part, whole)) in part.iter().zip(whole).enumerate() {
+                    let (y, x) = (at / size.width % size.height, at % size.width);
+                    let is_needed = down.contains(&y) && across.contains(&x);
+                    assert!(*part == if is_needed { *whole } else { f32::INFINITY }, "{what} ({y}, {x})");
+                }
+            };
+            for isa in Isa::int8() {
+                let (chain, scratch) = (case.chain(isa).unwrap(), Scratch::default());
+                for tiling in tilings(places) {
+                    let mut whole = vec![f32::NAN; OUTPUTS * size.pixels()];
+                    chain.run(&input, &mut whole, size, tiling, &scratch);
+                    let run = |planes: [&mut [f32]; OUTPUTS]| chain.run_rows(&rows, planes, size, tiling, &scratch);
+                    check(&whole, &run, &format!("{isa} {side} {tiling:?}"));
+                }
+            }
+            for isa in Isa::f32() {
+                let (chain, scratch) = (F32Chain::new(&layers, isa).unwrap(), Scratch::default());
+                for tiling in tilings(places) {
+                    let mut whole = vec![f32::NAN; OUTPUTS * size.pixels()];
+                    chain.run(&input, &mut whole, size, tiling, &scratch);
+                    let run = |planes: [&mut [f32]; OUTPUTS]| chain.run_rows(&rows, planes, size, tiling, &scratch);
+                    check(&whole, &run, &format!("f32 {isa} {side} {tiling:?}"));
+                }
+            }
+        }
+    }
+}
+
+/// Returns chains of `count` layers for pixels, or for squares of two by two pixels.
+fn of_side(side: usize, channels: usize, filters: usize, count: usize) -> (Int8Case, Vec<F32Layer>) {
+    let inputs = side * side * channels;
+    let mut case = Int8Case::random(inputs, filters, count, 2);
+    let mut layers = f32_layers(inputs, filters, count, 5);
+    for pixel in 1..(side * side) as u64 {
+        let more = Int8Case::random(inputs, filters, count, 10 + pixel)
+            .layers
+            .pop()
+            .unwrap();
+        let last = case.layers.last_mut().unwrap();
+        last.outputs += OUTPUTS;
+        last.kernel.extend(more.kernel);
+        last.bias.extend(more.bias);
+        last.multiplier.extend(more.multiplier);
+        let more = f32_layers(inputs, filters, count, 10 + pixel).pop().unwrap();
+        let last = layers.last_mut().unwrap();
+        last.outputs += OUTPUTS;
+        last.kernel.extend(more.kernel);
+        last.bias.extend(more.bias);
+    }
+    (case, layers)
+}
+
 #[test]
 fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
     for (channels, filters, count) in [(4, 48, 3), (4, 8, 5), (6, 16, 2)] {
-        let mut case = Int8Case::random(4 * channels, filters, count, 2);
-        let mut layers = f32_layers(4 * channels, filters, count, 5);
-        for pixel in 1..4 {
-            let more = Int8Case::random(4 * channels, filters, count, 10 + pixel)
-                .layers
-                .pop()
-                .unwrap();
-            let last = case.layers.last_mut().unwrap();
-            last.outputs += OUTPUTS;
-            last.kernel.extend(more.kernel);
-            last.bias.extend(more.bias);
-            last.multiplier.extend(more.multiplier);
-            let more = f32_layers(4 * channels, filters, count, 10 + pixel).pop().unwrap();
-            let last = layers.last_mut().unwrap();
-            last.outputs += OUTPUTS;
-            last.kernel.extend(more.kernel);
-            last.bias.extend(more.bias);
-        }
+        let (case, layers) = of_side(2, channels, filters, count);
         for size in [
             Size { width: 1, height: 1 },
             Size { width: 4, height: 6 },

@@ -43,8 +43,8 @@ pub struct SessionOptions {
     pub target_rate_hz: Option<f64>,
     /// The conversion of fields to levels.
     pub encoder: EncoderOptions,
-    /// Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-    /// only the parts where colour or depth have changed by more than a camera's noise.
+    /// Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or
+    /// depth have changed by more than a camera's noise. Seeded networks, and those on tract, compute whole frames.
     pub keep_standing: bool,
     /// The processing of depth.
     pub depth: DepthOptions,

@@ -93,8 +93,8 @@ export interface SessionOptions<N = Network, T = Target | Display> {
   /** The confidence, 0 to 1, below which readings are ignored. */
   readonly leastConfidence?: number;
   /**
-   * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes only
-   * the tiles in which colour or depth have changed by more than a camera's noise. True by default.
+   * Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or depth
+   * have changed by more than a camera's noise. True by default.
    */
   readonly keepStanding?: boolean;
   /** The maximum number of pixels of a quality level and of the modulator. */

@@ -13,11 +13,16 @@ use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::response::Response;
 use crate::display::target::Target;
-use crate::method::sweep::{ChangedRows, Wave};
+use crate::method::standing::Changed;
+use crate::method::wave::Wave;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// The number of rows of a piece whose changed columns are found together.
+const PIECE: usize = 64;
 
 /// A plan for one shape, target and encoding. It is immutable and can be shared between threads.
 pub struct Encoder {
@@ -81,6 +86,16 @@ enum Row<'a> {
     Field(&'a [Complex32]),
     /// Corrected values, whose own phase is displayed.
     Corrected(&'a [Complex32]),
+}
+
+impl Row<'_> {
+    /// Returns the `count` values from `from` on.
+    fn part(self, from: usize, count: usize) -> Self {
+        match self {
+            Row::Field(values) => Row::Field(&values[from..][..count]),
+            Row::Corrected(values) => Row::Corrected(&values[from..][..count]),
+        }
+    }
 }
 
 impl Encoder {
@@ -163,9 +178,9 @@ impl Encoder {
             None,
             phase,
             scratch,
-            |row, shown, phases| match shown {
+            |first, shown, phases| match shown {
                 Row::Field(values) if !self.is_phase => {
-                    double_phase::encode_row(values, row % self.height, scale, phases)
+                    double_phase::encode_row(values, first / self.width % self.height, scale, phases)
                 }
                 Row::Field(values) | Row::Corrected(values) => double_phase::phase_row(values, phases),
             },
@@ -196,7 +211,7 @@ impl Encoder {
         !self.is_phase && !self.prefilter.is_of_whole_field()
     }
 
-    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, only the rows that differ are computed, and
+    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, only the pixels that differ are computed, and
     /// `levels` hold those of the wave before at the same scale and turns.
     ///
     /// # Panics
@@ -205,7 +220,7 @@ impl Encoder {
         &self,
         wave: Wave<'_>,
         scale: f32,
-        changed: Option<ChangedRows<'_>>,
+        changed: Option<Changed<'_>>,
         levels: &mut [u8],
         scratch: &mut EncoderScratch,
     ) {
@@ -217,13 +232,13 @@ impl Encoder {
         &self,
         source: Source<'_>,
         scale: f32,
-        changed: Option<ChangedRows<'_>>,
+        changed: Option<Changed<'_>>,
         levels: &mut [u8],
         scratch: &mut EncoderScratch,
     ) {
         let work = self.work(scale);
-        self.rows(source, work, changed, levels, scratch, |row, shown, levels| {
-            let (y, first) = (row % self.height, row * self.width);
+        self.rows(source, work, changed, levels, scratch, |first, shown, levels| {
+            let y = first / self.width % self.height;
             match shown {
                 Row::Field(values) if !self.is_phase => {
                     double_phase::encode_row_levels(values, y, scale, &self.response, first, levels);
@@ -253,7 +268,7 @@ impl Encoder {
         self.local.as_ref().map_or(0, |local| REACH * local.steps)
     }
 
-    /// Returns how many rows above and below a row its phases depend on.
+    /// Returns how many rows and columns on each side of a pixel its phase depends on.
     fn reach(&self) -> usize {
         self.correction_reach() + self.prefilter.blur().map_or(0, AntiAlias::half)
     }
@@ -295,13 +310,32 @@ impl Encoder {
         scale
     }
 
-    /// Processes each row of `source`, or each that `changed` affects. Calls `then` with the row's index in the stack,
-    /// the row and its part of `out`, which is divided into C·H parts of equal size.
+    /// Returns the smallest rectangle of `rows` that holds what `changed` affects, from an even column on.
+    fn needed(&self, rows: Range<usize>, changed: Option<Changed<'_>>) -> Option<[Range<usize>; 2]> {
+        let all = 0..self.width;
+        let Some(changed) = changed else {
+            return Some([rows, all]);
+        };
+        let [rows, columns] = changed.affected([&rows, &all], self.reach())?;
+        // Only whole rows are divided by light.
+        let columns = if self.illumination.is_some() { all } else { columns };
+        Some([rows, columns.start / 2 * 2..columns.end])
+    }
+
+    /// Returns the columns to read for `columns`, from an even one on.
+    fn read_for(&self, columns: &Range<usize>) -> Range<usize> {
+        let reach = self.reach();
+        columns.start.saturating_sub(reach) / 2 * 2..(columns.end + reach).min(self.width)
+    }
+
+    /// Processes each row of `source`, or the parts of rows that `changed` affects. Calls `then` with the place in the
+    /// stack at which a part begins, in an even column, with the part, and with its place in `out`, which has a value for
+    /// each pixel or, if nothing is given as changed, for each row.
     fn rows<T: Send>(
         &self,
         source: Source<'_>,
         work: Work<'_>,
-        changed: Option<ChangedRows<'_>>,
+        changed: Option<Changed<'_>>,
         out: &mut [T],
         scratch: &mut EncoderScratch,
         then: impl Fn(usize, Row<'_>, &mut [T]) + Sync,
@@ -313,16 +347,16 @@ impl Encoder {
             wanted, parts, cancel, ..
         } = scratch;
         assert_eq!(source.len(), self.colours * height * width);
-        let reach = self.reach();
-        let is_needed = |y: usize| changed.is_none_or(|changed| changed.any(y.saturating_sub(reach)..y + reach + 1));
         let band = height.div_ceil(parts.len());
+        let piece = if changed.is_some() { PIECE } else { band };
         for (colour, out) in out.chunks_exact_mut(height * per_row).enumerate() {
             if cancel.requested() {
                 return;
             }
-            let start = Start {
+            let whole = Start {
                 plane: source.plane(colour, height * width),
-                height,
+                size: Size { width, height },
+                columns: 0..width,
                 colour,
                 dark_threshold: work.dark_threshold,
                 blur: self.prefilter.blur(),
@@ -334,13 +368,23 @@ impl Encoder {
                 .enumerate()
                 .for_each(|(part, (out, scratch))| {
                     let (first, end) = (part * band, part * band + out.len() / per_row);
-                    let mut then = |y: usize, row: Row<'_>| {
-                        then(colour * height + y, row, &mut out[(y - first) * per_row..][..per_row]);
-                    };
-                    let mut next = first;
-                    while let Some(from) = (next..end).find(|y| is_needed(*y)) {
-                        let rows = from..(from..end).find(|y| !is_needed(*y)).unwrap_or(end);
-                        next = rows.end;
+                    for top in (first..end).step_by(piece) {
+                        let Some([rows, columns]) = self.needed(top..(top + piece).min(end), changed) else {
+                            continue;
+                        };
+                        let start = Start {
+                            columns: self.read_for(&columns),
+                            ..whole.clone()
+                        };
+                        let before = columns.start - start.columns.start;
+                        let mut then = |y: usize, row: Row<'_>| {
+                            let at = if per_row == width { columns.start } else { 0 };
+                            then(
+                                (colour * height + y) * width + columns.start,
+                                row.part(before, columns.len()),
+                                &mut out[(y - first) * per_row + at..][..columns.len().min(per_row)],
+                            );
+                        };
                         match (work.local, &mut scratch.local) {
                             (Some((local, per_scale)), Some(of_local)) => {
                                 let wanted = Wanted {
@@ -352,10 +396,11 @@ impl Encoder {
                                 filter.correct(rows, &start, wanted, &mut scratch.start, of_local, then);
                             }
                             _ => {
+                                let row = &mut scratch.row[..start.columns.len()];
                                 scratch.start.begin(&start, rows.start);
                                 for y in rows {
-                                    start.row(y, &mut scratch.row, &mut scratch.start);
-                                    then(y, Row::Field(&scratch.row));
+                                    start.row(y, row, &mut scratch.start);
+                                    then(y, Row::Field(row));
                                 }
                             }
                         }

@@ -81,16 +81,17 @@ pub(super) struct Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    fn row<'a>(&'a self, y: usize, width: usize, start: &'a Start<'_>, of_start: &'a StartScratch) -> &'a [Complex32] {
+    fn row<'a>(&'a self, y: usize, start: &'a Start<'_>, of_start: &'a StartScratch) -> &'a [Complex32] {
         match self.plane {
-            Some(plane) => &plane[y * width..][..width],
-            None => start.source(y, width, of_start),
+            Some(plane) => &plane[start.first(y)..][..start.columns.len()],
+            None => start.source(y, of_start),
         }
     }
 }
 
 /// The working memory of a part of a plane.
 pub(super) struct LocalScratch {
+    steps: usize,
     /// The rows of g − L·e of each step in a ring, with REACH empty columns on either side.
     rings: Vec<Complex32>,
     /// Sums down some columns, for the taps at 0, 1, 2 and 3 columns to the left and right.
@@ -102,10 +103,11 @@ pub(super) struct LocalScratch {
 }
 
 impl LocalScratch {
-    /// Creates working memory for `steps` ≥ 1 with rows of `width`.
+    /// Creates working memory for `steps` ≥ 1 with rows of at most `width`.
     pub(super) fn new(steps: usize, width: usize) -> Self {
         let padded = width + 2 * REACH;
         LocalScratch {
+            steps,
             rings: vec![Complex32::ZERO; steps * KEPT * padded],
             sums: vec![Complex32::ZERO; (REACH + 1) * (COLUMNS + 2 * REACH)],
             row: vec![Complex32::ZERO; width],
@@ -115,8 +117,8 @@ impl LocalScratch {
 }
 
 impl LocalFilter {
-    /// Corrects the rows `rows` of a plane that begins as `start`. Calls `then` with the index of each row and the
-    /// field whose phase is displayed.
+    /// Corrects the rows `rows` of some columns of a plane that begin as `start`. Calls `then` with the index of each
+    /// row and the field whose phase is displayed.
     pub(super) fn correct(
         &self,
         rows: Range<usize>,
@@ -126,23 +128,19 @@ impl LocalFilter {
         scratch: &mut LocalScratch,
         mut then: impl FnMut(usize, &[Complex32]),
     ) {
-        let LocalScratch {
-            rings,
-            sums,
-            row,
-            light,
-        } = scratch;
-        let per_scale = wanted.per_scale;
-        let (height, width) = (start.height, row.len());
+        let (height, width, steps) = (start.size.height, start.columns.len(), scratch.steps);
         let padded = width + 2 * REACH;
-        let steps = rings.len() / (KEPT * padded);
+        let rings = &mut scratch.rings[..steps * KEPT * padded];
+        let (row, light) = (&mut scratch.row[..width], &mut scratch.light[..width]);
+        let sums = &mut scratch.sums;
+        let per_scale = wanted.per_scale;
         let first = rows.start.saturating_sub(REACH * steps);
         of_start.begin(start, first);
         for front in first..rows.end + REACH * steps {
             if front < height {
                 start.row(front, row, of_start);
                 start.light_row(front, light);
-                let goal = wanted.row(front, width, start, of_start);
+                let goal = wanted.row(front, start, of_start);
                 let to = &mut rings[front % KEPT * padded..][..padded];
                 let sign = if front.is_multiple_of(2) { 1.0 } else { -1.0 };
                 wide!(begin(row, goal, light, per_scale, sign, &mut to[REACH..][..width]));
@@ -164,7 +162,7 @@ impl LocalFilter {
                     let (y, i) = (y as isize, i as isize + 1);
                     [of_ring(y - i), of_ring(y + i)]
                 });
-                let goal = wanted.row(y, width, start, of_start);
+                let goal = wanted.row(y, start, of_start);
                 self.draw(of_ring(y as isize), around, goal, per_scale, sums, row);
                 if step < steps {
                     start.light_row(y, light);

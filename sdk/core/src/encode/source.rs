@@ -1,6 +1,6 @@
-//! The field that an encoder reads: values in memory, or the 16-bit wave of the plane sweep.
+//! The field that an encoder reads: values in memory, or the wave of a method.
 
-use crate::method::sweep::{Wave, WavePlane};
+use crate::method::wave::{Wave, WavePlane};
 use num_complex::Complex32;
 
 /// A field at the modulator, (C, H, W).

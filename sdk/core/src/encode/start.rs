@@ -8,13 +8,16 @@ use crate::Size;
 use crate::display::illumination::Illumination;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
+use std::ops::Range;
 
-/// One plane of a field and the operations on it.
-#[derive(Clone, Copy)]
+/// Some columns of one plane of a field and the operations on them.
+#[derive(Clone)]
 pub(super) struct Start<'a> {
     /// The plane, (H, W).
     pub(super) plane: Plane<'a>,
-    pub(super) height: usize,
+    pub(super) size: Size,
+    /// The columns that rows hold. All, if there is `light`.
+    pub(super) columns: Range<usize>,
     /// 0 red, 1 green, 2 blue. 0 for one laser.
     pub(super) colour: usize,
     pub(super) dark_threshold: Option<DarkThreshold>,
@@ -35,7 +38,7 @@ pub(super) struct StartScratch {
 }
 
 impl StartScratch {
-    /// Creates memory for rows of `width`. [`Start::source`] returns the latest row and `before` rows above it.
+    /// Creates memory for rows of at most `width`. [`Start::source`] returns the latest row and `before` rows above it.
     pub(super) fn new(blur: Option<&AntiAlias>, before: usize, width: usize) -> Self {
         let kept = blur.map_or(0, |blur| 2 * blur.half() + 1);
         let read = before + 1 + blur.map_or(0, AntiAlias::half);
@@ -56,23 +59,24 @@ impl StartScratch {
 impl Start<'_> {
     /// Writes row `y` into `out`. Rows must be requested in order.
     pub(super) fn row(&self, y: usize, out: &mut [Complex32], scratch: &mut StartScratch) {
-        let width = out.len();
+        let (width, height) = (out.len(), self.size.height);
         let StartScratch {
             read,
             ring,
             damped,
             next,
         } = scratch;
+        let damped = &mut damped[..width];
         match (self.blur, self.dark_threshold) {
-            (None, None) => out.copy_from_slice(self.read(y, width, read)),
+            (None, None) => out.copy_from_slice(self.read(y, read)),
             (None, Some(threshold)) => {
-                let row = self.read(y, width, read);
+                let row = self.read(y, read);
                 wide!(threshold.draw(row, out));
             }
             (Some(blur), threshold) => wide!({
                 let (half, kept) = (blur.half(), ring.len() / width);
-                while *next <= (y + half).min(self.height - 1) {
-                    let row = self.read(*next, width, read);
+                while *next <= (y + half).min(height - 1) {
+                    let row = self.read(*next, read);
                     let to = &mut ring[*next % kept * width..][..width];
                     match threshold {
                         None => blur.blur_row(row, to),
@@ -83,32 +87,39 @@ impl Start<'_> {
                     }
                     *next += 1;
                 }
-                blur.blur_down(ring, y, self.height, out);
+                blur.blur_down(ring, y, height, out);
             }),
         }
         if let Some((light, modulator)) = self.light {
-            light.divide_row(out, self.colour * self.height + y, self.height, modulator);
+            light.divide_row(out, self.colour * height + y, height, modulator);
         }
     }
 
     /// Returns row `y` of the plane, in `read` if it is not in memory as values.
-    fn read<'a>(&'a self, y: usize, width: usize, read: &'a mut [Complex32]) -> &'a [Complex32] {
+    fn read<'a>(&'a self, y: usize, read: &'a mut [Complex32]) -> &'a [Complex32] {
+        let (width, first) = (self.columns.len(), self.first(y));
         match self.plane {
-            Plane::Field(values) => &values[y * width..][..width],
+            Plane::Field(values) => &values[first..][..width],
             Plane::Wave(wave) => {
                 let kept = read.len() / width;
                 let row = &mut read[y % kept * width..][..width];
-                wave.write(y * width, row);
+                wave.write(first, row);
                 row
             }
         }
     }
 
+    /// Returns where row `y` begins in the plane.
+    pub(super) fn first(&self, y: usize) -> usize {
+        y * self.size.width + self.columns.start
+    }
+
     /// Returns row `y` of the plane. It is the row of the latest call of [`Self::row`], or one of those before that the
     /// scratch was made for.
-    pub(super) fn source<'a>(&'a self, y: usize, width: usize, scratch: &'a StartScratch) -> &'a [Complex32] {
+    pub(super) fn source<'a>(&'a self, y: usize, scratch: &'a StartScratch) -> &'a [Complex32] {
+        let width = self.columns.len();
         match self.plane {
-            Plane::Field(values) => &values[y * width..][..width],
+            Plane::Field(values) => &values[self.first(y)..][..width],
             Plane::Wave(_) => &scratch.read[y % (scratch.read.len() / width) * width..][..width],
         }
     }
@@ -116,7 +127,8 @@ impl Start<'_> {
     /// Writes the light that falls on row `y` into `row`.
     pub(super) fn light_row(&self, y: usize, row: &mut [f32]) {
         if let Some((light, modulator)) = self.light {
-            light.light_row(row, self.colour * self.height + y, self.height, modulator);
+            let height = self.size.height;
+            light.light_row(row, self.colour * height + y, height, modulator);
         }
     }
 }

@@ -36,6 +36,7 @@ use metadata::{Description, Served};
 pub use metadata::{InputKind, TrainedDisplay};
 
 use crate::display::Display;
+use crate::method::standing::Changes;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;
@@ -695,9 +696,31 @@ impl NetworkPlan {
         field: &mut [Complex32],
         scratch: &mut NetworkScratch,
     ) -> Result<()> {
+        self.field_where(None, source, field, scratch).map(|_| ())
+    }
+
+    /// Works like [`Self::field`], but if `changes` to the source are given, only what they affect is computed, which
+    /// needs a [`Self::reach`]. Returns whether the run came to its end.
+    pub(crate) fn field_where<S: Source + ?Sized>(
+        &self,
+        changes: Option<&Changes>,
+        source: &S,
+        field: &mut [Complex32],
+        scratch: &mut NetworkScratch,
+    ) -> Result<bool> {
         match self.colour {
-            None => self.field_of([0, 1, 2], source, field, scratch),
-            Some(colour) => self.field_of([colour], source, field, scratch),
+            None => self.field_of([0, 1, 2], changes, source, field, scratch)?,
+            Some(colour) => self.field_of([colour], changes, source, field, scratch)?,
+        }
+        Ok(!scratch.fused.cancel.requested())
+    }
+
+    /// Returns how far from a pixel the field depends on the source. `None` on tract, which computes whole frames.
+    pub(crate) fn reach(&self) -> Option<usize> {
+        match &self.path {
+            Path::Fused(chain, _) => Some(chain.reach()),
+            #[cfg(feature = "tract")]
+            Path::Stock(..) | Path::Own(_) => None,
         }
     }
 
@@ -705,6 +728,7 @@ impl NetworkPlan {
     fn field_of<S: Source + ?Sized, const C: usize>(
         &self,
         colours: [usize; C],
+        changes: Option<&Changes>,
         source: &S,
         field: &mut [Complex32],
         scratch: &mut NetworkScratch,
@@ -723,7 +747,7 @@ impl NetworkPlan {
                     head: *head,
                     colours,
                 };
-                chain.field(source, into, field, size, &scratch.fused);
+                chain.field(changes, source, into, field, size, &scratch.fused);
                 Ok(())
             }
             #[cfg(feature = "tract")]

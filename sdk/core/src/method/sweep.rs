@@ -23,15 +23,14 @@ mod points;
 pub mod reference;
 mod shares;
 mod spans;
-mod standing;
 mod tile;
-mod wave;
 mod workers;
 
 use crate::Size;
 use crate::display::Display;
-use crate::frame::{Past, RgbdFrame};
-use crate::method::mean_phase::{self, MeanPhase};
+use crate::frame::RgbdFrame;
+use crate::method::standing::{BLOCK, Changes};
+use crate::method::wave::{Pixels, Wave};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use filters::Filters;
@@ -44,12 +43,10 @@ use phasefront_kernels::wide;
 use rayon::prelude::*;
 pub use shares::MEET;
 use shares::Slot;
-use standing::{BLOCK, Standing};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 pub use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
-pub(crate) use wave::{ChangedRows, Wave, WavePlane};
 use workers::Workers;
 
 /// The largest number of planes of a sweep.
@@ -191,8 +188,6 @@ pub struct SweepScratch {
     tiles: Workers<TileScratch>,
     /// The swept wave, (C, H, W).
     wave: Vec<Pixel>,
-    /// What stands still, if it keeps its wave.
-    standing: Option<Box<Standing>>,
     cancel: Cancel,
 }
 
@@ -200,6 +195,11 @@ impl SweepScratch {
     /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.cancel = cancel.clone();
+    }
+
+    /// Returns the swept wave, (C, H, W).
+    pub(super) fn wave(&self) -> Pixels<'_> {
+        Pixels::Fixed(&self.wave)
     }
 }
 
@@ -293,19 +293,17 @@ impl SweepPlan {
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
             wave: vec![Pixel::ZERO; self.filters.len() * size],
-            standing: None,
             cancel: Cancel::default(),
         }
     }
 
-    /// Lets what stands still in a video keep its wave, in [`SweepPlan::field_after`]. This takes memory for another
-    /// frame.
-    pub(crate) fn keep_standing(&self, scratch: &mut SweepScratch) {
-        scratch.standing = Some(Box::new(Standing::new(self.filters.len(), self.size)));
+    /// Returns how far from a pixel the wave depends on its colour and depth.
+    pub(super) fn reach(&self) -> usize {
+        self.layout.reach() + self.hidden.dependence()
     }
 
     /// Writes the hologram of `frame`, without the carrier, at [`SweepPlan::z_m`] into `field`, (C, H, W). Allocates
-    /// nothing.
+    /// nothing. A frame that is given up leaves `field` as it is.
     ///
     /// # Errors
     /// Returns an error if the frame has another shape or other colours.
@@ -313,72 +311,31 @@ impl SweepPlan {
     /// # Panics
     /// Panics if `field` does not have C·H·W values or `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
-        self.field_after(None, frame, MeanPhase::Kept, field, scratch)
-    }
-
-    /// Works like [`Self::field`] for a frame that follows another if there is a `past`. What stands still since then
-    /// keeps its wave after [`Self::keep_standing`]. The mean phase of each colour can be removed. A frame that is
-    /// given up leaves `field` as it is.
-    pub(crate) fn field_after(
-        &self,
-        past: Option<Past>,
-        frame: &RgbdFrame,
-        mean_phase: MeanPhase,
-        field: &mut [Complex32],
-        scratch: &mut SweepScratch,
-    ) -> Result<()> {
         let size = self.size.pixels();
         assert_eq!(field.len(), self.filters.len() * size);
-        if self.sweep_after(past, frame, scratch)? {
-            for (wave, plane) in scratch.wave.chunks_exact(size).zip(field.chunks_exact_mut(size)) {
-                mean_phase::write(mean_phase, wave, tile::value, plane);
-            }
-        }
+        let is_whole = self.sweep_where(None, frame, scratch)?;
+        let wave = Wave {
+            pixels: scratch.wave(),
+            size,
+            turns: [Complex32::ONE; 3],
+            changed: None,
+            is_whole,
+        };
+        wave.write(field);
         Ok(())
     }
 
-    /// Works like [`Self::field_after`], but returns the wave, without the mean phase of each colour. The wave of a
-    /// frame that is given up is unspecified.
-    pub(crate) fn wave_after<'a>(
+    /// Sweeps `frame` into the wave of `scratch`. If `changes` to the frame before are given, only what they affect is
+    /// computed. Returns whether the wave is whole, which it is unless the frame is given up.
+    ///
+    /// # Errors
+    /// Returns an error if the frame has another shape or other colours.
+    pub(super) fn sweep_where(
         &self,
-        past: Option<Past>,
+        changes: Option<&Changes>,
         frame: &RgbdFrame,
-        scratch: &'a mut SweepScratch,
-    ) -> Result<Wave<'a>> {
-        let size = self.size.pixels();
-        let is_whole = self.sweep_after(past, frame, scratch)?;
-        let SweepScratch { wave, standing, .. } = scratch;
-        let mut turns = [Complex32::ONE; 3];
-        let mut changed = None;
-        match standing {
-            Some(standing) => {
-                if is_whole {
-                    turns = standing.turns(wave);
-                }
-                changed = Some(ChangedRows {
-                    number: standing.number(),
-                    changes: &standing.changes,
-                    reach: self.layout.reach() + self.hidden.dependence(),
-                });
-            }
-            None if is_whole => {
-                for (turn, wave) in turns.iter_mut().zip(wave.chunks_exact(size)) {
-                    *turn = mean_phase::turn_of(wave, tile::value);
-                }
-            }
-            None => {}
-        }
-        Ok(Wave {
-            pixels: wave,
-            size,
-            turns,
-            changed,
-        })
-    }
-
-    /// Sweeps `frame` into the wave of `scratch`. Returns whether the wave is whole, which it is unless the frame is
-    /// given up.
-    fn sweep_after(&self, past: Option<Past>, frame: &RgbdFrame, scratch: &mut SweepScratch) -> Result<bool> {
+        scratch: &mut SweepScratch,
+    ) -> Result<bool> {
         frame.check(self.size(), self.filters.len())?;
         let size = self.size.pixels();
         let SweepScratch {
@@ -388,16 +345,8 @@ impl SweepPlan {
             hidden,
             tiles,
             wave,
-            standing,
             cancel,
         } = scratch;
-        if let Some(standing) = standing {
-            standing.show(frame, past.is_some(), self.sweep.planes);
-        }
-        let (frame, changes) = match standing.as_deref() {
-            Some(standing) => (&standing.frame, Some(&standing.changes)),
-            None => (frame, None),
-        };
         let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
         let (rgb, depth) = frame.values();
         let part = BLOCK * self.size.width;
@@ -426,7 +375,7 @@ impl SweepPlan {
         let mut waves = wave.chunks_exact_mut(size);
         // An array of the largest number of colours avoids an allocation.
         let waves: [_; 3] = std::array::from_fn(|_| Mutex::new(waves.next().unwrap_or_default()));
-        let reach = self.layout.reach() + self.hidden.dependence();
+        let reach = self.reach();
         let (down, across) = self.layout.count(self.size);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
             if cancel.requested() {
@@ -450,11 +399,7 @@ impl SweepPlan {
                 }
             });
         });
-        let is_whole = !cancel.requested();
-        if let Some(standing) = standing {
-            standing.finish(is_whole);
-        }
-        Ok(is_whole)
+        Ok(!cancel.requested())
     }
 }
 

@@ -15,7 +15,7 @@ use crate::encode::modelled::{ModelScratch, ModelSteps};
 use crate::encode::natural::{NaturalScratch, NaturalSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding, Source};
 use crate::frame::{Past, RgbdFrame};
-use crate::method::sweep::Wave;
+use crate::method::wave::Wave;
 use crate::optics::asm::Propagator;
 use crate::optics::fft::ConvolveScratch;
 use crate::pipeline::shown::Shown;
@@ -279,7 +279,7 @@ impl DisplayPlan {
         }
     }
 
-    /// Works like [`Self::modulate`] for the wave of a plane sweep. What stands still keeps its levels after
+    /// Works like [`Self::modulate`] for the wave of a method. What stands still keeps its levels after
     /// [`Self::keep_standing`]. If the frame is given up, levels may be old.
     ///
     /// # Panics

@@ -2,7 +2,8 @@
 
 use crate::encode::brightness::{self, Brightness, Percentile};
 use crate::frame::Past;
-use crate::method::sweep::{ChangedRows, Wave};
+use crate::method::standing::Changed;
+use crate::method::wave::Wave;
 use num_complex::Complex32;
 
 /// The levels of the latest wave that keeps what stands still.
@@ -33,8 +34,8 @@ impl Shown {
         }
     }
 
-    /// Prepares for the levels of `wave`, whose largest amplitude is `most`. Returns the scale and, if only some rows
-    /// differ from [`Self::levels`], these rows.
+    /// Prepares for the levels of `wave`, whose largest amplitude is `most`. Returns the scale and, if only some pixels
+    /// differ from [`Self::levels`], these pixels.
     pub(super) fn begin<'a>(
         &mut self,
         past: Option<Past>,
@@ -42,10 +43,10 @@ impl Shown {
         brightness: Brightness,
         percentile: &mut Percentile,
         most: impl FnOnce() -> f32,
-    ) -> (f32, Option<ChangedRows<'a>>) {
+    ) -> (f32, Option<Changed<'a>>) {
         let before = (self.made.take().zip(wave.changed))
             .filter(|(made, changed)| past.is_some() && made.number + 1 == changed.number && made.turns == wave.turns);
-        let same = before.filter(|(_, changed)| !changed.any(0..usize::MAX));
+        let same = before.filter(|(_, changed)| !changed.any());
         let own_scale = match (same, brightness) {
             (Some((made, _)), _) => made.own_scale,
             (None, Brightness::Smoothed) => percentile.of(wave.len(), |at| wave.value(at)),

@@ -81,8 +81,8 @@ pub(crate) struct Video {
     /// Let a live stream step down to half and a quarter of the resolution if it cannot hold the rate
     #[arg(long, requires = "live", help_heading = "Input")]
     adaptive: bool,
-    /// Let what stands still keep its wave where the plane sweep makes it, as --live does: a frame computes only what
-    /// has changed by more than a camera's noise
+    /// Let what stands still keep its wave, as --live does: a frame computes only what has changed by more than a
+    /// camera's noise
     #[arg(long, help_heading = "Method")]
     keep_standing: bool,
     /// Number of times to show the frames of a folder

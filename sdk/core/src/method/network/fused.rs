@@ -3,6 +3,7 @@
 use super::chain::{Chain, Precision, Quantisation, Weights};
 use super::{Head, InputKind, Source};
 use crate::Size;
+use crate::method::standing::Changes;
 use crate::runtime::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{
@@ -10,10 +11,13 @@ use phasefront_kernels::{
     Tiling, wide,
 };
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A chain packed for the kernels. It works for any frame size, and threads can share it.
 pub(super) struct FusedChain {
     kernels: Kernels,
+    /// The pixels along each side of a layer's pixel.
+    side: usize,
     tanh: bool,
 }
 
@@ -51,6 +55,7 @@ impl FusedChain {
         };
         Ok(FusedChain {
             kernels,
+            side: chain.side(),
             tanh: chain.tanh,
         })
     }
@@ -75,10 +80,17 @@ impl FusedChain {
         }
     }
 
+    /// Returns how far from a pixel the output depends on the input, in pixels.
+    pub(super) fn reach(&self) -> usize {
+        // A square of two by two pixels reaches one pixel farther to one side.
+        self.layers() * self.side + self.side - 1
+    }
+
     /// Runs the chain from `source` into `field`, (C, H, W), row by row. Neither the input nor the output is stored as
-    /// a whole.
+    /// a whole. If `changes` to the input are given, only what they affect is computed.
     pub(super) fn field<S: Source + ?Sized, const C: usize>(
         &self,
+        changes: Option<&Changes>,
         source: &S,
         into: FieldOf<C>,
         field: &mut [Complex32],
@@ -89,6 +101,7 @@ impl FusedChain {
             source,
             into,
             tanh: self.tanh,
+            changes: changes.map(|changes| (changes, self.reach())),
             cancel: &scratch.cancel,
         };
         let mut planes = field.chunks_exact_mut((size.height * size.width).max(1));
@@ -146,6 +159,8 @@ struct FieldRows<'a, S: ?Sized, const C: usize> {
     source: &'a S,
     into: FieldOf<C>,
     tanh: bool,
+    /// The changes of the input and how far they reach.
+    changes: Option<(&'a Changes, usize)>,
     cancel: &'a Cancel,
 }
 
@@ -174,6 +189,13 @@ impl<S: Source + ?Sized, const C: usize> Rows<C> for FieldRows<'_, S, C> {
             let FieldOf { kind, head, colours } = &self.into;
             head.row(*kind, colours, values, base, field);
         });
+    }
+
+    fn needed(&self, rows: Range<usize>, columns: Range<usize>) -> Option<[Range<usize>; 2]> {
+        match self.changes {
+            None => Some([rows, columns]),
+            Some((changes, reach)) => changes.affected([&rows, &columns], reach),
+        }
     }
 
     fn given_up(&self) -> bool {

@@ -11,7 +11,7 @@ use super::points::Points;
 use super::shares::{Slot, in_units, round, share};
 use super::spans::{NOWHERE, Span, join, widen, widen_down};
 use crate::Size;
-use num_complex::Complex32;
+use crate::method::wave::UNIT;
 use phasefront_kernels::fir::{Fir, Pixel, RUN, Taps};
 use phasefront_kernels::wide;
 use std::ops::Range;
@@ -19,9 +19,6 @@ use std::ops::Range;
 /// The number of pixels beyond light's reach that are also computed, because a fitted filter's light spreads slightly
 /// farther.
 pub const MARGIN: usize = 10;
-
-/// The units of a wave of amplitude 1. Parts of more than 2 saturate.
-const UNIT: f32 = 8192.0;
 
 /// The surfaces of a frame: the positions and colours of the points of each pixel.
 #[derive(Clone, Copy)]
@@ -340,12 +337,6 @@ impl<'a> Tile<'a> {
             wave[at..][..row.len()].copy_from_slice(row);
         }
     }
-}
-
-/// Returns the value of a pixel.
-#[inline(always)]
-pub(super) fn value(pixel: Pixel) -> Complex32 {
-    Complex32::new(pixel.re() as f32, pixel.im() as f32) * (1.0 / UNIT)
 }
 
 /// Returns an amplitude in units of [`UNIT`].

@@ -1,29 +1,25 @@
 //! What stands still in a video. Pixels whose surroundings stay as they were keep their wave.
 //!
-//! The sweep shows a frame of its own, the *shown* frame. In a frame of a video, each block of pixels that differs from
-//! the shown frame by more than a tolerance replaces its part there. In each tile, only the smallest rectangle that
-//! holds all pixels which such blocks can affect is swept again. So the wave is always the sweep of the shown frame but
-//! for rounding, and no block of the shown frame differs from the given one by more than the tolerance, however long a
-//! scene stands. A camera's noise stays below it.
+//! Methods show a frame of their own, the *shown* frame. In a frame of a video, each block of pixels that differs from
+//! the shown frame by more than a tolerance replaces its part there. Of each part of the frame, only the smallest
+//! rectangle that holds all pixels which such blocks can affect is computed again. So the wave is always that of the
+//! shown frame, for the sweep but for rounding, and no block of the shown frame differs from the given one by more than
+//! the tolerance, however long a scene stands. A camera's noise stays below it.
 //!
 //! The difference in colour of a block is the mean of Δa² over its pixels and colours, and that in depth the mean of
 //! a²·min(1, [`DEPTH_WEIGHT`]·Δp²), with the amplitude a and the position p among the planes. Sums run in a fixed
 //! order, so that all instruction sets decide alike.
 
-use super::spans::{NOWHERE, Span, join};
-use super::tile;
 use crate::Size;
 use crate::frame::RgbdFrame;
-use crate::method::mean_phase;
 use num_complex::Complex32;
-use phasefront_kernels::fir::Pixel;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
 
 /// The number of pixels along each side of a block.
-pub(super) const BLOCK: usize = 16;
+pub(crate) const BLOCK: usize = 16;
 
 /// The largest difference in colour of a block that stands, 34 dB below full light.
 const COLOUR_TOLERANCE: f32 = 4e-4;
@@ -32,15 +28,15 @@ const COLOUR_TOLERANCE: f32 = 4e-4;
 /// because the noise of a sensor moves edges by a pixel here and there.
 const DEPTH_TOLERANCE: f32 = 4e-3;
 
-/// The share of a point's light that counts as different if its depth changes by the distance of two planes: its image
-/// becomes a little more or less sharp.
+/// The share of a point's light that counts as different if its depth changes by the distance of two planes of the
+/// sweep: its image becomes a little more or less sharp.
 const DEPTH_WEIGHT: f32 = 0.05;
 
 /// The largest difference of a colour's mean phase from 0 while it is kept: four levels of 8 bits.
 const TURN_TOLERANCE: f32 = 2.0 * PI / 64.0;
 
 /// The blocks of a frame that have changed.
-pub(super) struct Changes {
+pub(crate) struct Changes {
     blocks: Vec<bool>,
     /// The number of blocks across the frame.
     across: usize,
@@ -48,7 +44,7 @@ pub(super) struct Changes {
 
 impl Changes {
     /// Returns whether a block in these rows of pixels has changed. The rows may go beyond the frame.
-    pub(super) fn any(&self, rows: Range<usize>) -> bool {
+    pub(crate) fn any(&self, rows: Range<usize>) -> bool {
         let down = self.blocks.len() / self.across;
         let rows = (rows.start / BLOCK).min(down)..rows.end.div_ceil(BLOCK).min(down);
         self.blocks[rows.start * self.across..rows.end * self.across].contains(&true)
@@ -56,24 +52,50 @@ impl Changes {
 
     /// Returns the smallest rectangle that holds all pixels of `rows` and `columns` within `reach` of a block that has
     /// changed, or `None` if there are no such pixels.
-    pub(super) fn affected(&self, [rows, columns]: [&Range<usize>; 2], reach: usize) -> Option<[Range<usize>; 2]> {
+    pub(crate) fn affected(&self, [rows, columns]: [&Range<usize>; 2], reach: usize) -> Option<[Range<usize>; 2]> {
         let within = |block: usize, side: &Range<usize>| {
             let first = (block * BLOCK).saturating_sub(reach).max(side.start);
-            [first, ((block + 1) * BLOCK + reach).min(side.end)]
+            first..((block + 1) * BLOCK + reach).min(side.end)
         };
-        let is_any = |span: &Span| span[0] < span[1];
-        let (mut down, mut across) = (NOWHERE, NOWHERE);
+        let join = |a: &Range<usize>, b: &Range<usize>| a.start.min(b.start)..a.end.max(b.end);
+        let mut all: Option<[Range<usize>; 2]> = None;
         for (row, blocks) in self.blocks.chunks_exact(self.across).enumerate() {
             let of_row = within(row, rows);
-            if !is_any(&of_row) {
+            if of_row.is_empty() {
                 continue;
             }
             let changed = (blocks.iter().enumerate()).filter(|(_, changed)| **changed);
-            for of_column in changed.map(|(column, _)| within(column, columns)).filter(is_any) {
-                (down, across) = (join(down, of_row), join(across, of_column));
+            for of_column in changed.map(|(column, _)| within(column, columns)).filter(|of| !of.is_empty()) {
+                all = Some(match &all {
+                    Some([down, across]) => [join(down, &of_row), join(across, &of_column)],
+                    None => [of_row.clone(), of_column],
+                });
             }
         }
-        is_any(&down).then(|| [down, across].map(|span| span[0]..span[1]))
+        all
+    }
+}
+
+/// The pixels in which a wave differs from the wave before, apart from the factor of its mean phase.
+#[derive(Clone, Copy)]
+pub(crate) struct Changed<'a> {
+    changes: &'a Changes,
+    /// How far beside a changed block pixels differ.
+    reach: usize,
+    /// The number of waves so far. The wave before has the number before.
+    pub(crate) number: u64,
+}
+
+impl Changed<'_> {
+    /// Returns whether a pixel differs.
+    pub(crate) fn any(&self) -> bool {
+        self.changes.blocks.contains(&true)
+    }
+
+    /// Returns the smallest rectangle that holds all pixels of `rows` and `columns` that depend on a pixel that differs
+    /// and is within `reach`, or `None` if there are none.
+    pub(crate) fn affected(&self, part: [&Range<usize>; 2], reach: usize) -> Option<[Range<usize>; 2]> {
+        self.changes.affected(part, self.reach + reach)
     }
 }
 
@@ -82,7 +104,9 @@ pub(super) struct Standing {
     /// The shown frame.
     pub(super) frame: RgbdFrame,
     pub(super) changes: Changes,
-    /// Whether the sweep's wave is that of `frame`.
+    /// The number of planes of a sweep for the display, whose distance measures a change of depth.
+    planes: usize,
+    /// Whether the wave is that of `frame`.
     is_whole: bool,
     /// Whether the wave of the frame before is kept where nothing changes.
     keeps: bool,
@@ -93,8 +117,8 @@ pub(super) struct Standing {
 }
 
 impl Standing {
-    /// Creates memory for frames of `colours` and `size`.
-    pub(super) fn new(colours: usize, size: Size) -> Self {
+    /// Creates memory for frames of `colours` and `size` for a display whose sweep has `planes`.
+    pub(super) fn new(colours: usize, size: Size, planes: usize) -> Self {
         let (across, down) = (size.width.div_ceil(BLOCK), size.height.div_ceil(BLOCK));
         Standing {
             frame: RgbdFrame::black(colours, size),
@@ -102,6 +126,7 @@ impl Standing {
                 blocks: vec![true; across * down],
                 across,
             },
+            planes,
             is_whole: false,
             keeps: false,
             turns: [Complex32::ONE; 3],
@@ -111,12 +136,12 @@ impl Standing {
 
     /// Finds what changes from the shown frame to `frame`, and shows it. Without a past, everything changes. The wave
     /// is that of the shown frame again after [`Self::finish`].
-    pub(super) fn show(&mut self, frame: &RgbdFrame, has_past: bool, planes: usize) {
+    pub(super) fn show(&mut self, frame: &RgbdFrame, has_past: bool) {
         let keeps = has_past && self.is_whole;
         (self.keeps, self.is_whole) = (keeps, false);
         self.number += 1;
         let Size { width, height } = frame.size();
-        let across = self.changes.across;
+        let (across, planes) = (self.changes.across, self.planes);
         let shown = &self.frame;
         let rows = self.changes.blocks.par_chunks_mut(across).enumerate();
         rows.for_each(|(row, blocks)| match keeps {
@@ -146,18 +171,22 @@ impl Standing {
         }
     }
 
-    /// Returns the number of shown frames.
-    pub(super) fn number(&self) -> u64 {
-        self.number
+    /// Returns what the last frame has changed, where a changed pixel changes others within `reach`.
+    pub(super) fn changed(&self, reach: usize) -> Changed<'_> {
+        Changed {
+            changes: &self.changes,
+            reach,
+            number: self.number,
+        }
     }
 
-    /// Returns the factor that removes the mean phase of each colour of `wave`, (C, H, W). It stays as it was while its
-    /// phase is within [`TURN_TOLERANCE`] of the wave's own.
-    pub(super) fn turns(&mut self, wave: &[Pixel]) -> [Complex32; 3] {
-        let size = self.frame.size().pixels();
+    /// Returns the factor that removes the mean phase of each colour of the wave, where `own` is that of the wave alone.
+    /// It stays as it was while its phase is within [`TURN_TOLERANCE`] of the wave's own.
+    pub(super) fn turns(&mut self, own: impl Fn(usize) -> Complex32) -> [Complex32; 3] {
         if !self.keeps || self.changes.blocks.contains(&true) {
-            for (turn, wave) in self.turns.iter_mut().zip(wave.chunks_exact(size)) {
-                let own = mean_phase::turn_of(wave, tile::value);
+            let colours = self.frame.colours();
+            for (colour, turn) in self.turns[..colours].iter_mut().enumerate() {
+                let own = own(colour);
                 if !self.keeps || (own * turn.conj()).arg().abs() > TURN_TOLERANCE {
                     *turn = own;
                 }
@@ -169,6 +198,11 @@ impl Standing {
     /// Notes whether the wave of the shown frame was computed to its end.
     pub(super) fn finish(&mut self, is_whole: bool) {
         self.is_whole = is_whole;
+    }
+
+    /// Forgets the wave, which is another method's.
+    pub(super) fn forget(&mut self) {
+        self.is_whole = false;
     }
 }
 
@@ -220,10 +254,14 @@ mod tests {
     use super::*;
     use crate::display::Display;
     use crate::frame::Past;
+    use crate::frame::tests::scene as scene_of;
     use crate::method::mean_phase::MeanPhase;
-    use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
+    use crate::method::network::Network;
+    use crate::method::sweep::{Sweep, SweepPlan};
+    use crate::method::{Method, MethodPlan, MethodScratch, Plan};
     use crate::runtime::cancel::Cancel;
     use num_complex::Complex32;
+    use std::sync::Arc;
     use std::time::Duration;
 
     const SIZE: Size = Size { width: 83, height: 61 };
@@ -234,93 +272,119 @@ mod tests {
         elapsed: Duration::from_millis(33),
     });
 
-    /// A sequence of numbers from −1 to 1.
-    fn noise(seed: u32) -> impl FnMut() -> f32 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
-        }
+    fn scene(x: usize, noise: [f32; 2], seed: u32) -> RgbdFrame {
+        scene_of(SIZE, x, noise, seed)
     }
 
-    /// Returns a wall and a ball whose centre is in column `x`, with noise of these amplitudes in colour and depth.
-    fn scene(x: usize, [of_colour, of_depth]: [f32; 2], seed: u32) -> RgbdFrame {
-        let mut frame = RgbdFrame::black(3, SIZE);
-        let mut noise = noise(seed);
-        let (rgb, depth) = frame.planes_mut();
-        for (i, depth) in depth.iter_mut().enumerate() {
-            let (row, column) = (i / SIZE.width, i % SIZE.width);
-            let is_ball = column.abs_diff(x).pow(2) + row.abs_diff(20).pow(2) < 60;
-            *depth = (if is_ball { 0.2 } else { 0.7 } + of_depth * noise()).clamp(0.0, 1.0);
-            for (colour, rgb) in rgb.chunks_exact_mut(SIZE.pixels()).enumerate() {
-                let texture = (row * 3 + column * (2 + colour)) % 7;
-                rgb[i] = (if is_ball { 0.9 } else { 0.1 * texture as f32 } + of_colour * noise()).clamp(0.0, 1.0);
-            }
-        }
-        frame
+    fn display() -> Display {
+        Display::from_toml("volume_depth_mm = 1.5").unwrap()
     }
 
-    fn plan(layers: usize) -> SweepPlan {
-        plan_of_tiles(layers, 16)
-    }
-
-    fn plan_of_tiles(layers: usize, tile: usize) -> SweepPlan {
-        let display = Display::from_toml("volume_depth_mm = 1.5").unwrap();
-        let sweep = Sweep {
+    fn sweep(layers: usize, tile: usize) -> Sweep {
+        Sweep {
             tile,
             hidden_layers: layers,
-            ..Sweep::of_planes(&display, 9)
-        };
-        SweepPlan::new(SIZE, &display, sweep, 0.0).unwrap()
+            ..Sweep::of_planes(&display(), 9)
+        }
     }
 
-    fn keeping(plan: &SweepPlan) -> SweepScratch {
+    fn plan_of(method: Method) -> MethodPlan {
+        MethodPlan::new(SIZE, method, &display()).unwrap()
+    }
+
+    fn plan(layers: usize) -> MethodPlan {
+        plan_of(Method::Sweep(sweep(layers, 16)))
+    }
+
+    fn networks() -> [Arc<Network>; 3] {
+        let network = |bytes: &[u8]| Arc::new(Network::from_onnx(bytes).unwrap());
+        [
+            network(include_bytes!("../../../../models/rgbd-8-int8.onnx")),
+            network(include_bytes!("../../../../models/rgbd-8.onnx")),
+            network(include_bytes!("../../../../models/natural-8-int8.onnx")),
+        ]
+    }
+
+    fn keeping(plan: &MethodPlan) -> MethodScratch {
         let mut scratch = plan.scratch();
         plan.keep_standing(&mut scratch);
         scratch
     }
 
-    fn field(plan: &SweepPlan, past: Option<Past>, frame: &RgbdFrame, scratch: &mut SweepScratch) -> Vec<Complex32> {
+    fn field(plan: &MethodPlan, past: Option<Past>, frame: &RgbdFrame, scratch: &mut MethodScratch) -> Vec<Complex32> {
         let mut field = vec![Complex32::new(f32::NAN, f32::NAN); 3 * SIZE.pixels()];
-        plan.field_after(past, frame, MeanPhase::Kept, &mut field, scratch)
+        plan.choose(past, frame, scratch).unwrap();
+        plan.field_as_chosen(past, frame, MeanPhase::Kept, &mut field, scratch)
             .unwrap();
         field
     }
 
-    fn anew(plan: &SweepPlan, frame: &RgbdFrame) -> Vec<Complex32> {
+    fn anew(plan: &MethodPlan, frame: &RgbdFrame) -> Vec<Complex32> {
         field(plan, None, frame, &mut plan.scratch())
     }
 
-    fn changed(scratch: &SweepScratch) -> usize {
+    fn shown(scratch: &MethodScratch) -> &RgbdFrame {
+        &scratch.standing.as_ref().unwrap().frame
+    }
+
+    fn changed(scratch: &MethodScratch) -> usize {
         let blocks = &scratch.standing.as_ref().unwrap().changes.blocks;
         blocks.iter().filter(|changed| **changed).count()
     }
 
+    /// Returns the largest difference between two fields.
+    fn farthest(a: &[Complex32], b: &[Complex32]) -> f32 {
+        a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max)
+    }
+
     #[test]
-    fn the_wave_is_the_sweep_of_the_shown_frame_which_is_near_the_given_one() {
-        for (layers, tile) in [(0, 16), (2, 16), (0, 48), (2, 48), (2, 96)] {
-            let plan = plan_of_tiles(layers, tile);
+    fn the_wave_is_that_of_the_shown_frame_which_is_near_the_given_one() {
+        let swept = [(0, 16), (2, 16), (0, 48), (2, 48), (2, 96)];
+        let swept = swept.map(|(layers, tile)| (Method::Sweep(sweep(layers, tile)), ROUNDING));
+        // The pixels of a network do not depend on what else is computed.
+        let trained = networks().map(|network| (Method::Network(network), 0.0));
+        for (which, (method, rounding)) in swept.into_iter().chain(trained).enumerate() {
+            let plan = plan_of(method);
             let mut scratch = keeping(&plan);
             for i in 0..6_u32 {
                 let frame = scene(20 + 4 * i as usize, [0.004, 0.01], i);
                 let past = PAST.filter(|_| i > 0);
                 let field = field(&plan, past, &frame, &mut scratch);
-                let shown = scratch.standing.as_ref().unwrap().frame.clone();
-                let farthest = (field.iter().zip(anew(&plan, &shown))).map(|(a, b)| (a - b).norm());
-                let farthest = farthest.fold(0.0, f32::max);
-                assert!(farthest < ROUNDING, "{layers} {tile} {i}: {farthest}");
+                let apart = farthest(&field, &anew(&plan, shown(&scratch)));
+                assert!(apart <= rounding, "{which} {i}: {apart}");
                 if i == 0 {
-                    assert!(shown == frame);
+                    assert!(*shown(&scratch) == frame);
                     continue;
                 }
                 let blocks = changed(&scratch);
-                assert!((1..12).contains(&blocks), "{layers} {i}: {blocks}");
+                assert!((1..12).contains(&blocks), "{which} {i}: {blocks}");
                 let wave = anew(&plan, &frame);
                 let squares: f32 = field.iter().zip(&wave).map(|(a, b)| (a - b).norm_sqr()).sum();
                 let error = (squares / wave.len() as f32).sqrt();
-                assert!(error < 0.03, "{layers} {i}: {error}");
+                assert!(error < 0.03, "{which} {i}: {error}");
             }
         }
+    }
+
+    /// Checks the automatic choice, which goes from the sweep to a network as depth gets soft, and back.
+    #[test]
+    fn another_method_computes_all() {
+        let [network, ..] = networks();
+        let plan = plan_of(Method::Auto(sweep(2, 16), network));
+        let mut scratch = keeping(&plan);
+        let sharp = scene(40, [0.0, 0.0], 1);
+        let mut soft = sharp.clone();
+        let depths = soft.planes_mut().1.iter_mut().enumerate();
+        depths.for_each(|(i, depth)| *depth = 0.5 + 0.3 * ((i % SIZE.width) as f32 / 9.0).sin());
+        let mut choices = Vec::new();
+        for frame in [&sharp, &sharp, &soft, &soft, &sharp, &sharp] {
+            let apart = farthest(&field(&plan, PAST, frame, &mut scratch), &anew(&plan, frame));
+            assert!(apart < ROUNDING, "{choices:?}: {apart}");
+            choices.push((scratch.is_swept(), changed(&scratch)));
+        }
+        let all = 6 * 4;
+        let expected = [(true, all), (true, 0), (false, all), (false, 0), (true, all), (true, 0)];
+        assert_eq!(choices, expected);
     }
 
     #[test]
@@ -369,8 +433,7 @@ mod tests {
             frame.planes_mut().0.iter_mut().for_each(|a| *a *= 0.99);
             field(&plan, PAST, &frame, &mut scratch);
             most = most.max(changed(&scratch));
-            let shown = &scratch.standing.as_ref().unwrap().frame;
-            let farthest = (shown.values().0.iter().zip(frame.values().0)).map(|(a, b)| (a - b).abs());
+            let farthest = (shown(&scratch).values().0.iter().zip(frame.values().0)).map(|(a, b)| (a - b).abs());
             assert!(farthest.fold(0.0, f32::max) < 0.06);
         }
         assert!(most > 12, "{most}");
@@ -399,13 +462,18 @@ mod tests {
     #[test]
     fn all_instruction_sets_and_numbers_of_threads_keep_the_same() {
         let frames = [0, 1, 2].map(|i| scene(30 + 5 * i as usize, [0.012, 0.03], i));
-        let run = |plan: &SweepPlan| {
+        let run = |plan: &MethodPlan| {
             let mut scratch = keeping(plan);
             frames.each_ref().map(|frame| field(plan, PAST, frame, &mut scratch))
         };
         let expected = run(&plan(2));
         for isa in phasefront_kernels::Isa::fir() {
-            if let Some(plan) = plan(2).on(isa) {
+            let swept = SweepPlan::new(SIZE, &display(), sweep(2, 16), 0.0).unwrap();
+            if let Some(swept) = swept.on(isa) {
+                let plan = MethodPlan {
+                    plan: Plan::Sweep(Box::new(swept)),
+                    ..plan(2)
+                };
                 assert!(run(&plan) == expected, "{isa}");
             }
         }
