@@ -14,7 +14,7 @@ use crate::frame::{Past, RgbdFrame};
 use crate::method::mean_phase::{MeanPhase, remove_mean_phase};
 use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::method::seeded::{SeededPlan, SeededScratch};
-use crate::method::standing::Standing;
+use crate::method::standing::{Changed, Standing};
 use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
 use crate::method::wave::{Pixels, Wave};
 use crate::runtime::cancel::Cancel;
@@ -388,15 +388,15 @@ impl MethodPlan {
             standing.show(frame, past.is_some());
             (shown, changes) = (&standing.frame, Some(&standing.changes));
         }
-        let (is_whole, pixels, reach) = match self.plan.chosen(of_plan) {
+        // The sweep also knows which hidden surfaces have changed.
+        let (is_whole, pixels, of_surfaces, reach) = match self.plan.chosen(of_plan) {
             Chosen::Sweep(plan, scratch) => {
                 let is_whole = plan.sweep_where(changes, shown, scratch)?;
-                (is_whole, scratch.wave(), plan.reach())
+                (is_whole, scratch.wave(), Some(scratch.changes()), plan.reach())
             }
             Chosen::Network(plan, scratch, kept) => {
-                let reach = plan.reach().unwrap_or(self.size.width.max(self.size.height));
                 let is_whole = plan.field_where(changes, shown, kept, scratch)?;
-                (is_whole, Pixels::Float(kept), reach)
+                (is_whole, Pixels::Float(kept), None, plan.reach().unwrap_or_default())
             }
             Chosen::Seeded(..) => panic!("a seeded network makes no wave"),
         };
@@ -404,21 +404,24 @@ impl MethodPlan {
         let own_turn = |colour| pixels.turn_of(colour, size);
         let mut turns = [Complex32::ONE; 3];
         let is_turned = is_whole && mean_phase == MeanPhase::Removed;
-        let changed = match standing {
+        let mut changed = None;
+        match standing {
             Some(standing) => {
                 standing.finish(is_whole);
                 if is_turned {
                     turns = standing.turns(own_turn);
                 }
-                Some(standing.changed(reach))
+                changed = Some(Changed {
+                    changes: of_surfaces.unwrap_or(&standing.changes),
+                    reach,
+                    number: standing.number(),
+                });
             }
-            None => {
-                if is_turned {
-                    (turns[..self.colours].iter_mut().enumerate()).for_each(|(colour, turn)| *turn = own_turn(colour));
-                }
-                None
+            None if is_turned => {
+                (turns[..self.colours].iter_mut().enumerate()).for_each(|(colour, turn)| *turn = own_turn(colour));
             }
-        };
+            None => {}
+        }
         Ok(Wave {
             pixels,
             size,

@@ -36,13 +36,29 @@ const DEPTH_WEIGHT: f32 = 0.05;
 const TURN_TOLERANCE: f32 = 2.0 * PI / 64.0;
 
 /// The blocks of a frame that have changed.
+#[derive(Clone)]
 pub(crate) struct Changes {
-    blocks: Vec<bool>,
+    /// The blocks, row by row.
+    pub(super) blocks: Vec<bool>,
     /// The number of blocks across the frame.
-    across: usize,
+    pub(super) across: usize,
 }
 
 impl Changes {
+    /// Returns a frame of `size` in which all has changed.
+    pub(super) fn all(size: Size) -> Self {
+        let (across, down) = (size.width.div_ceil(BLOCK), size.height.div_ceil(BLOCK));
+        Changes {
+            blocks: vec![true; across * down],
+            across,
+        }
+    }
+
+    /// Returns whether a pixel is in a block that has changed.
+    pub(super) fn contains(&self, y: usize, x: usize) -> bool {
+        self.blocks[y / BLOCK * self.across + x / BLOCK]
+    }
+
     /// Returns whether a block in these rows of pixels has changed. The rows may go beyond the frame.
     pub(crate) fn any(&self, rows: Range<usize>) -> bool {
         let down = self.blocks.len() / self.across;
@@ -79,9 +95,9 @@ impl Changes {
 /// The pixels in which a wave differs from the wave before, apart from the factor of its mean phase.
 #[derive(Clone, Copy)]
 pub(crate) struct Changed<'a> {
-    changes: &'a Changes,
+    pub(super) changes: &'a Changes,
     /// How far beside a changed block pixels differ.
-    reach: usize,
+    pub(super) reach: usize,
     /// The number of waves so far. The wave before has the number before.
     pub(crate) number: u64,
 }
@@ -119,13 +135,9 @@ pub(super) struct Standing {
 impl Standing {
     /// Creates memory for frames of `colours` and `size` for a display whose sweep has `planes`.
     pub(super) fn new(colours: usize, size: Size, planes: usize) -> Self {
-        let (across, down) = (size.width.div_ceil(BLOCK), size.height.div_ceil(BLOCK));
         Standing {
             frame: RgbdFrame::black(colours, size),
-            changes: Changes {
-                blocks: vec![true; across * down],
-                across,
-            },
+            changes: Changes::all(size),
             planes,
             is_whole: false,
             keeps: false,
@@ -171,13 +183,9 @@ impl Standing {
         }
     }
 
-    /// Returns what the last frame has changed, where a changed pixel changes others within `reach`.
-    pub(super) fn changed(&self, reach: usize) -> Changed<'_> {
-        Changed {
-            changes: &self.changes,
-            reach,
-            number: self.number,
-        }
+    /// Returns the number of shown frames.
+    pub(super) fn number(&self) -> u64 {
+        self.number
     }
 
     /// Returns the factor that removes the mean phase of each colour of the wave, where `own` is that of the wave alone.

@@ -188,6 +188,8 @@ pub struct SweepScratch {
     tiles: Workers<TileScratch>,
     /// The swept wave, (C, H, W).
     wave: Vec<Pixel>,
+    /// The blocks whose visible or hidden surfaces have changed since the frame before.
+    changes: Changes,
     cancel: Cancel,
 }
 
@@ -200,6 +202,11 @@ impl SweepScratch {
     /// Returns the swept wave, (C, H, W).
     pub(super) fn wave(&self) -> Pixels<'_> {
         Pixels::Fixed(&self.wave)
+    }
+
+    /// Returns the blocks whose light the last call of [`SweepPlan::sweep_where`] with changes has changed.
+    pub(super) fn changes(&self) -> &Changes {
+        &self.changes
     }
 }
 
@@ -293,13 +300,14 @@ impl SweepPlan {
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
             wave: vec![Pixel::ZERO; self.filters.len() * size],
+            changes: Changes::all(self.size),
             cancel: Cancel::default(),
         }
     }
 
-    /// Returns how far from a pixel the wave depends on its colour and depth.
+    /// Returns how far the light of a pixel spreads.
     pub(super) fn reach(&self) -> usize {
-        self.layout.reach() + self.hidden.dependence()
+        self.layout.reach()
     }
 
     /// Writes the hologram of `frame`, without the carrier, at [`SweepPlan::z_m`] into `field`, (C, H, W). Allocates
@@ -345,6 +353,7 @@ impl SweepPlan {
             hidden,
             tiles,
             wave,
+            changes: of_surfaces,
             cancel,
         } = scratch;
         let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
@@ -362,8 +371,15 @@ impl SweepPlan {
                 );
             });
         let layers = self.sweep.hidden_layers;
-        if layers > 0 {
-            self.hidden.find_where(changed, depth, sources, hidden);
+        let affected = changes.map(|changes| {
+            of_surfaces.blocks.copy_from_slice(&changes.blocks);
+            if layers > 0 {
+                (self.hidden).find_where(changes, of_surfaces, depth, sources, hidden);
+            }
+            &*of_surfaces
+        });
+        if affected.is_none() && layers > 0 {
+            self.hidden.find(depth, sources, hidden);
         }
         let surfaces = Surfaces {
             rgb,
@@ -382,8 +398,8 @@ impl SweepPlan {
                 return;
             }
             let mut tile = Tile::of(&self.layout, self.fir, surfaces, index);
-            if let Some(changes) = changes {
-                let Some([rows, columns]) = changes.affected([&tile.rows, &tile.columns], reach) else {
+            if let Some(affected) = affected {
+                let Some([rows, columns]) = affected.affected([&tile.rows, &tile.columns], reach) else {
                     return;
                 };
                 // Tiles start at whole registers.

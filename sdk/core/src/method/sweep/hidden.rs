@@ -12,17 +12,15 @@
 
 use super::workers::Workers;
 use crate::Size;
+use crate::method::standing::{BLOCK, Changes};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The difference in normalized depth above which two pixels are on different surfaces.
 pub const JUMP: f32 = 0.02;
 /// The index of no source.
 pub const NOTHING: u32 = u32::MAX;
 /// The number of rows of a task.
-const BAND: usize = 32;
-/// The number of pixels that are skipped together if nothing is hidden.
-const BLOCK: usize = 16;
+const BAND: usize = 2 * BLOCK;
 /// The depth of no source, which is not deeper than anything.
 const NO_DEPTH: f32 = -1.0;
 
@@ -176,7 +174,7 @@ pub struct HiddenScratch {
 struct Work {
     /// The sources above or below the current row for each column.
     columns: Vec<Found>,
-    /// Whether any column of each [`BLOCK`] has found a source.
+    /// Whether any column of each [`BLOCK`] has found a source. The others are skipped together.
     busy: Vec<bool>,
     /// The layers of a band, (BAND, W).
     layers: Vec<Layers>,
@@ -190,7 +188,7 @@ impl Hidden {
     }
 
     /// Returns how far from a pixel the depth affects its sources: one pixel beyond the farthest source.
-    pub(super) fn dependence(&self) -> usize {
+    fn dependence(&self) -> usize {
         self.reach + 1
     }
 
@@ -211,36 +209,58 @@ impl Hidden {
     /// # Panics
     /// Panics if a length is wrong.
     pub fn find(&self, depth: &[f32], sources: &mut [u32], scratch: &mut HiddenScratch) {
-        self.find_where(|_| true, depth, sources, scratch);
+        self.check(depth, sources);
+        let (first, second) = sources.split_at_mut(self.height * self.width);
+        (first.par_chunks_mut(BAND * self.width))
+            .zip(second.par_chunks_mut(BAND * self.width))
+            .enumerate()
+            .for_each(|(band, layers)| {
+                (scratch.workers).with(|work| self.band(depth, band * BAND, layers.into(), None, work));
+            });
     }
 
-    /// Works like [`Self::find`], but keeps the sources of rows that depend on no row that has `changed`.
+    /// Works like [`Self::find`] where the frame has changed since the last call: rows that do not depend on a block of
+    /// `changes` keep their sources. Adds to `affected` the blocks with a pixel whose source is another one, or is in a
+    /// block of `changes`.
     pub(super) fn find_where(
         &self,
-        changed: impl Fn(Range<usize>) -> bool + Sync,
+        changes: &Changes,
+        affected: &mut Changes,
         depth: &[f32],
         sources: &mut [u32],
         scratch: &mut HiddenScratch,
     ) {
-        let size = self.height * self.width;
-        assert!(depth.len() == size && sources.len() == 2 * size);
-        let (first, second) = sources.split_at_mut(size);
+        self.check(depth, sources);
+        let (first, second) = sources.split_at_mut(self.height * self.width);
         (first.par_chunks_mut(BAND * self.width))
             .zip(second.par_chunks_mut(BAND * self.width))
+            .zip(affected.blocks.par_chunks_mut(BAND / BLOCK * changes.across))
             .enumerate()
             .filter(|(band, _)| {
                 let (top, around) = (band * BAND, self.dependence());
-                changed(top.saturating_sub(around)..top + BAND + around)
+                changes.any(top.saturating_sub(around)..top + BAND + around)
             })
-            .for_each(|(band, (first, second))| {
-                scratch.workers.with(|work| {
-                    self.band(depth, band * BAND, first, second, work);
-                });
+            .for_each(|(band, (layers, affected))| {
+                let known = Some((changes, affected));
+                (scratch.workers).with(|work| self.band(depth, band * BAND, layers.into(), known, work));
             });
     }
 
-    /// Finds the sources of the rows from `top` on that `first` and `second` hold.
-    fn band(&self, depth: &[f32], top: usize, first: &mut [u32], second: &mut [u32], work: &mut Work) {
+    fn check(&self, depth: &[f32], sources: &[u32]) {
+        let size = self.height * self.width;
+        assert!(depth.len() == size && sources.len() == 2 * size);
+    }
+
+    /// Finds the sources of the rows from `top` on that `of_layers` hold. If the changes of the frame are known, adds
+    /// those of the sources to the rows' blocks.
+    fn band(
+        &self,
+        depth: &[f32],
+        top: usize,
+        [first, second]: [&mut [u32]; 2],
+        known: Option<(&Changes, &mut [bool])>,
+        work: &mut Work,
+    ) {
         let (width, reach) = (self.width, self.reach as u32);
         let row = |y: usize| &depth[y * width..][..width];
         let rows = first.len() / width;
@@ -269,6 +289,22 @@ impl Hidden {
             step(columns, busy, row(y + 1), row(y), reach, layers, |x, d| {
                 (y + d as usize) * width + x
             });
+        }
+        if let Some((changes, affected)) = known {
+            for (y, layers) in layers.chunks_exact(width).enumerate() {
+                let before = first[y * width..].chunks(BLOCK).zip(second[y * width..].chunks(BLOCK));
+                let affected = &mut affected[y / BLOCK * changes.across..][..changes.across];
+                for ((affected, layers), (first, second)) in affected.iter_mut().zip(layers.chunks(BLOCK)).zip(before) {
+                    let now = layers.iter().map(|layers| layers.source);
+                    let mut both = now.zip(first.iter().zip(second));
+                    *affected |= both.any(|(now, (first, second))| {
+                        let is_changed = |source: u32| {
+                            source != NOTHING && changes.contains(source as usize / width, source as usize % width)
+                        };
+                        now != [*first, *second] || now.into_iter().any(is_changed)
+                    });
+                }
+            }
         }
         for ((first, second), layers) in first.iter_mut().zip(second).zip(layers) {
             [*first, *second] = layers.source;
@@ -399,4 +435,59 @@ pub fn reference(depth: &[f32], size: Size, reach: usize) -> Vec<u32> {
         }
     }
     sources
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size { width: 75, height: 101 };
+
+    /// Checks the sources after a change, and the blocks that are affected, value by value.
+    #[test]
+    fn a_change_is_found_in_all_blocks_that_it_affects() {
+        let mut state = 1u32;
+        let mut random = |most: usize| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) as usize % most
+        };
+        let mut paint = |depth: &mut [f32], side: usize| {
+            let (top, left) = (random(SIZE.height), random(SIZE.width));
+            let (down, across, value) = (1 + random(side), 1 + random(side), random(10) as f32 / 10.0);
+            for row in depth.chunks_exact_mut(SIZE.width).skip(top).take(down) {
+                row[left..].iter_mut().take(across).for_each(|depth| *depth = value);
+            }
+        };
+        let size = SIZE.pixels();
+        let mut more = 0;
+        for _ in 0..40 {
+            let mut depth = vec![0.9; size];
+            (0..6).for_each(|_| paint(&mut depth, 50));
+            let (plan, mut sources) = (Hidden::new(SIZE, 21), vec![NOTHING; 2 * size]);
+            let mut scratch = plan.scratch();
+            plan.find(&depth, &mut sources, &mut scratch);
+            let before = (depth.clone(), sources.clone());
+            paint(&mut depth, 12);
+
+            let mut changes = Changes::all(SIZE);
+            let block = |at: usize| at / SIZE.width / BLOCK * changes.across + at % SIZE.width / BLOCK;
+            let mut blocks = vec![false; changes.blocks.len()];
+            (0..size).for_each(|at| blocks[block(at)] |= depth[at] != before.0[at]);
+            let expected = reference(&depth, SIZE, 21);
+            let mut affected = blocks.clone();
+            for (i, (now, then)) in expected.iter().zip(&before.1).enumerate() {
+                let is_of_changed = *now != NOTHING && blocks[block(*now as usize)];
+                affected[block(i % size)] |= now != then || is_of_changed;
+            }
+            more += usize::from(affected != blocks);
+
+            let mut found = Changes::all(SIZE);
+            found.blocks.copy_from_slice(&blocks);
+            changes.blocks.copy_from_slice(&blocks);
+            plan.find_where(&changes, &mut found, &depth, &mut sources, &mut scratch);
+            assert!(sources == expected);
+            assert!(found.blocks == affected);
+        }
+        assert!(more > 10, "{more}");
+    }
 }
