@@ -218,8 +218,8 @@ impl MethodScratch {
         self.of_plan.is_swept()
     }
 
-    /// Returns whether [`MethodPlan::wave_as_chosen`] works for the chosen frame: the plane sweep makes it, or a network
-    /// that keeps what stands still.
+    /// Returns whether [`MethodPlan::wave_as_chosen`] works for the chosen frame: the plane sweep makes it, or a
+    /// network that keeps what stands still.
     pub(crate) fn makes_waves(&self) -> bool {
         self.of_plan.makes_waves()
     }

@@ -463,7 +463,13 @@ fn only_what_is_needed_is_computed() {
             width: size.width.div_ceil(side),
             height: size.height.div_ceil(side),
         };
-        for needed in [[3..4, 200..201], [11..33, 17..150], [40..41, 300..301], [0..41, 0..301], [7..30, 0..90]] {
+        for needed in [
+            [3..4, 200..201],
+            [11..33, 17..150],
+            [40..41, 300..301],
+            [0..41, 0..301],
+            [7..30, 0..90],
+        ] {
             let rows = InRectangle {
                 input: &input,
                 size,
@@ -478,7 +484,10 @@ fn only_what_is_needed_is_computed() {
                 for (at, (part, whole)) in part.iter().zip(whole).enumerate() {
                     let (y, x) = (at / size.width % size.height, at % size.width);
                     let is_needed = down.contains(&y) && across.contains(&x);
-                    assert!(*part == if is_needed { *whole } else { f32::INFINITY }, "{what} ({y}, {x})");
+                    assert!(
+                        *part == if is_needed { *whole } else { f32::INFINITY },
+                        "{what} ({y}, {x})"
+                    );
                 }
             };
             for isa in Isa::int8() {

@@ -81,7 +81,10 @@ impl Changes {
                 continue;
             }
             let changed = (blocks.iter().enumerate()).filter(|(_, changed)| **changed);
-            for of_column in changed.map(|(column, _)| within(column, columns)).filter(|of| !of.is_empty()) {
+            for of_column in changed
+                .map(|(column, _)| within(column, columns))
+                .filter(|of| !of.is_empty())
+            {
                 all = Some(match &all {
                     Some([down, across]) => [join(down, &of_row), join(across, &of_column)],
                     None => [of_row.clone(), of_column],
@@ -188,8 +191,8 @@ impl Standing {
         self.number
     }
 
-    /// Returns the factor that removes the mean phase of each colour of the wave, where `own` is that of the wave alone.
-    /// It stays as it was while its phase is within [`TURN_TOLERANCE`] of the wave's own.
+    /// Returns the factor that removes the mean phase of each colour of the wave, where `own` is that of the wave
+    /// alone. It stays as it was while its phase is within [`TURN_TOLERANCE`] of the wave's own.
     pub(super) fn turns(&mut self, own: impl Fn(usize) -> Complex32) -> [Complex32; 3] {
         if !self.keeps || self.changes.blocks.contains(&true) {
             let colours = self.frame.colours();
