@@ -328,9 +328,9 @@ impl Encoder {
         columns.start.saturating_sub(reach) / 2 * 2..(columns.end + reach).min(self.width)
     }
 
-    /// Processes each row of `source`, or the parts of rows that `changed` affects. Calls `then` with the place in the
-    /// stack at which a part begins, in an even column, with the part, and with its place in `out`, which has a value for
-    /// each pixel or, if nothing is given as changed, for each row.
+    /// Processes each row of `source`, or the part of each row that `changed` affects. Calls `then` with the index in
+    /// the stack at which the part begins, in an even column, with the part, and with its values in `out`. `out` has a
+    /// value for each pixel or, without `changed`, for each row.
     fn rows<T: Send>(
         &self,
         source: Source<'_>,
