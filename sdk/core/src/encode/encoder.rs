@@ -211,8 +211,8 @@ impl Encoder {
         !self.is_phase && !self.prefilter.is_of_whole_field()
     }
 
-    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, only the pixels that differ are computed, and
-    /// `levels` hold those of the wave before at the same scale and turns.
+    /// Encodes `wave` like [`Self::encode_levels`]. If `changed` is given, only the pixels that differ are computed,
+    /// and `levels` hold those of the wave before at the same scale and turns.
     ///
     /// # Panics
     /// Panics if the wave does not have C·H·W values, or if this encoder takes no waves.
