@@ -3,8 +3,8 @@ import { Frame, Network, Session, load } from "/phasefront/phasefront.js";
 
 const [WIDTH, HEIGHT] = [640, 480];
 
-/** Returns a frame of a ball in front of a striped wall. */
-export function frame() {
+/** Returns frame `i` of a ball in front of a striped wall, which `moves` or stands. */
+export function frame(i = 0, moves = false) {
   const data = new Uint8Array(4 * WIDTH * HEIGHT);
   for (let y = 0; y < HEIGHT; y++) {
     for (let x = 0; x < WIDTH; x++) {
@@ -14,10 +14,11 @@ export function frame() {
   }
   const metres = Float32Array.from({ length: 160 * 120 }, (_, i) => {
     const [x, y] = [i % 160, Math.floor(i / 160)];
-    const r = Math.hypot(x - 70, y - 60) / 30;
+    const r = Math.hypot(x - 70 - (moves ? 2 * i : 0), y - 60) / 30;
     return r < 1 ? 0.6 - 0.15 * Math.sqrt(1 - r * r) : 1.2 + (0.5 * x) / 160;
   });
-  return new Frame({ width: WIDTH, height: HEIGHT, data }, { width: 160, height: 120, data: metres });
+  const timestamp = moves ? 33_000 * (i + 1) : undefined;
+  return new Frame({ width: WIDTH, height: HEIGHT, data }, { width: 160, height: 120, data: metres }, { timestamp });
 }
 
 /** Returns the best times by method. */
@@ -31,13 +32,16 @@ export async function run() {
     sweep: { target, method: { kind: "sweep" } },
     "automatic, 6 mm away": { target: { ...target, offsetMm: 6 } },
     "natural focus": { target, focus: { kind: "natural" } },
+    "automatic, video of a moving ball": { target },
+    "natural focus, video of a moving ball": { target, focus: { kind: "natural" } },
   };
-  const said = frame();
   for (const [name, options] of Object.entries(all)) {
-    const session = new Session(options);
+    const moves = name.includes("video");
+    const session = new Session(options, moves ? "video" : "image");
     const view = new ImageData(WIDTH, HEIGHT);
     const best = { frameMs: Infinity, previewMs: Infinity };
     for (let i = 0; i < 20; i++) {
+      const said = frame(i, moves);
       const before = performance.now();
       const hologram = session.process(said);
       const made = performance.now();

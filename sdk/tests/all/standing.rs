@@ -3,7 +3,7 @@ use crate::camera;
 
 use camera::{Scene, frame};
 use phasefront::input::{DepthFormat, DepthRange};
-use phasefront::{Brightness, Display, ImageSession, Method, SessionOptions, Size, Sweep, VideoSession};
+use phasefront::{Brightness, Display, ImageSession, Method, Network, SessionOptions, Size, Sweep, VideoSession};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -13,6 +13,10 @@ const SIZE: Size = Size { width: 193, height: 77 };
 fn options(keep_standing: bool) -> SessionOptions {
     let display = Display::default().with_size(SIZE).unwrap();
     let method = Method::Sweep(Sweep::for_display(&display));
+    options_of(display, method, keep_standing)
+}
+
+fn options_of(display: Display, method: Method, keep_standing: bool) -> SessionOptions {
     let mut options = SessionOptions::new(display, method);
     options.keep_standing = keep_standing;
     options.encoder.brightness = Brightness::Fixed(1.0);
@@ -41,18 +45,28 @@ fn levels(session: &VideoSession, time: u64, scene: &Scene) -> Vec<u8> {
 
 #[test]
 fn a_camera_s_noise_stands_still_by_default_and_changes_levels_by_choice() {
-    let (keeping, anew) = (options(true), options(false));
-    let (keeping, anew) = (VideoSession::new(keeping).unwrap(), VideoSession::new(anew).unwrap());
-    let first = levels(&keeping, 0, &noisy(40, 0));
-    assert!(first == levels(&anew, 0, &noisy(40, 0)));
+    let display = Display::default().with_size(SIZE).unwrap();
+    let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx")).unwrap();
+    for method in [
+        Method::Sweep(Sweep::for_display(&display)),
+        Method::Network(network.into()),
+    ] {
+        let session = |keeps| VideoSession::new(options_of(display.clone(), method.clone(), keeps)).unwrap();
+        check_noise(&session(true), &session(false));
+    }
+}
+
+fn check_noise(keeping: &VideoSession, anew: &VideoSession) {
+    let first = levels(keeping, 0, &noisy(40, 0));
+    assert!(first == levels(anew, 0, &noisy(40, 0)));
     for time in 1..4 {
         let scene = noisy(40, time);
-        assert!(levels(&keeping, time, &scene) == first, "{time}");
-        assert!(levels(&anew, time, &scene) != first, "{time}");
+        assert!(levels(keeping, time, &scene) == first, "{time}");
+        assert!(levels(anew, time, &scene) != first, "{time}");
     }
     // The square moves: where it was and where it is, the levels are those of the new frame.
     let moved = noisy(120, 9);
-    let (kept, whole) = (levels(&keeping, 4, &moved), levels(&anew, 4, &moved));
+    let (kept, whole) = (levels(keeping, 4, &moved), levels(anew, 4, &moved));
     let differ = kept
         .iter()
         .zip(&whole)
@@ -61,7 +75,7 @@ fn a_camera_s_noise_stands_still_by_default_and_changes_levels_by_choice() {
     assert!(kept != first && differ < kept.len() / 50, "{differ} of {}", kept.len());
     // After a pause nothing is kept.
     let later = noisy(120, 10);
-    assert!(levels(&keeping, 100, &later) == levels(&anew, 100, &later));
+    assert!(levels(keeping, 100, &later) == levels(anew, 100, &later));
 }
 
 #[test]

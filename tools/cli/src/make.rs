@@ -32,7 +32,7 @@ impl HologramRequest {
     pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<HologramResult> {
         if let Some(lens) = &display.lens {
             let Image::Rgbd(frame) = image else {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "the focal plane of a lens takes --rgb with --depth, no layered depth image".into(),
                 ));
             };
@@ -48,7 +48,7 @@ impl HologramRequest {
         if device.is_some()
             && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.image.ldi.is_some())
         {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--backend gpu runs --method network, sweep and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
                     .into(),
             ));

@@ -111,7 +111,7 @@ impl DisplayFlags {
         match (&self.display, self.offset_mm) {
             (Some(_), _) => Ok(Some(self.read_with_lens()?)),
             (None, None) => Ok(None),
-            (None, Some(_)) => Err(Error::Input(
+            (None, Some(_)) => Err(Error::Usage(
                 "--offset-mm goes with --display; a hologram file says its own offset".into(),
             )),
         }
@@ -137,7 +137,7 @@ impl DisplayFlags {
         };
         if let Some(mm) = self.offset_mm {
             if file.lens.is_some() {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "--offset-mm is for pictures about the modulator, and this display's lies in the focal plane of a lens"
                         .into(),
                 ));
@@ -227,10 +227,10 @@ impl EncoderName {
             (Some((.., encoding)), None) => encoding.clone(),
             (None, Some(network)) => Encoding::Deep(network),
             (None, None) => {
-                return Err(Error::Input("--encoder deep needs --prefilter".into()));
+                return Err(Error::Usage("--encoder deep needs --prefilter".into()));
             }
             (Some((name, ..)), Some(_)) => {
-                return Err(Error::Input(format!(
+                return Err(Error::Usage(format!(
                     "--prefilter goes with --encoder deep, not with {name}"
                 )));
             }
@@ -248,7 +248,7 @@ impl EncoderName {
 pub fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
     match flags.iter().find(|(_, given, used, _)| *given && !*used) {
         None => Ok(()),
-        Some((flag, .., with)) => Err(Error::Input(format!(
+        Some((flag, .., with)) => Err(Error::Usage(format!(
             "{flag} goes with {with}; here it would change nothing, leave it out"
         ))),
     }

@@ -10,6 +10,9 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// The exit code of a wrong command line, which is also clap's.
+const USAGE: u8 = 2;
+
 /// The flags of every command.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "General")]
@@ -49,7 +52,10 @@ impl Common {
             Err(e) => {
                 // If the message cannot be printed, the exit code still reports the failure.
                 let _ = writeln!(std::io::stderr(), "error: {e}");
-                ExitCode::FAILURE
+                match e {
+                    Error::Usage(_) => ExitCode::from(USAGE),
+                    _ => ExitCode::FAILURE,
+                }
             }
         }
     }

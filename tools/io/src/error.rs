@@ -19,6 +19,9 @@ pub enum Error {
     /// A value, shape or scene cannot be used as requested.
     #[error("{}", Line(.0))]
     Input(String),
+    /// The command line is wrong: flags that do not go together, or that would change nothing.
+    #[error("{}", Line(.0))]
+    Usage(String),
     /// The core returned an error.
     #[error(transparent)]
     Core(#[from] phasefront::Error),

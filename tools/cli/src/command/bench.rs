@@ -121,7 +121,7 @@ impl Bench {
         }
         if let Some(name) = &self.kernels {
             let limit = Isa::named(name).and_then(Isa::limit);
-            limit.map_err(|why| Error::Input(format!("--kernels: {why}")))?;
+            limit.map_err(|why| Error::Usage(format!("--kernels: {why}")))?;
         }
         let on_gpu = self.backend.device()?.is_some();
         check_used(&[
@@ -160,7 +160,7 @@ impl Bench {
     /// Returns the time for each combination, if it is given.
     fn budget(&self) -> Result<Option<Duration>> {
         let budget = self.seconds.map(Duration::try_from_secs_f64).transpose();
-        budget.map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))
+        budget.map_err(|_| Error::Usage("--seconds must be a number of seconds, 0 or more".into()))
     }
 
     /// Measures sessions on each scene, before a camera that stands and one that moves.
@@ -197,7 +197,7 @@ impl Bench {
     fn scenes(&self, size: Size) -> Result<Vec<Scene>> {
         let (colours, depths) = (&self.rgb, &self.depth);
         if colours.len() != depths.len() {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "{} --rgb and {} --depth are given; every picture needs both",
                 colours.len(),
                 depths.len()
@@ -235,7 +235,7 @@ impl Bench {
             methods.push(Method::Network(bench::random::network(layers)?));
         }
         if methods.is_empty() {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "no int8 network of that many layers is bundled; `phasefront bench` without --layers shows which do"
                     .into(),
             ));

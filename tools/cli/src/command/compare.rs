@@ -31,7 +31,7 @@ pub(crate) struct Compare {
 impl Compare {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if self.z_mm.is_some() && !hologram::is_hologram(&self.a)? && !hologram::is_hologram(&self.b)? {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--z-mm is the focus of holograms; these are two images, leave it out".into(),
             ));
         }

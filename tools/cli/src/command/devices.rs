@@ -28,7 +28,7 @@ impl Devices {
         if let Some(name) = &self.device {
             let file = display::find_display(name)?;
             if self.z_mm.is_some() && file.lens.is_some() {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "--z-mm is for pictures about the modulator, and this display's lies in the focal plane of a lens"
                         .into(),
                 ));

@@ -51,7 +51,7 @@ impl Hologram {
             return self.stills(json, pictures, flags);
         }
         if self.resume || self.overwrite {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--resume and --overwrite go with folders of pictures, as --rgb DIR --depth DIR; a file is replaced"
                     .into(),
             ));

@@ -57,7 +57,7 @@ const MOST_NATURAL: u16 = 24;
 impl MultiplexCommand {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if self.output.is_none() && self.packed.is_none() && !self.judge {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "give -o, --packed or --judge: where the maps go, or whether to judge them".into(),
             ));
         }
@@ -130,13 +130,13 @@ impl MultiplexCommand {
             ("--no-feedback", self.no_feedback, coherent, with),
         ])?;
         if self.hologram.encoder.focus()? == (Focus::Natural { steps: 0 }) {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--focus-steps 0 is for one map, by a network; several maps of natural focus take at least 1 joint step"
                     .into(),
             ));
         }
         if !coherent && self.maps > MOST_NATURAL {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "--focus natural makes at most {MOST_NATURAL} maps, all at once; --maps is {}",
                 self.maps
             )));
@@ -172,7 +172,7 @@ impl MultiplexCommand {
 
     fn frame_of(&self, display: &DisplayFile, maps: &[Map]) -> Result<packed::Image> {
         let Packing::BitPlanes(cells) = &display.device.packing else {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--packed is for modulators whose frames are bit planes; this one's are not, -o writes the maps".into(),
             ));
         };

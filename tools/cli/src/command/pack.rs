@@ -45,7 +45,7 @@ impl Pack {
                 packed.map_err(|e| Error::file(hologram, e))?
             }
             (_, Packing::BitPlanes(_)) if self.colour.is_none() && colours > 1 => {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "several holograms in one frame need --colour, which of theirs is shown".into(),
                 ));
             }

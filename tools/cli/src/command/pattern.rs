@@ -122,7 +122,7 @@ impl Pattern {
     /// Checks that neighbouring pixels can show the pattern: their phases may differ by half a turn.
     fn check(&self, display: &Display) -> Result<()> {
         match self {
-            Pattern::Grating { period, .. } if !(period.abs() >= 2.0 && period.is_finite()) => Err(Error::Input(
+            Pattern::Grating { period, .. } if !(period.abs() >= 2.0 && period.is_finite()) => Err(Error::Usage(
                 format!("--period {period}: pixels show periods of 2 or more, or of -2 or less"),
             )),
             Pattern::Lens { focal_mm, .. } => {
@@ -132,7 +132,7 @@ impl Pattern {
                 if focal_mm.is_finite() && focal_mm.abs() >= least_mm {
                     return Ok(());
                 }
-                Err(Error::Input(format!(
+                Err(Error::Usage(format!(
                     "--focal-mm {focal_mm}: the pixels show lenses of {least_mm:.0} mm or more, or of -{least_mm:.0} mm or less"
                 )))
             }

@@ -121,7 +121,7 @@ enum BrightnessName {
 impl Video {
     pub(crate) fn run(mut self, threads: Option<NonZeroUsize>, json: bool, flags: &[Flag]) -> Result<()> {
         if self.output.is_none() && !self.live && !json {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "no output is asked for: -o DIR writes the holograms; --json alone reports how long they took".into(),
             ));
         }
@@ -370,7 +370,7 @@ impl Video {
 
 fn check_rate(rate_hz: Option<f64>) -> Result<()> {
     match rate_hz {
-        Some(rate) if !(rate.is_finite() && rate > 0.0 && rate <= 1000.0) => Err(Error::Input(format!(
+        Some(rate) if !(rate.is_finite() && rate > 0.0 && rate <= 1000.0) => Err(Error::Usage(format!(
             "--rate {rate}: it must lie above 0 and up to 1000"
         ))),
         _ => Ok(()),

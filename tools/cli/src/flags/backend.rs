@@ -32,7 +32,7 @@ impl BackendFlags {
         match (self.backend, &self.gpu) {
             (BackendName::Gpu, name) => Ok(Some(gpu::options(name.as_deref()))),
             (BackendName::Cpu, None) => Ok(None),
-            (BackendName::Cpu, Some(_)) => Err(Error::Input("--gpu needs --backend gpu".into())),
+            (BackendName::Cpu, Some(_)) => Err(Error::Usage("--gpu needs --backend gpu".into())),
         }
     }
 }

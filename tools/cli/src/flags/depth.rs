@@ -71,7 +71,7 @@ impl DepthFlags {
         match (self.near, self.far) {
             (None, None) => Ok(None),
             (Some(near), Some(far)) => Ok(Some((near, far))),
-            _ => Err(Error::Input("video needs both --near and --far, or neither".into())),
+            _ => Err(Error::Usage("video needs both --near and --far, or neither".into())),
         }
     }
 

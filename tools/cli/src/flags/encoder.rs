@@ -197,7 +197,7 @@ impl EncoderFlags {
         let deep = self.is_deep() || (by_name && self.encoder.is_none());
         if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
             let Some(pair) = phasefront_models::pair_for(display, precision.unwrap_or_default()) else {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "the bundled networks for the deep encoder are for an offset of 0 mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias, which displays more".into(),
                 ));
             };
@@ -205,7 +205,7 @@ impl EncoderFlags {
             return Ok((pair.hologram, encoder));
         }
         if by_name {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "--network {} brings its own --encoder, deep, and --prefilter; leave them out",
                 networks::DEEP
             )));

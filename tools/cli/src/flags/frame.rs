@@ -222,7 +222,7 @@ impl FrameFlags {
             (Some(colour), Some(depths)) if rgb && depth => of_two_folders(colour, depths).map(Some),
             (Some(colour), None) if rgb => of_one_folder(colour).map(Some),
             (Some(colour), Some(_)) if rgb && flat => of_one_folder(colour).map(Some),
-            (Some(_), Some(_)) if rgb || depth => Err(Error::Input(
+            (Some(_), Some(_)) if rgb || depth => Err(Error::Usage(
                 "--rgb and --depth name two files, or two folders of files with equal names".into(),
             )),
             _ => Ok(None),
@@ -276,7 +276,7 @@ impl FrameFlags {
                 (self.flat(&rgb, display)?, encoding)
             }
             (Some(_), Some(_), _) if self.z_mm.is_some() => {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "--z-mm is for --depth flat; a depth image has depths of its own".into(),
                 ));
             }
@@ -304,7 +304,7 @@ impl FrameFlags {
                 (self.of_photo(path, &photo, display)?, photo.colours.encoding)
             }
             _ => {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "an image is needed: --rgb with --depth, --depth flat or --depth-network, or --photo".into(),
                 ));
             }
@@ -346,14 +346,14 @@ impl FrameFlags {
     /// Makes the frame of a picture on one plane, at --z-mm.
     fn flat(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
         if self.seen.invert {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--invert has no meaning with --depth flat; --z-mm moves its plane".into(),
             ));
         }
         let (_, height, width) = rgb.dim();
         let (z_mm, half_mm) = (self.z_mm.unwrap_or(0.0), 500.0 * display.volume_depth_m());
         if !(-half_mm..=half_mm).contains(&z_mm) {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "--z-mm {z_mm} lies outside the volume, from {} mm to {half_mm} mm",
                 -half_mm
             )));
@@ -384,7 +384,7 @@ impl FrameFlags {
     fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
         let (_, height, width) = rgb.dim();
         let (Some(path), Some(network)) = (self.seen.network(), self.seen.open(Size { width, height })?) else {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--rgb needs --depth, --depth-network that estimates it (docs/depth.md says how to make one), or --depth flat for a picture on one plane"
                     .into(),
             ));

@@ -51,7 +51,7 @@ impl OutputFlags {
     pub(crate) fn declare(&self, display: &DisplayFile) -> Result<()> {
         if let Some(path) = &self.complex {
             if display.lens.is_some() {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "--complex is for pictures about the modulator; in the focal plane of a lens phases are searched, and there is no field"
                         .into(),
                 ));

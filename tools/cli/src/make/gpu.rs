@@ -24,7 +24,7 @@ impl HologramRequest {
         options: &DeviceOptions,
     ) -> Result<HologramResult> {
         if display.target.display.bits() > 8 {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--backend gpu makes levels of up to 8 bits; those of over 8 are the CPU's".into(),
             ));
         }

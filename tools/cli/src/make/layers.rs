@@ -113,7 +113,7 @@ impl HologramRequest {
     /// Reads the network of --network, which must take layers and suit `display`.
     fn network_for_layers(&self, display: &Display) -> Result<Arc<Network>> {
         let name = self.hologram.network.as_deref().ok_or_else(|| {
-            Error::Input("--method network with --ldi needs a --network for layered depth images".into())
+            Error::Usage("--method network with --ldi needs a --network for layered depth images".into())
         })?;
         let network = networks::network(name, self.hologram.precision.map(PrecisionName::precision))?;
         if !matches!(network.input(), InputKind::Ldi { .. }) {

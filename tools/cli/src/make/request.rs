@@ -200,7 +200,7 @@ impl HologramRequest {
         if let (Some(Method::Core(method)), Some(_)) = (self.method, &self.image.ldi)
             && method != CoreMethod::Network
         {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--method sweep and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
                     .into(),
             ));

@@ -137,7 +137,7 @@ fn what_natural_focus_cannot_do_is_one_line() {
             "trained for the display",
         ),
     ] {
-        let said = folder.fails(&call.split(' ').collect::<Vec<_>>(), 1);
+        let said = folder.fails_as(&call.split(' ').collect::<Vec<_>>(), &[1, 2]);
         assert!(said.contains(word) && said.lines().count() == 1, "{call}: {said}");
     }
     assert!(!folder.path("h.png").exists() && !folder.path("m").exists());

@@ -239,7 +239,7 @@ fn what_a_lens_does_not_take_is_told_in_one_line() {
     let hologram = ["hologram", "--rgb", "rgb.png", "--depth", "depth.png", "-o", "h.png"];
     folder.succeeds(&[&hologram[..], &["--display", "d.toml"]].concat());
     let fails = |arguments: &[&str], word: &str| {
-        let said = folder.fails(arguments, 1);
+        let said = folder.fails_as(arguments, &[1, 2]);
         assert!(
             said.contains(word) && said.trim().lines().count() == 1,
             "{arguments:?}: {said}"

@@ -73,7 +73,7 @@ fn patterns_send_light_where_they_say() {
     ] {
         let said = folder.fails(
             &[&["pattern"], pattern, &["--display", "d.toml", "-o", "p.png"]].concat(),
-            1,
+            2,
         );
         assert!(said.contains(word), "{said}");
     }

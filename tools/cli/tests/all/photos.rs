@@ -532,7 +532,7 @@ fn folders_of_photos_and_of_pictures_become_holograms_too() {
 
 /// Checks that the command fails in one line that has all `words`.
 fn refuses(folder: &Folder, arguments: &[&str], words: &[&str]) {
-    let errors = folder.fails(arguments, 1);
+    let errors = folder.fails_as(arguments, &[1, 2]);
     assert!(
         errors.lines().count() == 1 && words.iter().all(|word| errors.contains(word)),
         "{errors}"

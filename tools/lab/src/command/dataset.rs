@@ -88,7 +88,7 @@ impl Dataset {
         }
         let textures = match &self.textures {
             Some(_) if matches!(self.scenes_like, Like::Objects | Like::Hard | Like::Interiors) => {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "--textures is for --scenes-like photographs and varied".into(),
                 ));
             }

@@ -243,7 +243,7 @@ impl Evaluate {
         let mut shown = vec![Shown::complex()];
         for encoder in &self.encoder {
             let encoding = encoder.encoding(None).map_err(|_| {
-                Error::Input(format!(
+                Error::Usage(format!(
                     "--encoder {} needs the network that its pre-filter was trained with: --pair judges the bundled ones, `python -m phasefront_training evaluate-encoding` others",
                     encoder.name()
                 ))

@@ -27,7 +27,7 @@ pub(crate) struct Stacks {
 impl Stacks {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if !(1..=64).contains(&self.depths) {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "--depths is {}; it must lie in 1..=64",
                 self.depths
             )));

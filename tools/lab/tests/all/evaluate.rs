@@ -567,17 +567,17 @@ fn the_command_prints_figures_and_draws_the_worst() {
     refused(&["--pair", "--offset-mm", "3"], 1, "3 mm");
     refused(
         &["--method", "rgb", "--taps", "9"],
-        1,
+        2,
         "--taps goes with --method sweep or auto",
     );
     refused(
         &["--method", "rgb", "--planes", "9"],
-        1,
+        2,
         "--planes goes with a --method of waves",
     );
     refused(
         &["--method", "rgb", "--precision", "f32"],
-        1,
+        2,
         "--precision goes with a bundled --network, --pair or --method auto",
     );
     refused(&["--method", "rgb", "--dark-threshold", "0"], 2, "--encoder");

@@ -132,8 +132,8 @@ impl Aberration {
 
     fn check_colour(&self, display: &Display) -> Result<()> {
         match (display.colours(), self.colour) {
-            (1, Some(_)) => Err(Error::Input("--colour: the display has one laser; leave it out".into())),
-            (3, None) => Err(Error::Input(
+            (1, Some(_)) => Err(Error::Usage("--colour: the display has one laser; leave it out".into())),
+            (3, None) => Err(Error::Usage(
                 "--colour red, green or blue is needed for three lasers".into(),
             )),
             _ => Ok(()),

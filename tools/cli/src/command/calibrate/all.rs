@@ -61,7 +61,7 @@ pub(crate) struct All {
 impl All {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         if !self.capture.is_given() {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--capture is needed: a program that shows and photographs the patterns; without one, run each calibration by itself".into(),
             ));
         }
@@ -115,7 +115,7 @@ impl All {
     fn check(&self, target: &Target) -> Result<()> {
         let display = &target.display;
         if self.photographs.is_some() && target.panel.adds() {
-            return Err(Error::Input(
+            return Err(Error::Usage(
                 "--photographs: a learned model is for a panel without carrier, lens and flatness; leave one out"
                     .into(),
             ));

@@ -27,7 +27,7 @@ impl CaptureFlags {
     /// Returns the program, which starts with the first photograph that is missing.
     pub(super) fn later(&self) -> Result<Capture<'_>> {
         let timeout = Duration::try_from_secs_f64(self.capture_timeout_s)
-            .map_err(|e| Error::Input(format!("--capture-timeout-s {}: {e}", self.capture_timeout_s)))?;
+            .map_err(|e| Error::Usage(format!("--capture-timeout-s {}: {e}", self.capture_timeout_s)))?;
         Ok(Capture {
             flags: self,
             timeout,

@@ -76,7 +76,7 @@ impl Lut {
     /// Takes the photographs that are missing, if there is a program, and measures the curves.
     pub(super) fn calibrate(&self, capture: &mut Capture<'_>) -> Result<Told> {
         let (Some(captures), Some(output)) = (&self.captures, &self.output) else {
-            return Err(Error::Input("give --patterns, or --captures and -o".into()));
+            return Err(Error::Usage("give --patterns, or --captures and -o".into()));
         };
         let display = self.display.read_without_offset()?.target.display;
         if !capture.is_given() {

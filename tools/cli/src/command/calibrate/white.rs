@@ -61,7 +61,7 @@ impl White {
                 (format!("primaries = {rows:?}"), Balance::Primaries(rows))
             }
             _ => {
-                return Err(Error::Input(
+                return Err(Error::Usage(
                     "a reading is needed: --powers, --xy or --primaries".into(),
                 ));
             }

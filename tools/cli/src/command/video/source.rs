@@ -208,7 +208,7 @@ impl Input {
             return open_pipe(flags, numbers);
         }
         if flags.raw.is_some() {
-            return Err(Error::Input("--raw is for frames on stdin; give - as input".into()));
+            return Err(Error::Usage("--raw is for frames on stdin; give - as input".into()));
         }
         match is_film {
             true => open_film(flags, numbers),
@@ -233,7 +233,7 @@ fn open_folder(flags: &mut Video) -> Result<(Input, Size)> {
         None => sequence::of_folder(&flags.input)?,
         Some(pattern) => {
             let (colour, depth) = pattern.split_once(',').ok_or_else(|| {
-                Error::Input("--pairs takes two patterns with a comma between, as rgb_*.png,depth_*.png".into())
+                Error::Usage("--pairs takes two patterns with a comma between, as rgb_*.png,depth_*.png".into())
             })?;
             sequence::by_pattern(&flags.input, colour, depth)?
         }
@@ -293,7 +293,7 @@ impl Folder {
 /// Refuses near and far if depth has no metres.
 fn check_range(flags: &Video, numbers: DepthOptions) -> Result<()> {
     if flags.depth.range()?.is_some() && numbers.unit == DepthUnit::Normalized {
-        Err(Error::Input(
+        Err(Error::Usage(
             "--near and --far are metres and normalized depth has no unit; leave them out, or name the unit by --depth-unit"
                 .into(),
         ))
@@ -304,7 +304,7 @@ fn check_range(flags: &Video, numbers: DepthOptions) -> Result<()> {
 
 fn open_pipe(flags: &Video, numbers: DepthOptions) -> Result<(Input, Size)> {
     let Some(colour) = flags.raw else {
-        return Err(Error::Input(
+        return Err(Error::Usage(
             "raw frames on stdin need --raw WxH, the size of their colour".into(),
         ));
     };

@@ -14,7 +14,7 @@ impl Study {
     /// Studies the data set's scenes by the automatic choice, displayed by the default encoder.
     pub(super) fn enlarged(&self, json: bool) -> Result<()> {
         let Some(data) = &self.data else {
-            return Err(Error::Input("the study of enlarged depth needs --data".into()));
+            return Err(Error::Usage("the study of enlarged depth needs --data".into()));
         };
         let manifest = Manifest::read(data)?;
         let scenes = usize::from(self.scenes).min(manifest.scenes);
