@@ -743,8 +743,8 @@ enum PfStatus pf_options_set_depth_range(struct PfOptions *options, float near_m
 // Sets the confidence, in 0 to 1, below which readings are ignored. ARKit's "low" is 0, "medium" 0.5, "high" 1.
 enum PfStatus pf_options_set_least_confidence(struct PfOptions *options, float confidence);
 
-// Sets whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame
-// computes only the parts where colour or depth have changed by more than a camera's noise. The default is true.
+// Sets whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or
+// depth have changed by more than a camera's noise. The default is true.
 enum PfStatus pf_options_set_keep_standing(struct PfOptions *options, bool keep);
 
 // Sets the number of threads to compute with, 1 to 256. The default is as many as the device has.

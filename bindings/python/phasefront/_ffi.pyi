@@ -834,7 +834,7 @@ class SessionOptions:
         focus: How what is out of focus looks.
         depth_range: The distances that map to the ends of the volume.
         least_confidence: The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
-        keep_standing: Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes only the parts where colour or depth have changed by more than a camera's noise.
+        keep_standing: Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or depth have changed by more than a camera's noise.
         threads: The number of threads to compute with, at most 256; none for as many as the device has.
         most_pixels: The maximum number of pixels of a quality level and of the modulator; 8192×4096 by default. The memory of a session is a multiple of it.
         backend: The backend that computes frames.

@@ -5413,8 +5413,8 @@ public struct SessionOptions {
      */
     public var leastConfidence: Float
     /**
-     * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-     * only the parts where colour or depth have changed by more than a camera's noise.
+     * Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or
+     * depth have changed by more than a camera's noise.
      */
     public var keepStanding: Bool
     /**
@@ -5480,8 +5480,8 @@ public struct SessionOptions {
          * The confidence, in 0..=1, below which readings are ignored. ARKit's "low" is 0, "medium" ½, "high" 1.
          */leastConfidence: Float, 
         /**
-         * Whether what stands still in a video keeps its wave, where the plane sweep makes it on the CPU: a frame computes
-         * only the parts where colour or depth have changed by more than a camera's noise.
+         * Whether what stands still in a video keeps its wave on the CPU: a frame computes only the parts where colour or
+         * depth have changed by more than a camera's noise.
          */keepStanding: Bool = true, 
         /**
          * The number of threads to compute with, at most 256; none for as many as the device has.
