@@ -487,6 +487,7 @@ mod tests {
 
     /// At the default volume and on other displays.
     #[test]
+    #[ignore = "slow: 20 seconds of a core in software"]
     fn whole_frames_are_those_of_the_cpu() {
         let default = Display::default();
         let fine = Display::from_toml("pitch_um = 3.74\nvolume_depth_mm = 2").unwrap();

@@ -878,6 +878,7 @@ fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
 }
 
 #[test]
+#[ignore = "slow: 30 seconds of a core in software"]
 fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     let folder = Folder::new().with_frame();
     for method in ["network", "sweep"] {

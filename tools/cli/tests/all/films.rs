@@ -78,6 +78,7 @@ impl Folder {
 }
 
 #[test]
+#[ignore = "slow: 15 seconds of a core"]
 fn picture_n_of_a_film_of_varying_rate_has_depth_n() {
     let folder = frames(12);
     // Pictures 0, 1, 2, 3, 8, 9, 11 at their times of 30 pictures a second, as a phone in dim light gives them.
@@ -182,6 +183,7 @@ fn depth_in_false_colours_is_refused_as_stills_are() {
 }
 
 #[test]
+#[ignore = "slow: 10 seconds of a core"]
 fn a_margin_between_colour_and_depth_is_cut() {
     let folder = frames(3);
     folder.film("color", "colour.mkv", &LOSSLESS);
@@ -305,6 +307,7 @@ fn first_picture(path: &Path) -> RgbImage {
 }
 
 #[test]
+#[ignore = "slow: 15 seconds of a core"]
 fn films_of_high_dynamic_range_show_what_their_sdr_twins_show() {
     let folder = Folder::new();
     for (name, transfer) in [("hlg.mkv", "arib-std-b67"), ("pq.mkv", "smpte2084")] {

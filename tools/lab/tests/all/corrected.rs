@@ -279,6 +279,7 @@ fn too_many_propagations_are_refused_before_they_begin() {
 
 /// Compares interpolated kernels for coefficients that change over depth with a separate kernel for each plane.
 #[test]
+#[ignore = "slow: 10 seconds of a core"]
 fn coefficients_that_change_over_depth_are_followed() {
     let ldi = random_ldi(Size { width: 56, height: 48 }, 3);
     let display = Display::default();

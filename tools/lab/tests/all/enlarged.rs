@@ -55,6 +55,7 @@ fn depth_of_two_hundred_scenes_is_not_taken_for_enlarged() {
 }
 
 #[test]
+#[ignore = "slow: 10 seconds of a core"]
 fn factor_and_way_of_enlarged_scenes_are_found() {
     let ways = [Enlarging::Nearest, Enlarging::Bilinear, Enlarging::Bicubic];
     for kind in &KINDS {

@@ -244,6 +244,7 @@ fn colours_are_judged_by_light() {
 
 /// Tests that the holograms of a data set that corrects an aberration are all viewed through it (Fig. 8).
 #[test]
+#[ignore = "slow: 10 seconds of a core"]
 fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let cylinder = Aberration::new([[2.0, 4.0, 0.0, 0.0, 0.0]; 3]).unwrap();
     let all = Aberrations::new(vec![(0.0, cylinder)]).unwrap();
