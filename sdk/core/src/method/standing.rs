@@ -36,7 +36,6 @@ const DEPTH_WEIGHT: f32 = 0.05;
 const TURN_TOLERANCE: f32 = 2.0 * PI / 64.0;
 
 /// The blocks of a frame that have changed.
-#[derive(Clone)]
 pub(crate) struct Changes {
     /// The blocks, row by row.
     pub(super) blocks: Vec<bool>,
