@@ -57,19 +57,9 @@ impl Folder {
     /// Runs the command, checks that it fails with `code` and without a panic, and returns its error output.
     #[track_caller]
     pub(crate) fn fails(&self, arguments: &[&str], code: i32) -> String {
-        self.fails_as(arguments, &[code])
-    }
-
-    /// Works like [`Folder::fails`] with any of `codes`.
-    #[track_caller]
-    pub(crate) fn fails_as(&self, arguments: &[&str], codes: &[i32]) -> String {
         let output = self.run(arguments);
         let errors = String::from_utf8(output.stderr).unwrap();
-        let code = output.status.code();
-        assert!(
-            code.is_some_and(|code| codes.contains(&code)),
-            "{arguments:?}: {code:?} {errors}"
-        );
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
         assert!(!errors.contains("panicked"), "{errors}");
         errors
     }

@@ -142,7 +142,7 @@ impl DisplayFlags {
                         .into(),
                 ));
             }
-            file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
+            file.target.display = file.target.display.with_offset_m(mm / 1e3).map_err(Error::usage)?;
             file.device.display = file.target.display.clone();
         }
         let lasers = file.device.lasers_turns.iter().flatten();

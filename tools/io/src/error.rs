@@ -35,6 +35,11 @@ impl Error {
             reason: reason.to_string(),
         }
     }
+
+    /// Creates an error about the command line from the core's error about the value of a flag.
+    pub fn usage(why: phasefront::Error) -> Self {
+        Self::Usage(why.to_string())
+    }
 }
 
 /// The result type of the tools.

@@ -73,7 +73,7 @@ impl Hologram {
     fn stills(self, json: bool, pictures: Vec<Picture>, flags: &[Flag]) -> Result<()> {
         let outputs = given::ids::<OutputFlags>();
         if let Some(Flag { name, .. }) = flags.iter().find(|flag| flag.is_given && outputs.contains(&flag.id)) {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "{name} goes with one picture, not with a folder of them"
             )));
         }

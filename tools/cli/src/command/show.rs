@@ -39,7 +39,7 @@ impl Show {
             if let Some(value) = value
                 && !(value > 0.0 && value <= 1e6)
             {
-                return Err(Error::Input(format!(
+                return Err(Error::Usage(format!(
                     "{flag} {value}: it must lie above 0 and up to 1000000"
                 )));
             }

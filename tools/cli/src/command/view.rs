@@ -92,7 +92,7 @@ impl View {
         let max_mb = self.max_mb.unwrap_or(DEFAULT_MB);
         let budget = max_mb * 1e6 / self.inputs.len().max(1) as f64;
         if !(budget.is_finite() && budget > BESIDE_VIEWS as f64) {
-            return Err(Error::Input(format!(
+            return Err(Error::Usage(format!(
                 "--max-mb {} is too little; a hologram\'s page needs {:.1} MB at least",
                 max_mb,
                 BESIDE_VIEWS as f64 / 1e6

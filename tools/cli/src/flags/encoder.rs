@@ -150,14 +150,16 @@ impl EncoderFlags {
 
     fn encoder(&self, encoding: Encoding, name: EncoderName) -> Result<Encoder> {
         let default = EncoderOptions::from(encoding);
+        let options = EncoderOptions {
+            dark_threshold: self.dark_threshold.unwrap_or(default.dark_threshold),
+            local_steps: self.local_steps.unwrap_or(default.local_steps),
+            midpoint_steps: self.midpoint_steps,
+            focus_steps: self.focus()?.steps(),
+            ..default
+        };
+        options.check().map_err(Error::usage)?;
         Ok(Encoder {
-            options: EncoderOptions {
-                dark_threshold: self.dark_threshold.unwrap_or(default.dark_threshold),
-                local_steps: self.local_steps.unwrap_or(default.local_steps),
-                midpoint_steps: self.midpoint_steps,
-                focus_steps: self.focus()?.steps(),
-                ..default
-            },
+            options,
             name: name.name(),
         })
     }

@@ -94,7 +94,7 @@ impl HologramFlags {
                 (method, encoder.read()?)
             }
         };
-        focus.check(&method)?;
+        focus.check(&method).map_err(Error::usage)?;
         Ok((method, encoder))
     }
 }

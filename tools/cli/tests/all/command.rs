@@ -22,21 +22,13 @@ impl Folder {
     /// behind.
     #[track_caller]
     fn refuses(&self, arguments: &[&str], code: i32, words: &[&str]) {
-        self.refuses_as(&arguments.join(" "), arguments, &[code], words);
-    }
-
-    /// Asserts [`Folder::refuses`] with code 1 or 2 for each named case.
-    #[track_caller]
-    fn refuses_each(&self, cases: &[(&str, Vec<&str>, &[&str])]) {
-        for (name, arguments, words) in cases {
-            self.refuses_as(name, arguments, &[1, 2], words);
-        }
+        self.refuses_as(&arguments.join(" "), arguments, code, words);
     }
 
     #[track_caller]
-    fn refuses_as(&self, name: &str, arguments: &[&str], codes: &[i32], words: &[&str]) {
+    fn refuses_as(&self, name: &str, arguments: &[&str], code: i32, words: &[&str]) {
         let before = self.files();
-        let errors = self.fails_as(arguments, codes);
+        let errors = self.fails(arguments, code);
         let is_of_clap = errors.contains("For more information");
         if !is_of_clap {
             let last = errors.lines().last().unwrap_or_default();
@@ -412,11 +404,11 @@ fn pictures_that_cannot_be_used_are_named() {
     fs::write(folder.path("empty.png"), []).unwrap();
     let square = image::GrayImage::new(40, 40);
     square.save(folder.path("square.png")).unwrap();
-    folder.refuses_each(&[
+    for (name, arguments, words) in [
         (
             "no file",
             hologram("none.png", "depth.png"),
-            &["none.png", "cannot be read"],
+            &["none.png", "cannot be read"][..],
         ),
         (
             "half a file",
@@ -441,7 +433,9 @@ fn pictures_that_cannot_be_used_are_named() {
             vec!["hologram", "--ldi", "nowhere", "-o", "h.png"],
             &["nowhere"],
         ),
-    ]);
+    ] {
+        folder.refuses_as(name, &arguments, 1, words);
+    }
 }
 
 #[test]
@@ -545,11 +539,11 @@ fn depth_that_means_nothing_is_named() {
     folder.depth_npy("nan.npy", &Array2::from_elem((32, 48), f32::NAN));
     folder.depth_npy("metres.npy", &Array2::from_elem((32, 48), 2.0));
     folder.depth_npy("nothing.npy", &Array2::zeros((0, 0)));
-    folder.refuses_each(&[
+    for (name, arguments, words) in [
         (
             "infinite",
             hologram("rgb.png", "infinite.npy"),
-            &["infinite.npy", "inf"],
+            &["infinite.npy", "inf"][..],
         ),
         ("all holes", hologram("rgb.png", "nan.npy"), &["nan.npy", "no reading"]),
         (
@@ -558,25 +552,29 @@ fn depth_that_means_nothing_is_named() {
             &["metres.npy", "unit"],
         ),
         ("no pixel", hologram("rgb.png", "nothing.npy"), &["nothing.npy"]),
-    ]);
+    ] {
+        folder.refuses_as(name, &arguments, 1, words);
+    }
     let millimetres = Array2::from_shape_fn((32, 48), |(_, x)| 500.0 + 70.0 * x as f32);
     folder.depth_npy("mm.npy", &millimetres);
     let near_far = |unit, near, far| {
         let more = ["--depth-unit", unit, "--near", near, "--far", far];
         [&hologram("rgb.png", "mm.npy")[..], &more].concat()
     };
-    folder.refuses_each(&[
+    for (name, arguments, words) in [
         (
             "near and far in millimetres",
             near_far("mm", "500", "4000"),
-            &["mm.npy", "near 500 m", "from 0.5 m to 3.79 m", "both are metres"],
+            &["mm.npy", "near 500 m", "from 0.5 m to 3.79 m", "both are metres"][..],
         ),
         (
             "near and far of normalized depth",
             made(&["--near", "0.2", "--far", "0.8"]),
             &["depth.png", "near and far are metres"],
         ),
-    ]);
+    ] {
+        folder.refuses_as(name, &arguments, 1, words);
+    }
     let told = |arguments: &[&str]| String::from_utf8(folder.run(arguments).stderr).unwrap();
     assert!(told(&near_far("mm", "0.5", "0.6")).contains("96 % of the depth"));
     assert_eq!(told(&near_far("mm", "0.5", "4")), "");
@@ -597,18 +595,12 @@ fn depth_that_means_nothing_is_named() {
 #[test]
 fn options_that_cannot_be_meant_are_named() {
     let folder = Folder::new().with_frame();
-    folder.refuses_each(&[
+    for (name, arguments, words) in [
         (
-            "an offset out of reach",
-            made(&["--offset-mm", "9000"]),
-            &["9000", "smaller"],
+            "no planes",
+            made(&["--method", "layers", "--planes", "0"]),
+            &["plane"][..],
         ),
-        (
-            "an offset that is no number",
-            made(&["--offset-mm", "nan"]),
-            &["offset_mm"],
-        ),
-        ("no planes", made(&["--method", "layers", "--planes", "0"]), &["plane"]),
         (
             "more planes than fit in memory",
             made(&["--method", "layers", "--planes", "4000000000"]),
@@ -640,27 +632,40 @@ fn options_that_cannot_be_meant_are_named() {
             with(&["-o", "missing/h.png"]),
             &["missing/h.png", "no folder missing"],
         ),
-        ("no frame", vec!["hologram", "-o", "h.png"], &["--rgb", "--photo"]),
+        (
+            "a picture that loses levels",
+            with(&["-o", "h.jpg"]),
+            &["h.jpg", ".png"],
+        ),
+    ] {
+        folder.refuses_as(name, &arguments, 1, words);
+    }
+    for (name, arguments, words) in [
+        ("no frame", vec!["hologram", "-o", "h.png"], &["--rgb", "--photo"][..]),
         (
             "colour alone",
             vec!["hologram", "--rgb", "rgb.png", "-o", "h.png"],
             &["--depth", "--depth-network"],
         ),
         (
-            "a picture that loses levels",
-            with(&["-o", "h.jpg"]),
-            &["h.jpg", ".png"],
+            "raw depth without a scale",
+            made(&["--depth-unit", "raw"]),
+            &["--depth-scale"],
         ),
-    ]);
-    // Errors that follow from the arguments alone have code 2.
-    let raw = made(&["--depth-unit", "raw"]);
-    let cases: [(&str, &[&str], &str); 3] = [
-        ("raw depth without a scale", &raw, "--depth-scale"),
-        ("an unknown option", &with(&["--nonsense"]), "--nonsense"),
-        ("no distance", &["refocus", "rgb.png", "-o", "v.png"], "--z-mm"),
-    ];
-    for (name, arguments, word) in cases {
-        folder.refuses_as(name, arguments, &[2], &[word]);
+        (
+            "an offset out of reach",
+            made(&["--offset-mm", "9000"]),
+            &["9000", "smaller"],
+        ),
+        (
+            "an offset that is no number",
+            made(&["--offset-mm", "nan"]),
+            &["offset_mm"],
+        ),
+        ("an unknown option", with(&["--nonsense"]), &["--nonsense"]),
+        ("no distance", vec!["refocus", "rgb.png", "-o", "v.png"], &["--z-mm"]),
+    ] {
+        folder.refuses_as(name, &arguments, 2, words);
     }
 }
 
@@ -813,7 +818,7 @@ fn displays_that_cannot_be_used_are_named() {
     fs::write(folder.path("lut.txt"), "1 2 3").unwrap();
     for (name, text, words) in cases {
         fs::write(folder.path("display.toml"), text).unwrap();
-        folder.refuses_as(name, &made(&["--display", "display.toml"]), &[1], words);
+        folder.refuses_as(name, &made(&["--display", "display.toml"]), 1, words);
     }
 }
 
@@ -823,8 +828,8 @@ fn networks_that_cannot_be_used_are_named() {
     let model = fs::read(format!("{MODELS}/rgbd-8.onnx")).unwrap();
     fs::write(folder.path("no.onnx"), b"not a network").unwrap();
     fs::write(folder.path("half.onnx"), &model[..model.len() / 2]).unwrap();
-    folder.refuses_each(&[
-        ("no network", made(&["--network", "no.onnx"]), &["no.onnx"]),
+    for (name, arguments, words) in [
+        ("no network", made(&["--network", "no.onnx"]), &["no.onnx"][..]),
         ("half a network", made(&["--network", "half.onnx"]), &["half.onnx"]),
         (
             "none that is bundled",
@@ -839,7 +844,9 @@ fn networks_that_cannot_be_used_are_named() {
             made(&["--network", "rgbd-30"]),
             &["rgbd-30: is not bundled", "--network models/unbundled/rgbd-30.onnx"],
         ),
-    ]);
+    ] {
+        folder.refuses_as(name, &arguments, 1, words);
+    }
 }
 
 /// Runs the command on a GPU, with its cache in `folder`.
@@ -928,18 +935,20 @@ fn a_gpu_that_is_not_there_or_not_meant_is_named() {
         "{errors}"
     );
     assert!(!folder.path("gpu.png").exists());
-    folder.refuses_each(&[
+    for (name, arguments, words) in [
         (
             "a card for the CPU",
             with(&["--gpu", "x", "-o", "o.png"]),
-            &["--backend gpu"],
+            &["--backend gpu"][..],
         ),
         (
             "a complex field from the GPU",
             with(&["--backend", "gpu", "--complex", "c.npy", "-o", "o.png"]),
             &["--complex"],
         ),
-    ]);
+    ] {
+        folder.refuses_as(name, &arguments, 2, words);
+    }
 }
 
 #[test]
@@ -1033,8 +1042,8 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
         (Some(0.0), Some(0))
     );
     let call = with(&["-o", "h.png"]);
-    folder.refuses(&[&call[..], &["--local-steps", "9"]].concat(), 1, &["at most 8"]);
-    folder.refuses(&[&call[..], &["--dark-threshold", "1.5"]].concat(), 1, &["from 0 to 1"]);
+    folder.refuses(&[&call[..], &["--local-steps", "9"]].concat(), 2, &["at most 8"]);
+    folder.refuses(&[&call[..], &["--dark-threshold", "1.5"]].concat(), 2, &["from 0 to 1"]);
 }
 
 #[test]

@@ -238,14 +238,14 @@ fn what_a_lens_does_not_take_is_told_in_one_line() {
     fs::write(folder.path("plain.toml"), format!("width = {W}\nheight = {H}\n")).unwrap();
     let hologram = ["hologram", "--rgb", "rgb.png", "--depth", "depth.png", "-o", "h.png"];
     folder.succeeds(&[&hologram[..], &["--display", "d.toml"]].concat());
-    let fails = |arguments: &[&str], word: &str| {
-        let said = folder.fails_as(arguments, &[1, 2]);
+    let fails = |arguments: &[&str], code, word: &str| {
+        let said = folder.fails(arguments, code);
         assert!(
             said.contains(word) && said.trim().lines().count() == 1,
             "{arguments:?}: {said}"
         );
     };
-    fails(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"], "--display FILE");
+    fails(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"], 1, "--display FILE");
     let on_plain = [
         "refocus",
         "h.png",
@@ -258,6 +258,7 @@ fn what_a_lens_does_not_take_is_told_in_one_line() {
     ];
     fails(
         &on_plain,
+        1,
         "in the focal plane of a lens, that of the display about the modulator",
     );
     for more in [
@@ -270,11 +271,13 @@ fn what_a_lens_does_not_take_is_told_in_one_line() {
     ] {
         fails(
             &[&hologram[..], &["--display", "d.toml"], more].concat(),
+            2,
             "in the focal plane of a lens",
         );
     }
     fails(
         &[&hologram[..], &["--display", "d.toml", "--complex", "c.npy"]].concat(),
+        2,
         "there is no field",
     );
     let video = [
@@ -287,8 +290,8 @@ fn what_a_lens_does_not_take_is_told_in_one_line() {
         "--display",
         "d.toml",
     ];
-    fails(&video, "this command does not");
-    fails(&["bench", "--display", "d.toml"], "this command does not");
+    fails(&video, 1, "this command does not");
+    fails(&["bench", "--display", "d.toml"], 1, "this command does not");
 }
 
 #[test]

@@ -234,6 +234,7 @@ fn samsungs_depth_is_refused_by_its_name() {
         refuses(
             &folder,
             &["hologram", "--photo", "s.jpg", "-o", "n.png"],
+            1,
             &["s.jpg", depth, "exiftool", tag],
         );
         // Another trailer of Samsung's holds no depth.
@@ -241,6 +242,7 @@ fn samsungs_depth_is_refused_by_its_name() {
         refuses(
             &folder,
             &["hologram", "--photo", "utc.jpg", "-o", "n.png"],
+            1,
             &["neither GDepth nor"],
         );
     }
@@ -530,9 +532,9 @@ fn folders_of_photos_and_of_pictures_become_holograms_too() {
     assert!(folder.path("out-photos/dog.png").exists());
 }
 
-/// Checks that the command fails in one line that has all `words`.
-fn refuses(folder: &Folder, arguments: &[&str], words: &[&str]) {
-    let errors = folder.fails_as(arguments, &[1, 2]);
+/// Checks that the command fails with `code` in one line that has all `words`.
+fn refuses(folder: &Folder, arguments: &[&str], code: i32, words: &[&str]) {
+    let errors = folder.fails(arguments, code);
     assert!(
         errors.lines().count() == 1 && words.iter().all(|word| errors.contains(word)),
         "{errors}"
@@ -567,10 +569,10 @@ fn a_picture_lies_on_one_plane() {
         apart(1.494e-3),
         apart(-1.5e-3)
     );
-    refuses(&folder, &call(&["--z-mm", "3.5"]), &["--z-mm 3.5", "-3 mm to 3 mm"]);
+    refuses(&folder, &call(&["--z-mm", "3.5"]), 2, &["--z-mm 3.5", "-3 mm to 3 mm"]);
     by_file.extend(["--z-mm", "1"]);
-    refuses(&folder, &by_file, &["--z-mm is for --depth flat"]);
-    refuses(&folder, &call(&["--invert"]), &["--invert", "flat"]);
+    refuses(&folder, &by_file, 2, &["--z-mm is for --depth flat"]);
+    refuses(&folder, &call(&["--invert"]), 2, &["--invert", "flat"]);
 }
 
 /// A photo that holds no depth takes that of a network, whatever its kind.
@@ -591,6 +593,7 @@ fn a_photo_without_depth_takes_that_of_a_network() {
     refuses(
         &folder,
         &["hologram", "--photo", "plain.jpg", "-o", "n.png"],
+        1,
         &["--depth-network (docs/depth.md", "--depth flat"],
     );
 }
@@ -654,12 +657,14 @@ fn a_heic_portrait_becomes_a_hologram() {
     refuses(
         &folder,
         &["hologram", "--photo", "plain.heic", "-o", "n.png"],
+        1,
         &["plain.heic", "no depth", "--depth-network"],
     );
     fs::write(folder.path("cut.heic"), b"\0\0\0\x18ftypheic\0\0\0\0mif1heic").unwrap();
     refuses(
         &folder,
         &["hologram", "--photo", "cut.heic", "-o", "n.png"],
+        1,
         &["cut.heic", "heif-"],
     );
     // Without the program the message names its package.

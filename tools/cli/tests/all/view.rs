@@ -64,15 +64,15 @@ fn pages_and_holograms_are_joined_and_keep_their_budget() {
     assert!(scenes[1].phase.is_none() && scenes[2].shown.len() == 3 && !scenes[2].depth.known);
     folder.succeeds(&["view", "h.png", "--views", "60", "--max-mb", "0.5", "-o", "small.html"]);
     assert!(std::fs::metadata(folder.path("small.html")).unwrap().len() < 500_000);
-    for (arguments, word) in [
-        (vec!["view", "rgb.png", "-o", "n.html"], "rgb.png"),
-        (vec!["view", "h.png", "-o", "n.png"], ".html"),
-        (vec!["view", "h.png", "--max-mb", "0.1", "-o", "n.html"], "--max-mb"),
-        (vec!["view", "-o", "n.html"], "--rgb"),
-        (vec!["view", ".", "-o", "n.html"], "phase_000000.png"),
-        (vec!["view", "missing.html", "-o", "n.html"], "missing.html"),
+    for (arguments, code, word) in [
+        (vec!["view", "rgb.png", "-o", "n.html"], 1, "rgb.png"),
+        (vec!["view", "h.png", "-o", "n.png"], 1, ".html"),
+        (vec!["view", "h.png", "--max-mb", "0.1", "-o", "n.html"], 2, "--max-mb"),
+        (vec!["view", "-o", "n.html"], 2, "--rgb"),
+        (vec!["view", ".", "-o", "n.html"], 1, "phase_000000.png"),
+        (vec!["view", "missing.html", "-o", "n.html"], 1, "missing.html"),
     ] {
-        let errors = folder.fails_as(&arguments, &[1, 2]);
+        let errors = folder.fails(&arguments, code);
         assert!(
             errors.lines().count() == 1 && errors.contains(word),
             "{arguments:?}: {errors}"
