@@ -16,6 +16,8 @@ pub mod stream;
 
 use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, ArrayView2};
+use phasefront_kernels::wide;
+use rayon::prelude::*;
 
 /// The least number that is no reading in depth of any unit but the normalized one. Renderers write 1e10 or the largest
 /// finite number where there is no surface.
@@ -53,6 +55,29 @@ impl DepthUnit {
         });
         metres.filter(is_reading)
     }
+}
+
+/// Returns normalized `depth` as a word, round(d·65535).
+#[doc(hidden)]
+#[inline(always)]
+pub fn word(depth: f32) -> u16 {
+    // From 2²³ on, the low bits of a float are its integer value. A saturating conversion would not vectorise.
+    ((depth * 65535.0 + 0.5).floor() + 8_388_608.0).to_bits() as u16
+}
+
+/// Writes normalized `depth` as words. Does not allocate.
+///
+/// # Panics
+/// Panics if the lengths differ.
+#[doc(hidden)]
+pub fn write_words(depth: &[f32], words: &mut [u16]) {
+    /// The number of pixels that a thread converts at a time.
+    const PART: usize = 1 << 14;
+    assert_eq!(depth.len(), words.len());
+    let parts = words.par_chunks_mut(PART).zip(depth.par_chunks(PART));
+    parts.for_each(|(words, depth)| {
+        wide!(words.iter_mut().zip(depth).for_each(|(to, depth)| *to = word(*depth)));
+    });
 }
 
 /// Normalized depth and the parameters of its conversion.
@@ -290,6 +315,20 @@ mod tests {
             normalize(sparse.view(), DepthUnit::Metres, None, None).unwrap().holes,
             12
         );
+    }
+
+    #[test]
+    fn words_are_rounded() {
+        let depth: Vec<f32> = (0..=70_000).map(|i| i as f32 / 70_000.0).collect();
+        let mut words = vec![0; depth.len()];
+        write_words(&depth, &mut words);
+        for (word, depth) in words.iter().zip(&depth) {
+            assert!(
+                (f64::from(*word) - f64::from(*depth) * 65535.0).abs() < 0.51,
+                "{depth}: {word}"
+            );
+        }
+        assert_eq!((words[0], words[70_000]), (0, 65535));
     }
 
     #[test]

@@ -400,8 +400,6 @@ impl MethodPlan {
             }
             Chosen::Seeded(..) => panic!("a seeded network makes no wave"),
         };
-        let size = self.size.pixels();
-        let own_turn = |colour| pixels.turn_of(colour, size);
         let mut turns = [Complex32::ONE; 3];
         let is_turned = is_whole && mean_phase == MeanPhase::Removed;
         let mut changed = None;
@@ -409,7 +407,7 @@ impl MethodPlan {
             Some(standing) => {
                 standing.finish(is_whole);
                 if is_turned {
-                    turns = standing.turns(own_turn);
+                    turns = standing.turns(pixels, of_surfaces, reach);
                 }
                 changed = Some(Changed {
                     changes: of_surfaces.unwrap_or(&standing.changes),
@@ -418,13 +416,15 @@ impl MethodPlan {
                 });
             }
             None if is_turned => {
-                (turns[..self.colours].iter_mut().enumerate()).for_each(|(colour, turn)| *turn = own_turn(colour));
+                let size = self.size.pixels();
+                let turns = turns[..self.colours].iter_mut().enumerate();
+                turns.for_each(|(colour, turn)| *turn = pixels.turn_of(colour, size));
             }
             None => {}
         }
         Ok(Wave {
             pixels,
-            size,
+            size: self.size,
             turns,
             changed,
             is_whole,

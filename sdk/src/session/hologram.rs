@@ -6,7 +6,7 @@ use super::process_id::ProcessId;
 use super::threads::Threads;
 use num_complex::Complex32;
 use phasefront_core::Size;
-use phasefront_core::display::levels::{Levels, LevelsMut};
+use phasefront_core::display::levels::{Levels, LevelsMut, upper_bytes};
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::frame::RgbEncoding;
@@ -178,10 +178,7 @@ impl Hologram {
                 Some(words) => plan.modulate(None, &mut field, LevelsMut::Words(&mut words.values), &mut scratch),
             };
             if let Some(words) = &words {
-                let below = target.display.bits() - 8;
-                for (level, word) in levels.values.iter_mut().zip(&words.values) {
-                    *level = (*word >> below) as u8;
-                }
+                upper_bytes(&words.values, target.display.bits(), &mut levels.values);
             }
             Ok(Hologram {
                 timestamp_ns: None,

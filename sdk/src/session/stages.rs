@@ -11,16 +11,16 @@ use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::BackendReport;
 use super::threads::{Threads, block_on};
 use phasefront_core::Size;
+use phasefront_core::depth;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::depth::stream::{DepthReport, DepthStream};
-use phasefront_core::display::levels::LevelsMut;
+use phasefront_core::display::levels::{LevelsMut, upper_bytes};
 use phasefront_core::frame::{Past, RgbdFrame};
 use phasefront_core::pipeline::FrameTimes;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::clock::Instant;
 use phasefront_core::runtime::error::Result;
 use phasefront_core::runtime::stage::stage;
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -80,17 +80,10 @@ impl LevelPlan {
     /// Returns the depth of the frame that was taken in as d·65535, and its size: that of the hologram, or of the
     /// readings where the depth of pixels is undecided.
     fn depth_map(&self, pool: &Pool<u16>) -> (Pooled<u16>, Size) {
-        let to_word = |d: f32| (d * 65535.0 + 0.5) as u16;
         let size = self.frame.size();
         if !self.engine.takes_readings() {
             let mut map = pool.take(size.pixels());
-            const PART: usize = 1 << 14;
-            let parts = (map.values.par_chunks_mut(PART)).zip(self.frame.values().1.par_chunks(PART));
-            parts.for_each(|(words, depth)| {
-                for (word, d) in words.iter_mut().zip(depth) {
-                    *word = to_word(*d);
-                }
-            });
+            depth::write_words(self.frame.values().1, &mut map.values);
             return (map, size);
         }
         let readings = self.depth.readings();
@@ -104,7 +97,7 @@ impl LevelPlan {
             let pixel = |i: usize, n: usize, pixels: usize| (2 * i + 1) * pixels / (2 * n);
             let (row, column) = (i / to.width, i % to.width);
             let (y, x) = (pixel(row, to.height, size.height), pixel(column, to.width, size.width));
-            *word = to_word(readings.depth_near(y, x));
+            *word = depth::word(readings.depth_near(y, x));
         }
         (map, to)
     }
@@ -347,9 +340,7 @@ impl Stages {
             let encoded = engine.process(context, &mut input, made).await?;
             context.cancel.check()?;
             if let Some(words) = &words {
-                for (level, word) in levels.values.iter_mut().zip(&words.values) {
-                    *level = (*word >> (bits - 8)) as u8;
-                }
+                upper_bytes(&words.values, bits, &mut levels.values);
             }
             Ok((report, depth_map, encoded))
         };

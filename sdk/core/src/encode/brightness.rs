@@ -5,6 +5,7 @@ use crate::frame::Past;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::time::Duration;
 
 /// The rule that chooses the scale of a frame.
@@ -92,15 +93,18 @@ pub fn looked_at(len: usize) -> (usize, u32) {
 pub struct Percentile {
     /// The histograms of [`PARTS`] parts of the field, (PARTS, BINS).
     histograms: Vec<u32>,
+    /// Their sum.
+    all: Vec<u32>,
 }
 
-/// The number of parts of a field that threads count.
-const PARTS: usize = 16;
+/// The number of parts of a field that are counted apart.
+const PARTS: usize = 48;
 
 impl Default for Percentile {
     fn default() -> Self {
         Percentile {
             histograms: vec![0; PARTS * BINS],
+            all: vec![0; BINS],
         }
     }
 }
@@ -109,24 +113,34 @@ impl Percentile {
     /// Returns the percentile of `field`. If `past` is given, the result moves from the previous scale toward it.
     /// Allocates nothing.
     pub fn scale(&mut self, field: &[Complex32], past: Option<Past>) -> f32 {
-        let now = self.of(field.len(), |at| field[at]);
+        let now = self.of(field.len(), |at| field[at], |_| true);
         past.map_or(now, |past| smoothed(past, now))
     }
 
-    /// Returns the percentile of `len` values.
-    pub(crate) fn of(&mut self, len: usize, value: impl Fn(usize) -> Complex32 + Sync) -> f32 {
-        self.histograms.fill(0);
+    /// Returns the percentile of `len` values. Counts only ranges of values again of which `differs` says that they may
+    /// differ from those of the last call.
+    pub(crate) fn of(
+        &mut self,
+        len: usize,
+        value: impl Fn(usize) -> Complex32 + Sync,
+        differs: impl Fn(Range<usize>) -> bool + Sync,
+    ) -> f32 {
         let (count, mut over) = looked_at(len);
         let part = (count.div_ceil(PARTS) * STEP).max(1);
+        let values = |i: usize| (i * part).min(len)..((i + 1) * part).min(len);
         let histograms = self.histograms.par_chunks_exact_mut(BINS).enumerate();
-        histograms.for_each(|(i, histogram)| {
-            for at in (i * part..((i + 1) * part).min(len)).step_by(STEP) {
-                let bin = value(at).norm_sqr().sqrt() * (BINS as f32 / MOST);
-                histogram[(bin as usize).min(BINS - 1)] += 1;
-            }
-        });
-        let (histogram, rest) = self.histograms.split_at_mut(BINS);
-        for part in rest.chunks_exact(BINS) {
+        histograms
+            .filter(|(i, _)| differs(values(*i)))
+            .for_each(|(i, histogram)| {
+                histogram.fill(0);
+                for at in values(i).step_by(STEP) {
+                    let bin = value(at).norm_sqr().sqrt() * (BINS as f32 / MOST);
+                    histogram[(bin as usize).min(BINS - 1)] += 1;
+                }
+            });
+        let histogram = &mut self.all;
+        histogram.fill(0);
+        for part in self.histograms.chunks_exact(BINS) {
             histogram.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
         }
         let last = (histogram.iter().rposition(|n| {
@@ -168,6 +182,22 @@ mod tests {
         }
         assert!((scale(&field(9.0, 0), None) - MOST).abs() < 0.01);
         assert!((scale(&field(0.0, 0), None) - LEAST).abs() < 0.01);
+    }
+
+    #[test]
+    fn what_does_not_differ_keeps_its_count() {
+        let mut percentile = Percentile::default();
+        let mut now = field(0.4, 0);
+        percentile.of(now.len(), |at| now[at], |_| true);
+        let bright = 20_000..20_900;
+        now[bright.clone()].fill(Complex32::ONE);
+        let differs = |values: Range<usize>| values.start < bright.end && bright.start < values.end;
+        let kept = percentile.of(now.len(), |at| now[at], differs);
+        let anew = Percentile::default().of(now.len(), |at| now[at], |_| true);
+        assert_eq!(kept, anew);
+        assert!(kept > 0.9, "{kept}");
+        now[..5000].fill(Complex32::new(3.0, 0.0));
+        assert_eq!(percentile.of(now.len(), |at| now[at], |_| false), anew);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What happens to the mean phase of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,21 +36,75 @@ pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
 
 /// Returns the factor that removes the mean phase of a field with these values.
 pub(super) fn turn_of<T: Copy + Sync>(values: &[T], value: impl Fn(T) -> Complex32 + Copy + Sync) -> Complex32 {
-    let turn = Complex64::from_polar(1.0, -sum(values, value).arg());
+    turn(sum(
+        &|part| sum_part(values, part, value),
+        0..values.len().div_ceil(PART),
+    ))
+}
+
+/// The number of values of a part, which one thread takes at a time.
+const PART: usize = 1 << 14;
+
+/// The sums of the parts of a field, which stay where the field does.
+pub(super) struct Sums {
+    /// (C, parts).
+    parts: Vec<Complex64>,
+    /// The number of values of a colour.
+    size: usize,
+}
+
+impl Sums {
+    /// Creates the sums of `colours` of `size` values, all 0.
+    pub(super) fn new(colours: usize, size: usize) -> Self {
+        Sums {
+            parts: vec![Complex64::ZERO; colours * size.div_ceil(PART)],
+            size,
+        }
+    }
+
+    /// Sums the values of `colour` again where they differ from before. `differs` tells it of a range of values.
+    /// Returns what [`turn_of`] returns, with the same bits.
+    pub(super) fn turn_of<T: Copy + Sync>(
+        &mut self,
+        colour: usize,
+        values: &[T],
+        value: impl Fn(T) -> Complex32 + Copy + Sync,
+        differs: impl Fn(Range<usize>) -> bool + Sync,
+    ) -> Complex32 {
+        let count = self.size.div_ceil(PART);
+        let parts = &mut self.parts[colour * count..][..count];
+        (parts.par_iter_mut().enumerate())
+            .filter(|(part, _)| differs(part * PART..((part + 1) * PART).min(values.len())))
+            .for_each(|(part, of_part)| *of_part = sum_part(values, part, value));
+        turn(sum(&|part| parts[part], 0..count))
+    }
+}
+
+/// Returns the factor that removes the phase of `sum`.
+fn turn(sum: Complex64) -> Complex32 {
+    let turn = Complex64::from_polar(1.0, -sum.arg());
     Complex32::new(turn.re as f32, turn.im as f32)
 }
 
-/// The number of values that one thread takes at a time.
-const PART: usize = 1 << 14;
-
-/// Sums values by repeated halving at fixed places, so that the result has the same bits on any number of threads.
-fn sum<T: Copy + Sync>(values: &[T], value: impl Fn(T) -> Complex32 + Copy + Sync) -> Complex64 {
-    if values.len() > PART {
-        let (first, second) = values.split_at(values.len().div_ceil(PART).div_ceil(2) * PART);
-        let (first, second) = rayon::join(|| sum(first, value), || sum(second, value));
-        return first + second;
+/// Adds the sums of `parts` by repeated halving at fixed places, so that the result has the same bits on any number of
+/// threads.
+fn sum(of_part: &(impl Fn(usize) -> Complex64 + Sync), parts: Range<usize>) -> Complex64 {
+    match parts.len() {
+        0 => Complex64::ZERO,
+        1 => of_part(parts.start),
+        count => {
+            let middle = parts.start + count.div_ceil(2);
+            let halves = (|| sum(of_part, parts.start..middle), || sum(of_part, middle..parts.end));
+            let (first, second) = rayon::join(halves.0, halves.1);
+            first + second
+        }
     }
+}
+
+/// Sums part `part` of the values.
+fn sum_part<T: Copy>(values: &[T], part: usize, value: impl Fn(T) -> Complex32) -> Complex64 {
     const LANES: usize = 16;
+    let values = &values[part * PART..((part + 1) * PART).min(values.len())];
     wide!({
         let (runs, rest) = values.as_chunks::<LANES>();
         let mut sums = [Complex32::ZERO; LANES];
@@ -80,5 +135,26 @@ mod tests {
             let turn = turn_of(wave, |value| value);
             assert!(plane.iter().zip(wave).all(|(u, w)| *u == w * turn));
         }
+    }
+
+    #[test]
+    fn kept_sums_give_the_turn_of_all_values() {
+        let mut values: Vec<_> = (0..3 * PART + 17)
+            .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i % 5) as f32))
+            .collect();
+        let mut sums = Sums::new(2, values.len());
+        let mut turn = |values: &[Complex32], differs: &(dyn Fn(Range<usize>) -> bool + Sync)| {
+            sums.turn_of(1, values, |value| value, differs)
+        };
+        assert_eq!(turn(&values, &|_| true), turn_of(&values, |value| value));
+        for at in [PART, 3 * PART + 5] {
+            values[at] = Complex32::new(0.0, 3e4);
+            assert_eq!(
+                turn(&values, &|part| part.contains(&at)),
+                turn_of(&values, |value| value)
+            );
+        }
+        values[0] = Complex32::new(0.0, -3e4);
+        assert_ne!(turn(&values, &|_| false), turn_of(&values, |value| value));
     }
 }

@@ -12,6 +12,8 @@
 
 use crate::Size;
 use crate::frame::RgbdFrame;
+use crate::method::mean_phase::Sums;
+use crate::method::wave::Pixels;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
@@ -63,6 +65,18 @@ impl Changes {
         let down = self.blocks.len() / self.across;
         let rows = (rows.start / BLOCK).min(down)..rows.end.div_ceil(BLOCK).min(down);
         self.blocks[rows.start * self.across..rows.end * self.across].contains(&true)
+    }
+
+    /// Returns whether a change is within `reach` of the rows of a range of values, which is of planes of `size`.
+    pub(super) fn any_value(&self, values: Range<usize>, size: Size, reach: usize) -> bool {
+        let [first, last] = [values.start, values.end.max(1) - 1].map(|at| (at / size.pixels(), at % size.pixels()));
+        // Values of two planes may lie in any row.
+        let rows = if first.0 == last.0 {
+            first.1 / size.width..last.1 / size.width + 1
+        } else {
+            0..size.height
+        };
+        self.any(rows.start.saturating_sub(reach)..rows.end + reach)
     }
 
     /// Returns the smallest rectangle that holds all pixels of `rows` and `columns` within `reach` of a block that has
@@ -128,8 +142,9 @@ pub(super) struct Standing {
     is_whole: bool,
     /// Whether the wave of the frame before is kept where nothing changes.
     keeps: bool,
-    /// The factor that removes the mean phase of each colour.
+    /// The factor that removes the mean phase of each colour, and the sums that the wave's own follows from.
     turns: [Complex32; 3],
+    sums: Sums,
     /// The number of shown frames.
     number: u64,
 }
@@ -144,6 +159,7 @@ impl Standing {
             is_whole: false,
             keeps: false,
             turns: [Complex32::ONE; 3],
+            sums: Sums::new(colours, size.pixels()),
             number: 0,
         }
     }
@@ -190,14 +206,17 @@ impl Standing {
         self.number
     }
 
-    /// Returns the factor that removes the mean phase of each colour of the wave, where `own` is that of the wave
-    /// alone. It stays as it was while its phase is within [`TURN_TOLERANCE`] of the wave's own.
-    pub(super) fn turns(&mut self, own: impl Fn(usize) -> Complex32) -> [Complex32; 3] {
-        if !self.keeps || self.changes.blocks.contains(&true) {
-            let colours = self.frame.colours();
-            for (colour, turn) in self.turns[..colours].iter_mut().enumerate() {
-                let own = own(colour);
-                if !self.keeps || (own * turn.conj()).arg().abs() > TURN_TOLERANCE {
+    /// Returns the factor that removes the mean phase of each colour of the wave `pixels`. It stays as it was while its
+    /// phase is within [`TURN_TOLERANCE`] of the wave's own. The pixels differ from those before within `reach` of
+    /// `changes`, or of the shown frame's.
+    pub(super) fn turns(&mut self, pixels: Pixels<'_>, changes: Option<&Changes>, reach: usize) -> [Complex32; 3] {
+        let (keeps, size) = (self.keeps, self.frame.size());
+        let changes = changes.unwrap_or(&self.changes);
+        if !keeps || changes.blocks.contains(&true) {
+            let differs = |values: Range<usize>| !keeps || changes.any_value(values, size, reach);
+            for (colour, turn) in self.turns[..self.frame.colours()].iter_mut().enumerate() {
+                let own = pixels.turn_where(colour, size.pixels(), differs, &mut self.sums);
+                if !keeps || (own * turn.conj()).arg().abs() > TURN_TOLERANCE {
                     *turn = own;
                 }
             }
@@ -430,6 +449,27 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn values_differ_in_rows_near_a_change() {
+        let size = Size { width: 50, height: 70 };
+        let (down, across) = (5, 4);
+        let blocks = (0..down * across).map(|block| block == 9).collect();
+        let changes = Changes { blocks, across };
+        // The changed block has the rows 32 to 47.
+        for (rows, reach, differs) in [
+            (0..30, 2, false),
+            (0..31, 17, true),
+            (48..70, 0, false),
+            (48..70, 1, true),
+            (40..41, 0, true),
+        ] {
+            let values = size.pixels() + rows.start * 50 + 3..size.pixels() + rows.end * 50 - 3;
+            assert_eq!(changes.any_value(values, size, reach), differs, "{rows:?} {reach}");
+        }
+        let of_two_planes = size.pixels() - 1..size.pixels() + 1;
+        assert!(changes.any_value(of_two_planes, size, 0));
     }
 
     #[test]

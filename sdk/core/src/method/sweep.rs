@@ -43,7 +43,9 @@ use phasefront_kernels::wide;
 use rayon::prelude::*;
 pub use shares::MEET;
 use shares::Slot;
+use std::cmp::Reverse;
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 pub use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
@@ -190,6 +192,8 @@ pub struct SweepScratch {
     wave: Vec<Pixel>,
     /// The blocks whose visible or hidden surfaces have changed since the frame before.
     changes: Changes,
+    /// The rows and columns of the tiles that are computed, the largest first.
+    order: Vec<[Range<usize>; 2]>,
     cancel: Cancel,
 }
 
@@ -293,6 +297,7 @@ impl SweepPlan {
     pub fn scratch(&self) -> SweepScratch {
         let size = self.size.pixels();
         let layers = self.sweep.hidden_layers;
+        let Size { width, height } = self.size;
         SweepScratch {
             positions: vec![0.0; size],
             slots: vec![0; size],
@@ -301,6 +306,7 @@ impl SweepPlan {
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
             wave: vec![Pixel::ZERO; self.filters.len() * size],
             changes: Changes::all(self.size),
+            order: Vec::with_capacity(self.layout.tiles(0..height, 0..width, 2).count()),
             cancel: Cancel::default(),
         }
     }
@@ -324,7 +330,7 @@ impl SweepPlan {
         let is_whole = self.sweep_where(None, frame, scratch)?;
         let wave = Wave {
             pixels: scratch.wave(),
-            size,
+            size: self.size,
             turns: [Complex32::ONE; 3],
             changed: None,
             is_whole,
@@ -354,6 +360,7 @@ impl SweepPlan {
             tiles,
             wave,
             changes: of_surfaces,
+            order,
             cancel,
         } = scratch;
         let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
@@ -391,31 +398,57 @@ impl SweepPlan {
         let mut waves = wave.chunks_exact_mut(size);
         // An array of the largest number of colours avoids an allocation.
         let waves: [_; 3] = std::array::from_fn(|_| Mutex::new(waves.next().unwrap_or_default()));
-        let reach = self.reach();
-        let (down, across) = self.layout.count(self.size);
-        (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
-            if cancel.requested() {
-                return;
-            }
-            let mut tile = Tile::of(&self.layout, self.fir, surfaces, index);
-            if let Some(affected) = affected {
-                let Some([rows, columns]) = affected.affected([&tile.rows, &tile.columns], reach) else {
-                    return;
-                };
-                // Tiles start at whole registers.
-                let columns = columns.start / RUN * RUN..columns.end;
-                tile = Tile { rows, columns, ..tile };
-            }
-            tiles.with(|scratch| {
-                scratch.points.gather(&tile);
-                for (colour, filters) in self.filters.iter().enumerate() {
-                    tile.sweep(colour, filters, scratch);
-                    let mut wave = waves[colour].lock().unwrap_or_else(PoisonError::into_inner);
-                    tile.store(&mut wave, scratch);
+        self.arrange(affected, order);
+        let next = AtomicUsize::new(0);
+        let take = || {
+            order
+                .get(next.fetch_add(1, Ordering::Relaxed))
+                .filter(|_| !cancel.requested())
+        };
+        (0..rayon::current_num_threads())
+            .into_par_iter()
+            .with_max_len(1)
+            .for_each(|_| {
+                while let Some([rows, columns]) = take() {
+                    let tile = Tile {
+                        layout: &self.layout,
+                        fir: self.fir,
+                        surfaces,
+                        rows: rows.clone(),
+                        columns: columns.clone(),
+                    };
+                    tiles.with(|scratch| {
+                        scratch.points.gather(&tile);
+                        for (colour, filters) in self.filters.iter().enumerate() {
+                            tile.sweep(colour, filters, scratch);
+                            let mut wave = waves[colour].lock().unwrap_or_else(PoisonError::into_inner);
+                            tile.store(&mut wave, scratch);
+                        }
+                    });
                 }
             });
-        });
         Ok(!cancel.requested())
+    }
+
+    /// Finds the tiles to compute: those of the frame, or of the rectangle that holds what is `affected`, and of each
+    /// the part that is affected. The largest come first, so that all threads end at about the same time.
+    fn arrange(&self, affected: Option<&Changes>, order: &mut Vec<[Range<usize>; 2]>) {
+        order.clear();
+        let [rows, columns] = [0..self.size.height, 0..self.size.width];
+        let Some(affected) = affected else {
+            return order.extend(self.layout.tiles(rows, columns, 1));
+        };
+        let part = |rows: &Range<usize>, columns: &Range<usize>| affected.affected([rows, columns], self.reach());
+        let Some([rows, columns]) = part(&rows, &columns) else {
+            return;
+        };
+        // The number of tiles does not depend on the threads, because the rounding depends on the tiles.
+        for [rows, columns] in self.layout.tiles(rows, columns, 2) {
+            if let Some([rows, columns]) = part(&rows, &columns) {
+                order.push([rows, columns.start / RUN * RUN..columns.end]);
+            }
+        }
+        order.sort_unstable_by_key(|[rows, columns]| Reverse(rows.len() * columns.len()));
     }
 }
 

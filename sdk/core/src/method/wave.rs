@@ -1,11 +1,13 @@
 //! The wave of a frame as the encoder reads it: the pixels that a method keeps, and those that have changed.
 
-use super::mean_phase;
+use super::mean_phase::{self, Sums};
 use super::standing::Changed;
+use crate::Size;
 use num_complex::Complex32;
 use phasefront_kernels::fir::Pixel;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The units of a wave of amplitude 1 in the sweep's fixed point. Parts of more than 2 saturate.
 pub(super) const UNIT: f32 = 8192.0;
@@ -27,8 +29,8 @@ pub(crate) enum Pixels<'a> {
 pub(crate) struct Wave<'a> {
     /// The pixels, (C, H, W), with their mean phase.
     pub(super) pixels: Pixels<'a>,
-    /// The number of pixels of a colour.
-    pub(super) size: usize,
+    /// The size of the frame.
+    pub(super) size: Size,
     /// The factor that removes the mean phase of each colour.
     pub(crate) turns: [Complex32; 3],
     /// `None` if the method keeps nothing from frame to frame.
@@ -67,6 +69,20 @@ impl<'a> Pixels<'a> {
             Pixels::Float(values) => mean_phase::turn_of(values, |value| value),
         }
     }
+
+    /// Works like [`Self::turn_of`], but sums only the ranges of the colour's pixels again of which `differs` is true.
+    pub(super) fn turn_where(
+        self,
+        colour: usize,
+        size: usize,
+        differs: impl Fn(Range<usize>) -> bool + Sync,
+        sums: &mut Sums,
+    ) -> Complex32 {
+        match self.part(colour * size, size) {
+            Pixels::Fixed(pixels) => sums.turn_of(colour, pixels, value, differs),
+            Pixels::Float(values) => sums.turn_of(colour, values, |value| value, differs),
+        }
+    }
 }
 
 impl<'a> Wave<'a> {
@@ -82,12 +98,18 @@ impl<'a> Wave<'a> {
             Pixels::Fixed(pixels) => value(pixels[at]),
             Pixels::Float(values) => values[at],
         };
-        pixel * self.turns[at / self.size]
+        pixel * self.turns[at / self.size.pixels()]
+    }
+
+    /// Returns whether a value of a range of (C, H, W) may differ from the wave before, apart from the mean phase.
+    pub(crate) fn differs(&self, values: Range<usize>) -> bool {
+        (self.changed).is_none_or(|changed| changed.changes.any_value(values, self.size, changed.reach))
     }
 
     pub(crate) fn plane(&self, colour: usize) -> WavePlane<'a> {
+        let size = self.size.pixels();
         WavePlane {
-            pixels: self.pixels.part(colour * self.size, self.size),
+            pixels: self.pixels.part(colour * size, size),
             turn: self.turns[colour],
         }
     }
@@ -97,7 +119,7 @@ impl<'a> Wave<'a> {
         if !self.is_whole {
             return;
         }
-        for (colour, plane) in field.chunks_exact_mut(self.size).enumerate() {
+        for (colour, plane) in field.chunks_exact_mut(self.size.pixels()).enumerate() {
             let wave = self.plane(colour);
             let parts = plane.par_chunks_mut(PART).enumerate();
             parts.for_each(|(part, plane)| wave.write(part * PART, plane));

@@ -49,7 +49,10 @@ impl Shown {
         let same = before.filter(|(_, changed)| !changed.any());
         let own_scale = match (same, brightness) {
             (Some((made, _)), _) => made.own_scale,
-            (None, Brightness::Smoothed) => percentile.of(wave.len(), |at| wave.value(at)),
+            (None, Brightness::Smoothed) => {
+                let differs = |values| before.is_none() || wave.differs(values);
+                percentile.of(wave.len(), |at| wave.value(at), differs)
+            }
             (None, Brightness::Fixed(scale)) => scale,
             (None, Brightness::FrameMax) => most(),
         };

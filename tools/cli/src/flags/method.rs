@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use phasefront::{Display, Method, Sweep};
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used};
 use phasefront_command::networks;
-use phasefront_io::Result;
+use phasefront_io::{Error, Result};
 use phasefront_models::{NATURAL, default_network};
 
 /// A method for RGB-D images.

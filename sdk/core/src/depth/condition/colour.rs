@@ -43,8 +43,8 @@ pub(super) fn colours<T: Sync>(
             if !in_columns(around.clone()) {
                 continue;
             }
-            // One past the last column that the wanted readings so far reach.
-            let mut end = 0;
+            // The columns that were found last, and one past the last column that the wanted readings so far reach.
+            let (mut found, mut end) = (0..0, 0);
             for column in around.start..(stride.start + reach).min(w) {
                 end = if in_columns(column..column + 1) {
                     column + reach + 1
@@ -57,25 +57,42 @@ pub(super) fn colours<T: Sync>(
                     end = at + 2 * reach + 1;
                 }
                 if at < end {
-                    to[at] = sum(rgb, x.cell.len(), (x.pixels[at], y.pixels[row]));
+                    if found.end != at {
+                        sum(rgb, x, std::mem::replace(&mut found, at..at), y.pixels[row], to);
+                    }
+                    found.end = at + 1;
                 }
             }
+            sum(rgb, x, found, y.pixels[row], to);
         }
     });
 }
 
-/// Sums the colours of the pixels in `columns` and `rows`, each the first and one past the last.
+/// Sums the colours of the readings `columns` of a row that covers `lines` of pixels, the first and one past the last.
+/// It reads each line through all of these readings, in the order of memory.
 #[inline(always)]
-fn sum(rgb: &[f32], width: usize, (columns, rows): ((u32, u32), (u32, u32))) -> Moments {
-    let size = rgb.len() / 3;
-    let mut moments = Moments::default();
-    for line in rows.0 as usize..rows.1 as usize {
-        for i in line * width + columns.0 as usize..line * width + columns.1 as usize {
-            let pixel = [rgb[i], rgb[size + i], rgb[2 * size + i]];
-            moments.count += 1.0;
-            moments.sums.iter_mut().zip(pixel).for_each(|(sum, v)| *sum += v);
-            moments.squares += pixel[0] * pixel[0] + pixel[1] * pixel[1] + pixel[2] * pixel[2];
+fn sum(rgb: &[f32], x: &AxisMap, columns: Range<usize>, lines: (u32, u32), to: &mut [Moments]) {
+    let (size, width) = (rgb.len() / 3, x.cell.len());
+    for column in columns.clone() {
+        let (first, end) = x.pixels[column];
+        to[column] = Moments {
+            count: ((end - first) * (lines.1 - lines.0)) as f32,
+            ..Moments::default()
+        };
+    }
+    for line in lines.0 as usize..lines.1 as usize {
+        for column in columns.clone() {
+            let (first, end) = x.pixels[column];
+            let (at, count) = (line * width + first as usize, (end - first) as usize);
+            let [red, green, blue] = [at, size + at, 2 * size + at].map(|at| &rgb[at..at + count]);
+            let mut moments = to[column];
+            for ((red, green), blue) in red.iter().zip(green).zip(blue) {
+                moments.sums[0] += red;
+                moments.sums[1] += green;
+                moments.sums[2] += blue;
+                moments.squares += red * red + green * green + blue * blue;
+            }
+            to[column] = moments;
         }
     }
-    moments
 }

@@ -43,12 +43,19 @@ impl History {
         }
     }
 
-    /// Returns all lines of `width` pixels.
-    pub(super) fn lines(&mut self, width: usize) -> impl IndexedParallelIterator<Item = Line<&mut [f32], &mut [u8]>> {
-        let colours = self.colours.par_chunks_exact_mut(3 * width);
-        (self.depth.par_chunks_exact_mut(width))
+    /// Returns all lines of `width` pixels, `count` together.
+    pub(super) fn chunks(
+        &mut self,
+        count: usize,
+        width: usize,
+    ) -> impl IndexedParallelIterator<Item = impl Iterator<Item = Line<&mut [f32], &mut [u8]>>> {
+        let colours = self.colours.par_chunks_mut(count * 3 * width);
+        (self.depth.par_chunks_mut(count * width))
             .zip(colours)
-            .map(|(depth, colours)| Line { depth, colours })
+            .map(move |(depth, colours)| {
+                let colours = colours.chunks_exact_mut(3 * width);
+                (depth.chunks_exact_mut(width).zip(colours)).map(|(depth, colours)| Line { depth, colours })
+            })
     }
 }
 

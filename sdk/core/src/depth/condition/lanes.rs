@@ -6,7 +6,7 @@ pub(super) const LANES: usize = 8;
 pub(super) type Lanes<const N: usize = LANES> = [f32; N];
 
 /// The number of values that a search passes over at a time.
-const STRIDE: usize = 32;
+pub(super) const STRIDE: usize = 32;
 
 /// Returns whether any of the `values` is `wanted`. It looks at all of them, so the compiler makes vectors of them.
 #[inline(always)]

@@ -4,7 +4,7 @@
 use super::axis::AxisMap;
 use super::edges::Kind;
 use super::history::{self, History};
-use super::lanes::{self, LANES, Lanes, lanes, load, store};
+use super::lanes::{self, LANES, Lanes, STRIDE, lanes, load, store};
 use super::surfaces::{MOST, Places, Readings, Surface};
 use crate::Size;
 use phasefront_kernels::wide;
@@ -28,6 +28,8 @@ pub(super) const LEAST_ALIKE: f32 = 0.02;
 const OUTVOTED: f32 = f32::NEG_INFINITY;
 /// The number of rows of readings that are decided together.
 const BAND: usize = 8;
+/// The number of lines of pixels whose votes are counted together.
+const CHUNK: usize = 32;
 const SIDE: usize = 2 * REACH + 1;
 
 /// The working memory for readings and pixels of one shape, and the choices of earlier frames.
@@ -39,6 +41,8 @@ pub(super) struct Pixels {
     history: History,
     /// Two rows of readings, interpolated along the row, for each band.
     stretched: Vec<f32>,
+    /// The first depths of the lines above and below each chunk.
+    beside: Vec<f32>,
     near: [f32; SIDE * SIDE],
 }
 
@@ -61,6 +65,7 @@ impl Pixels {
             lead: vec![0.0; height * width],
             history: History::new(height * width),
             stretched: vec![0.0; rows.div_ceil(BAND) * 2 * width],
+            beside: vec![0.0; height.div_ceil(CHUNK) * 2 * width],
             near: std::array::from_fn(|i| quarter(square(i / SIDE) + square(i % SIDE), NEAR)),
         }
     }
@@ -80,18 +85,41 @@ impl Pixels {
             stretched: &mut self.stretched,
         };
         decider.bands(0..decider.y.pixels.len().div_ceil(BAND), lines, &self.history);
-        let (first, near) = (&*to, &self.near);
-        (self.lead.par_chunks_exact_mut(width))
-            .zip(self.second.par_chunks_exact(width))
+        self.copy_beside(to, width);
+        let chunk = CHUNK * width;
+        (to.par_chunks_mut(chunk))
+            .zip(self.second.par_chunks(chunk).zip(self.lead.par_chunks_mut(chunk)))
+            .zip((self.history.chunks(CHUNK, width)).zip(self.beside.par_chunks_exact_mut(2 * width)))
             .enumerate()
-            .for_each(|(y, (lead, second))| wide!(decider.vote(first, second, y, near, lead)));
-        (to.par_chunks_exact_mut(width))
-            .zip(self.second.par_chunks_exact(width))
-            .zip(self.lead.par_chunks_exact(width))
-            .zip(self.history.lines(width))
-            .enumerate()
-            .for_each(|(y, (((to, second), lead), mut line))| wide!(decider.finish(y, (second, lead), &mut line, to)));
+            .for_each(|(i, ((first, (second, lead)), (history, beside)))| {
+                decider.settle(i * CHUNK, (first, second, lead), history, beside, &self.near);
+            });
     }
+
+    /// Copies the first depths of the lines beside each chunk, because chunks change at the same time.
+    fn copy_beside(&mut self, first: &[f32], width: usize) {
+        for (i, beside) in self.beside.chunks_exact_mut(2 * width).enumerate() {
+            let (above, below) = beside.split_at_mut(width);
+            if let Some(line) = (i * CHUNK).checked_sub(1) {
+                above.copy_from_slice(&first[line * width..][..width]);
+            }
+            if let Some(line) = first
+                .get((i + 1) * CHUNK * width..)
+                .and_then(|lines| lines.get(..width))
+            {
+                below.copy_from_slice(line);
+            }
+        }
+    }
+}
+
+/// The surfaces of a reading at an edge, and its pixels along the row: the first, and one past the last.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    surfaces: [Surface; MOST],
+    count: usize,
+    first: usize,
+    end: usize,
 }
 
 /// Lines of the display, and two stretched rows for each band of readings in them.
@@ -103,6 +131,11 @@ struct Lines<'a> {
 }
 
 impl Lines<'_> {
+    /// Returns the depth, the alternative and the lead of line `line` of `width` pixels.
+    fn line(&mut self, line: usize, width: usize) -> [&mut [f32]; 3] {
+        [&mut *self.depth, &mut *self.second, &mut *self.lead].map(|lines| &mut lines[line * width..][..width])
+    }
+
     /// Splits after `pixels` pixels and `stretched` values of stretched rows.
     fn split(&mut self, pixels: usize, stretched: usize) -> (Lines<'_>, Lines<'_>) {
         let (depth, below_depth) = self.depth.split_at_mut(pixels);
@@ -133,7 +166,8 @@ impl Decider<'_> {
                 let rows = band * BAND..((band + 1) * BAND).min(self.y.pixels.len());
                 wide!(self.interpolate(self.lines(rows.clone()), &mut lines));
                 let first = self.lines(rows.clone()).start;
-                rows.for_each(|row| wide!(self.row(row, first, &mut lines, history)));
+                let mut cells = [Cell::default(); STRIDE];
+                rows.for_each(|row| wide!(self.row(row, first, &mut lines, history, &mut cells)));
             });
         }
         let (width, middle) = (self.x.cell.len(), (bands.start + bands.end) / 2);
@@ -193,60 +227,63 @@ impl Decider<'_> {
         }
     }
 
-    /// Decides the pixels at the edges of a row of readings. The `lines` begin with the display's line `first`.
+    /// Decides the pixels at the edges of a row of readings. The `lines` begin with the display's line `first`. `cells`
+    /// is working memory.
     #[inline(always)]
-    fn row(&self, row: usize, first: usize, lines: &mut Lines<'_>, history: &History) {
+    fn row(&self, row: usize, first: usize, lines: &mut Lines<'_>, history: &History, cells: &mut [Cell; STRIDE]) {
         let (h, w) = (self.y.pixels.len(), self.x.pixels.len());
-        let inside = self.y.inside(row);
+        let (inside, width) = (self.y.inside(row), self.x.cell.len());
         if inside.is_empty() {
             return;
         }
         let rows = [row.saturating_sub(1), row, (row + 1).min(h - 1)];
-        let mut surfaces = [Surface::default(); MOST];
         let kinds = &self.readings.kinds[row * w..][..w];
-        let mut next = 0;
-        while let Some(steps) = lanes::first(&kinds[next..], Kind::is_at_edge) {
-            let column = next + steps;
-            next = column + 1;
-            let pixels = self.x.inside(column);
-            if pixels.is_empty() {
-                continue;
+        for stride in lanes::strides(w).filter(|stride| lanes::any(&kinds[stride.clone()], Kind::is_at_edge)) {
+            let mut found = 0;
+            for column in stride.filter(|column| kinds[*column].is_at_edge()) {
+                let pixels = self.x.inside(column);
+                if !pixels.is_empty() {
+                    let columns = [column.saturating_sub(1), column, (column + 1).min(w - 1)];
+                    let around: [usize; 9] = std::array::from_fn(|k| rows[k / 3] * w + columns[k % 3]);
+                    let cell = &mut cells[found];
+                    cell.count = self.readings.surfaces(&around, &mut cell.surfaces);
+                    (cell.first, cell.end) = (pixels.start, pixels.end);
+                    found += 1;
+                }
             }
-            let columns = [column.saturating_sub(1), column, (column + 1).min(w - 1)];
-            let around: [usize; 9] = std::array::from_fn(|k| rows[k / 3] * w + columns[k % 3]);
-            let count = self.readings.surfaces(&around, &mut surfaces);
-            let surfaces = &surfaces[..count];
-            let cell = (inside.clone(), pixels);
-            match cell.1.len() {
-                1 => self.cell::<1>(surfaces, cell, first, lines, history),
-                2..=4 => self.cell::<4>(surfaces, cell, first, lines, history),
-                _ => self.cell::<LANES>(surfaces, cell, first, lines, history),
+            // Line by line, in the order of memory.
+            for y in inside.clone() {
+                let mut lines = lines.line(y - first, width);
+                let history = history.line(y, width);
+                for cell in &cells[..found] {
+                    match cell.end - cell.first {
+                        1 => self.cell::<1>(cell, y, &mut lines, &history),
+                        2..=4 => self.cell::<4>(cell, y, &mut lines, &history),
+                        _ => self.cell::<LANES>(cell, y, &mut lines, &history),
+                    }
+                }
             }
         }
     }
 
-    /// Decides the pixels (`rows`, `columns`) of a reading, `N` at a time.
+    /// Decides the pixels of a reading in line `y`, `N` at a time.
     #[inline(always)]
     fn cell<const N: usize>(
         &self,
-        surfaces: &[Surface],
-        (rows, columns): (Range<usize>, Range<usize>),
-        first: usize,
-        lines: &mut Lines<'_>,
-        history: &History,
+        cell: &Cell,
+        y: usize,
+        [depths, seconds, leads]: &mut [&mut [f32]; 3],
+        history: &history::Line<&[f32], &[u8]>,
     ) {
-        let width = self.x.cell.len();
-        for y in rows {
-            let line = history.line(y, width);
-            for x in columns.clone().step_by(N) {
-                let colours: [Lanes<N>; 3] = self.colours(y * width + x);
-                let places = Places::new(&load(&self.x.offset, x, 0.0), self.y.offset[y]);
-                let [depth, second, lead] = choose(surfaces, &places, &colours, &line.held(x, &colours));
-                let (at, count) = ((y - first) * width + x, N.min(columns.end - x));
-                store(&depth, &mut lines.depth[at..at + count]);
-                store(&second, &mut lines.second[at..at + count]);
-                store(&lead, &mut lines.lead[at..at + count]);
-            }
+        for x in (cell.first..cell.end).step_by(N) {
+            let colours: [Lanes<N>; 3] = self.colours(y * self.x.cell.len() + x);
+            let places = Places::new(&load(&self.x.offset, x, 0.0), self.y.offset[y]);
+            let surfaces = &cell.surfaces[..cell.count];
+            let [depth, second, lead] = choose(surfaces, &places, &colours, &history.held(x, &colours));
+            let end = (x + N).min(cell.end);
+            store(&depth, &mut depths[x..end]);
+            store(&second, &mut seconds[x..end]);
+            store(&lead, &mut leads[x..end]);
         }
     }
 
@@ -271,9 +308,37 @@ impl Decider<'_> {
         [load(red, at, 0.0), load(green, at, 0.0), load(blue, at, 0.0)]
     }
 
-    /// Marks the pixels of line `y` that lose the vote of their neighbours as [`OUTVOTED`].
+    /// Counts the votes of the pixels in lines from `y` on and gives them their depth. `beside` has the first depths of
+    /// the lines above and below.
+    fn settle<'a>(
+        &self,
+        y: usize,
+        (first, second, lead): (&mut [f32], &[f32], &mut [f32]),
+        history: impl Iterator<Item = history::Line<&'a mut [f32], &'a mut [u8]>>,
+        beside: &mut [f32],
+        near: &[f32; SIDE * SIDE],
+    ) {
+        let width = self.x.cell.len();
+        let (above, after) = beside.split_at_mut(width);
+        let lines = second
+            .chunks_exact(width)
+            .zip(lead.chunks_exact_mut(width))
+            .zip(history);
+        for (line, ((second, lead), mut history)) in lines.enumerate() {
+            let (own, rest) = first[line * width..].split_at_mut(width);
+            let below = rest.get(..width).unwrap_or(after);
+            wide!({
+                self.vote([above, own, below], second, y + line, near, lead);
+                above.copy_from_slice(own);
+                self.finish(y + line, (second, lead), &mut history, own);
+            });
+        }
+    }
+
+    /// Marks the pixels of line `y` that lose the vote of their neighbours as [`OUTVOTED`]. `first` has the line and
+    /// those beside it.
     #[inline(always)]
-    fn vote(&self, first: &[f32], second: &[f32], y: usize, near: &[f32; SIDE * SIDE], lead: &mut [f32]) {
+    fn vote(&self, first: [&[f32]; SIDE], second: &[f32], y: usize, near: &[f32; SIDE * SIDE], lead: &mut [f32]) {
         let (width, height) = (self.x.cell.len(), self.y.cell.len());
         if y < REACH || y + REACH >= height {
             return;
@@ -287,7 +352,7 @@ impl Decider<'_> {
             if !lead[x..x + count].iter().any(|lead| *lead < NEIGHBOURS) {
                 continue;
             }
-            let votes = self.votes(first, &load(second, x, 0.0), y * width + x, near);
+            let votes = self.votes(first, &load(second, x, 0.0), (y, x), near);
             for (lead, vote) in lead[x..x + count].iter_mut().zip(votes) {
                 if *lead < NEIGHBOURS && *lead + NEIGHBOURS * vote <= 0.0 {
                     *lead = OUTVOTED;
@@ -314,16 +379,17 @@ impl Decider<'_> {
         }
     }
 
-    /// Returns the mean votes of the neighbours of the pixels from `at` on, 1 for their `first` depth and −1 for their
-    /// `second`.
+    /// Returns the mean votes of the neighbours of the pixels from (`y`, `x`) on, 1 for their `first` depth and −1 for
+    /// their `second`.
     #[inline(always)]
-    fn votes(&self, first: &[f32], second: &Lanes, at: usize, near: &[f32; SIDE * SIDE]) -> Lanes {
+    fn votes(&self, first: [&[f32]; SIDE], second: &Lanes, (y, x): (usize, usize), near: &[f32; SIDE * SIDE]) -> Lanes {
         let width = self.x.cell.len();
-        let (own, colours): (Lanes, [Lanes; 3]) = (load(first, at, 0.0), self.colours(at));
+        let (own, colours): (Lanes, [Lanes; 3]) = (load(first[REACH], x, 0.0), self.colours(y * width + x));
         let (mut sum, mut weights) = ([0.0; LANES], [0.0; LANES]);
         for (k, near) in near.iter().enumerate() {
-            let i = at + (k / SIDE) * width + k % SIDE - REACH * width - REACH;
-            let (theirs, depth): ([Lanes; 3], Lanes) = (self.colours(i), load(first, i, 0.0));
+            let (line, x) = (k / SIDE, x + k % SIDE - REACH);
+            let theirs: [Lanes; 3] = self.colours((y + line - REACH) * width + x);
+            let depth: Lanes = load(first[line], x, 0.0);
             let weight: Lanes = lanes(|i| {
                 let [r, g, b] = [
                     theirs[0][i] - colours[0][i],

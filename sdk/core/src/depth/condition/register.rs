@@ -9,6 +9,7 @@
 
 use crate::Size;
 use crate::frame::Crop;
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// The largest number of colour samples per reading along each axis.
@@ -240,27 +241,23 @@ impl Registration {
         let size = self.edges[0].len();
         let height = size / width;
         let colour = &self.colour;
-        let change = |a: usize, b: usize| {
-            let sum: f32 = (0..3)
-                .map(|c| (colour[c * size + a] - colour[c * size + b]).abs())
-                .sum();
-            // Nothing is known of edges outside the display.
-            if sum.is_nan() { 0.0 } else { sum / (sum + HALF) }
-        };
+        let row = |y: usize| [0, 1, 2].map(|c| &colour[c * size + y * width..][..width]);
         // The edges lie between two readings, so the samples around an edge are as many on both sides.
         let before = 1 - samples % 2;
         let [along_x, along_y] = &mut self.edges;
-        along_x.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-            let at = |x: usize| y * width + x;
-            for (x, to) in row.iter_mut().enumerate() {
-                *to = change(at(x.saturating_sub(before)), at((x + 1).min(width - 1)));
-            }
+        along_x.par_chunks_exact_mut(width).enumerate().for_each(|(y, to)| {
+            let (row, last) = (row(y), width - 1);
+            let from = |x: usize| row.map(|row| &row[x..]);
+            let first = before.min(last);
+            wide!({
+                write_changes(from(0), from(1.min(last)), &mut to[..first]);
+                write_changes(from(0), from(1.min(last) + first), &mut to[first..last]);
+                write_changes(from(last - first), from(last), &mut to[last..]);
+            });
         });
-        along_y.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-            let (above, below) = (y.saturating_sub(before) * width, (y + 1).min(height - 1) * width);
-            for (x, to) in row.iter_mut().enumerate() {
-                *to = change(above + x, below + x);
-            }
+        along_y.par_chunks_exact_mut(width).enumerate().for_each(|(y, to)| {
+            let (above, below) = (row(y.saturating_sub(before)), row((y + 1).min(height - 1)));
+            wide!(write_changes(above, below, to));
         });
         let bands = along_x
             .par_chunks_mut(TILE * width)
@@ -283,15 +280,20 @@ impl Registration {
         for (edges, sums) in self.edges.iter_mut().zip(self.colour.chunks_exact_mut(size)) {
             let rows = sums.par_chunks_exact_mut(width).zip(edges.par_chunks_exact(width));
             rows.for_each(|(sums, row)| {
-                for (x, sum) in sums.iter_mut().enumerate() {
-                    *sum = row[x..(x + samples).min(width)].iter().sum();
-                }
+                wide!({
+                    sums.copy_from_slice(row);
+                    for beside in 1..samples.min(width) {
+                        sums.iter_mut().zip(&row[beside..]).for_each(|(sum, v)| *sum += v);
+                    }
+                });
             });
             edges.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
-                row.fill(0.0);
-                for sums in sums[y * width..].chunks_exact(width).take(samples) {
-                    row.iter_mut().zip(sums).for_each(|(to, sum)| *to += sum);
-                }
+                wide!({
+                    row.fill(0.0);
+                    for sums in sums[y * width..].chunks_exact(width).take(samples) {
+                        row.iter_mut().zip(sums).for_each(|(to, sum)| *to += sum);
+                    }
+                });
             });
         }
     }
@@ -326,6 +328,18 @@ impl Registration {
                 }
             }
         });
+    }
+}
+
+/// Writes the changes of red, green and blue between the samples `a` and `b`. There may be more samples than changes.
+#[inline(always)]
+fn write_changes(a: [&[f32]; 3], b: [&[f32]; 3], to: &mut [f32]) {
+    let count = to.len();
+    let [a, b] = [a, b].map(|samples| samples.map(|samples| &samples[..count]));
+    for (i, to) in to.iter_mut().enumerate() {
+        let sum = (a[0][i] - b[0][i]).abs() + (a[1][i] - b[1][i]).abs() + (a[2][i] - b[2][i]).abs();
+        // Nothing is known of edges outside the display.
+        *to = if sum.is_nan() { 0.0 } else { sum / (sum + HALF) };
     }
 }
 

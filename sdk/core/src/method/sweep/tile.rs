@@ -89,10 +89,24 @@ impl Layout {
         }
     }
 
-    /// Returns the number of tiles down and across a frame.
-    pub(super) fn count(&self, size: Size) -> (usize, usize) {
-        let Size { width, height } = size;
-        (height.div_ceil(self.tile.height), width.div_ceil(self.tile.width))
+    /// Returns the rows and columns of tiles of equal size that cover `rows` and `columns`, at least `least` down.
+    pub(super) fn tiles(
+        &self,
+        rows: Range<usize>,
+        columns: Range<usize>,
+        least: usize,
+    ) -> impl Iterator<Item = [Range<usize>; 2]> {
+        let part = |of: Range<usize>, side: usize| {
+            let starts = of.clone().step_by(side);
+            starts.map(move |start| start..(start + side).min(of.end))
+        };
+        let height = rows.len().div_ceil(rows.len().div_ceil(self.tile.height).max(least));
+        // Tiles start at whole registers.
+        let columns = columns.start / RUN * RUN..columns.end;
+        let width = columns.len().div_ceil(columns.len().div_ceil(self.tile.width));
+        part(rows, height).flat_map(move |rows| {
+            part(columns.clone(), width.next_multiple_of(RUN)).map(move |columns| [rows.clone(), columns])
+        })
     }
 
     /// Returns the first plane whose points matter `away` pixels from the tile, or the number of planes.
@@ -171,20 +185,7 @@ pub(super) struct Tile<'a> {
     pub(super) columns: Range<usize>,
 }
 
-impl<'a> Tile<'a> {
-    /// Returns tile `index` of a frame, counted by rows.
-    pub(super) fn of(layout: &'a Layout, fir: Fir, surfaces: Surfaces<'a>, index: usize) -> Self {
-        let (_, across) = layout.count(surfaces.size);
-        let part = |i: usize, side: usize, size: usize| i * side..((i + 1) * side).min(size);
-        Tile {
-            layout,
-            fir,
-            surfaces,
-            rows: part(index / across, layout.tile.height, surfaces.size.height),
-            columns: part(index % across, layout.tile.width, surfaces.size.width),
-        }
-    }
-
+impl Tile<'_> {
     /// Returns the rows and columns of the frame whose points may matter.
     pub(super) fn around(&self) -> (Range<usize>, Range<usize>) {
         let reach = self.layout.reach();
