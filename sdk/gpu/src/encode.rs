@@ -8,9 +8,12 @@ mod filter;
 mod local;
 mod mean_phase;
 mod midpoint;
+mod natural;
 mod shared;
+mod still;
 
 pub(super) use mean_phase::MeanPhase;
+pub(super) use natural::Natural;
 use phasefront_core::Size;
 
 use super::Result;
@@ -19,6 +22,7 @@ use super::device::Device;
 use crate::method::chain::ChainOptions;
 use double_phase::DoublePhase;
 use filter::Filter;
+use local::{Last, Local};
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
@@ -99,7 +103,30 @@ impl Encoder {
         })
     }
 
-    /// Sets the previous frame of the next submission. Smoothed brightness and midpoint steps continue from it.
+    /// Returns the steps of natural focus, if there are any.
+    pub(super) fn natural(&self) -> Option<&Natural> {
+        match &self.double_phase.local {
+            Some(Local {
+                last: Last::Natural(natural),
+                ..
+            }) => Some(natural),
+            _ => None,
+        }
+    }
+
+    /// Works like [`Self::natural`].
+    pub(super) fn natural_mut(&mut self) -> Option<&mut Natural> {
+        match &mut self.double_phase.local {
+            Some(Local {
+                last: Last::Natural(natural),
+                ..
+            }) => Some(natural),
+            _ => None,
+        }
+    }
+
+    /// Sets the previous frame of the next submission. Smoothed brightness, midpoint steps and those of natural focus
+    /// continue from it.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         self.double_phase.set_past(device, past);
         if let Some(smoother) = &self.smoother {
@@ -117,7 +144,8 @@ impl Encoder {
         }
     }
 
-    /// Encodes into the output buffers with that index.
+    /// Encodes into the output buffers with that index. With steps of natural focus, it only starts them, and
+    /// [`Natural::arrive`] writes levels.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         // Brightness is measured on the unfiltered field, as on the CPU.
         if let Some(smoother) = &self.smoother {

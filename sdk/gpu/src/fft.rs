@@ -1,11 +1,15 @@
 //! Applies a filter in the Fourier domain of zero-padded planes in three dispatches: rows, columns with the filter
-//! between their two transforms, and rows back. The counterpart of [`phasefront_core::optics::fft`].
+//! between their two transforms, and rows back. `paths` applies several filters and their adjoints. The counterpart of
+//! [`phasefront_core::optics::fft`].
 //!
 //! A line is transformed in workgroup memory, which limits its length: to 4096 with 32 KiB.
+
+mod paths;
 
 use super::device::{Constants, Device, Dispatch};
 use super::{GpuError, Result};
 use num_complex::Complex32;
+pub(super) use paths::{Paths, PathsJob};
 use phasefront_core::Size;
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -49,15 +53,20 @@ pub(super) struct Convolution {
     filter: wgpu::Buffer,
 }
 
-/// The operations of one of the three dispatches.
+/// The operations of a dispatch.
 #[derive(Clone, Copy)]
 struct Stage {
     length: usize,
     forward: bool,
     filter: bool,
+    /// Whether the filter has the conjugate factors.
+    conjugate: bool,
     inverse: bool,
     even: bool,
+    /// Whether the result replaces the source.
     in_place: bool,
+    /// Whether the result is added to what is there.
+    add: bool,
     turn: bool,
 }
 
@@ -65,10 +74,31 @@ struct Stage {
 /// line, and the length of a line.
 struct Lines<'a> {
     buffer: &'a wgpu::Buffer,
+    count: usize,
     places: [usize; 4],
 }
 
-/// The resources that the three dispatches share.
+impl<'a> Lines<'a> {
+    /// The rows of planes of this size.
+    fn rows(buffer: &'a wgpu::Buffer, Size { width, height }: Size) -> Self {
+        Lines {
+            buffer,
+            count: height,
+            places: [height * width, width, 1, width],
+        }
+    }
+
+    /// The columns of planes of this size.
+    fn columns(buffer: &'a wgpu::Buffer, Size { width, height }: Size) -> Self {
+        Lines {
+            buffer,
+            count: width,
+            places: [height * width, 1, width, height],
+        }
+    }
+}
+
+/// The resources that the dispatches of a filter share.
 struct Shared<'a> {
     device: &'a Device,
     filter: &'a wgpu::Buffer,
@@ -79,40 +109,29 @@ struct Shared<'a> {
 
 impl Convolution {
     pub(super) fn new(device: &Device, planes: &Planes<'_>) -> Result<Self> {
-        let Size { width, height } = planes.size;
-        let Size {
-            width: padded_width,
-            height: padded_height,
-        } = planes.padded;
+        let Planes { size, padded, .. } = *planes;
+        let spectra = spectra_size(size, padded);
         let one = planes.factors[0].len();
-        let even = one == (padded_height / 2 + 1) * (padded_width / 2 + 1);
         let table: Vec<Complex32> = planes.factors.concat();
         let table = device.table("a filter", bytemuck::cast_slice(&table))?;
-        let rows = device.buffer("spectra", 3 * height * padded_width * 8)?;
-        let row_roots = roots(device, padded_width)?.buffer;
-        let column_roots = roots(device, padded_height)?.buffer;
-        let [row, column, back] = Stage::of(planes, even);
+        let rows = device.buffer("spectra", 24 * spectra.pixels())?;
+        let row_roots = roots(device, padded.width)?.buffer;
+        let column_roots = roots(device, padded.height)?.buffer;
+        let [row, column, back] = Stage::of(padded, is_even(one, padded), planes.turn.is_some());
         let shared = Shared {
             device,
             filter: &table.buffer,
             filter_plane: if planes.factors.len() > 1 { one } else { 0 },
             turn: planes.turn.unwrap_or(&row_roots),
         };
-        let at = |buffer, places| Lines { buffer, places };
-        let frame = || at(planes.field, [height * width, width, 1, width]);
-        let spectra = || at(&rows, [height * padded_width, padded_width, 1, padded_width]);
-        let columns = [height * padded_width, 1, padded_width, height];
+        let frame = || Lines::rows(planes.field, size);
+        let across = || Lines::rows(&rows, spectra);
+        let down = |buffer| Lines::columns(buffer, spectra);
         let steps = [
-            shared.step("rows", row, &row_roots, (frame(), spectra()), height)?,
+            shared.step("rows", row, &row_roots, (frame(), across()))?,
             // In place: the program reads the result's buffer and ignores the one bound as its source.
-            shared.step(
-                "columns",
-                column,
-                &column_roots,
-                (at(&column_roots, columns), at(&rows, columns)),
-                padded_width,
-            )?,
-            shared.step("rows back", back, &row_roots, (spectra(), frame()), height)?,
+            shared.step("columns", column, &column_roots, (down(&column_roots), down(&rows)))?,
+            shared.step("rows back", back, &row_roots, (across(), frame()))?,
         ];
         Ok(Convolution {
             steps,
@@ -131,6 +150,19 @@ impl Convolution {
     }
 }
 
+/// Returns the size of a plane whose rows are transformed and padded.
+fn spectra_size(size: Size, padded: Size) -> Size {
+    Size {
+        width: padded.width,
+        height: size.height,
+    }
+}
+
+/// Returns whether a filter of `values` values is one quadrant.
+fn is_even(values: usize, padded: Size) -> bool {
+    values == (padded.height / 2 + 1) * (padded.width / 2 + 1)
+}
+
 /// Creates a table of exp(2πi j/n) for each j below `n`.
 fn roots(device: &Device, n: usize) -> Result<Constants> {
     let root = |j: usize| {
@@ -142,16 +174,15 @@ fn roots(device: &Device, n: usize) -> Result<Constants> {
 }
 
 impl Shared<'_> {
-    /// Creates the dispatch of `stage` on this number of `lines`, from `from` to `to`.
+    /// Creates the dispatch of `stage` from the lines `from` to as many lines `to`.
     fn step(
         &self,
         what: &str,
         stage: Stage,
         roots: &wgpu::Buffer,
         (from, to): (Lines<'_>, Lines<'_>),
-        lines: usize,
     ) -> Result<Dispatch> {
-        let device = self.device;
+        let (device, lines) = (self.device, to.count);
         let together = stage.lines_together(device)?;
         let numbers = [&[lines], &from.places[..], &to.places, &[self.filter_plane]].concat();
         let mut numbers: Vec<u32> = numbers.into_iter().map(|n| n as u32).collect();
@@ -171,19 +202,22 @@ impl Shared<'_> {
 }
 
 impl Stage {
-    /// Returns the stages for rows, columns and rows back. `even` means that the filter is one quadrant.
-    fn of(planes: &Planes<'_>, even: bool) -> [Stage; 3] {
+    /// Returns the stages for rows, columns and rows back. `even` means that the filter is one quadrant, `turn` that
+    /// the colours are turned when they are read.
+    fn of(padded: Size, even: bool, turn: bool) -> [Stage; 3] {
         let row = Stage {
-            length: planes.padded.width,
+            length: padded.width,
             forward: true,
             filter: false,
+            conjugate: false,
             inverse: false,
             even,
             in_place: false,
-            turn: planes.turn.is_some(),
+            add: false,
+            turn,
         };
         let column = Stage {
-            length: planes.padded.height,
+            length: padded.height,
             filter: true,
             inverse: true,
             in_place: true,
@@ -203,7 +237,7 @@ impl Stage {
     /// four values at a time.
     fn lines_together(&self, device: &Device) -> Result<usize> {
         let most = device.limits().max_compute_workgroup_storage_size as usize;
-        let wanted: &[usize] = if self.in_place { &[4, 2, 1] } else { &[1] };
+        let wanted: &[usize] = if self.filter { &[4, 2, 1] } else { &[1] };
         let fits = |lines: &&usize| **lines * self.length * 8 <= most;
         wanted.iter().find(fits).copied().ok_or_else(|| {
             GpuError::Refused(format!(
@@ -228,16 +262,20 @@ impl Stage {
             const THREADS: u32 = {threads}u;
             const FORWARD: bool = {};
             const FILTER: bool = {};
+            const CONJUGATE: bool = {};
             const INVERSE: bool = {};
             const EVEN: bool = {};
             const IN_PLACE: bool = {};
+            const ADD: bool = {};
             const TURN: bool = {};
             ",
             self.forward,
             self.filter,
+            self.conjugate,
             self.inverse,
             self.even,
             self.in_place,
+            self.add,
             self.turn,
             threads = each * lines,
         );

@@ -105,14 +105,16 @@ fn convolve(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         for (var j = t; j < N; j += EACH) {
             let even = near * (N / 2u + 1u) + min(j, N - j);
             let at = colour * lines.table_plane + select(column * N + j, even, EVEN);
-            row[j * LINES + l] = times(row[j * LINES + l], table[at]);
+            let factor = select(table[at], table[at] * vec2f(1, -1), CONJUGATE);
+            row[j * LINES + l] = times(row[j * LINES + l], factor);
         }
         workgroupBarrier();
     }
     if (INVERSE) { transform(t, l, 1.0); }
     for (var j = t; j < lines.to_count; j += EACH) {
         if (there) {
-            result[colour * lines.to_plane + line * lines.to_line + j * lines.to_step] = row[j * LINES + l];
+            let at = colour * lines.to_plane + line * lines.to_line + j * lines.to_step;
+            if (ADD) { result[at] += row[j * LINES + l]; } else { result[at] = row[j * LINES + l]; }
         }
     }
 }

@@ -5,11 +5,13 @@ mod camera;
 mod condition;
 mod frame;
 mod light;
+mod read_back;
 mod rounding;
 mod source;
 
 pub use frame::{Colour, ColourData, Depth, DepthData, Frame};
 use phasefront_core::Size;
+pub(super) use read_back::ReadBack;
 pub(super) use source::Source;
 
 use super::Result;
@@ -111,7 +113,9 @@ pub(super) struct Packer {
     frames: Option<Frames>,
     pub(super) input: ChainInput,
     step: Dispatch,
-    /// Converts surfaces whose depth was decided on the GPU.
+    /// The frame's surfaces, if the stage writes them.
+    surfaces: Option<wgpu::Buffer>,
+    /// Converts the surfaces to the input, if that is another form.
     last: Option<Box<Packer>>,
 }
 
@@ -125,16 +129,27 @@ impl Packer {
         source: Source<'_>,
         input: Option<ChainInput>,
     ) -> Result<Self> {
-        let Source::Frame(_, Depth::Readings(readings)) = source else {
-            return Self::alone(device, form, size, source, input);
-        };
+        match source {
+            Source::Frame(_, Depth::Readings(_)) => Self::by_surfaces(device, form, size, source, input),
+            _ => Self::alone(device, form, size, source, input),
+        }
+    }
+
+    /// Works like [`Self::new`] for frames, and writes their surfaces too.
+    pub(super) fn by_surfaces(
+        device: &Device,
+        form: Form<'_>,
+        size: Size,
+        source: Source<'_>,
+        input: Option<ChainInput>,
+    ) -> Result<Self> {
         let (is_last, surfaces) = match form {
             Form::Surfaces => (true, input.clone()),
             Form::Chain(..) => (false, None),
         };
         let mut packer = Self::alone(device, Form::Surfaces, size, source, surfaces)?;
         let surfaces = packer.input.first.clone();
-        if let Some(frames) = &mut packer.frames {
+        if let (Some(frames), Source::Frame(_, Depth::Readings(readings))) = (&mut packer.frames, source) {
             frames.conditioning = Some(Conditioning::new(device, readings, size, &surfaces)?);
         }
         if !is_last {
@@ -143,6 +158,12 @@ impl Packer {
             packer.last = Some(Box::new(last));
         }
         Ok(packer)
+    }
+
+    /// Returns the surfaces of a frame after [`Self::condition`], (H, W) of red, green, blue and depth, if the stage
+    /// writes them.
+    pub(super) fn surfaces(&self) -> Option<&wgpu::Buffer> {
+        self.surfaces.as_ref()
     }
 
     /// Plans the stage without conditioning.
@@ -191,6 +212,10 @@ impl Packer {
         Ok(Packer {
             planes: reader.first,
             frames,
+            surfaces: match form {
+                Form::Surfaces => Some(input.first.clone()),
+                Form::Chain(..) => None,
+            },
             input,
             step,
             last: None,

@@ -1,6 +1,6 @@
 //! Runs whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as wgpu compute passes for Vulkan, Metal,
-//! DirectX 12 and a browser's WebGPU. The input is a frame and the output is modulator levels. No intermediate result
-//! returns to the CPU.
+//! DirectX 12 and a browser's WebGPU. The input is a frame and the output is modulator levels. The CPU computes only
+//! the focal stack of natural focus, from the frame as the GPU has read it.
 //!
 //! Each stage is a .wgsl file beside its Rust file. The Rust code prepends a header of constants to the shader text, so
 //! that loops have constant bounds. The CPU stage is the reference: f32 agrees with it to 1e-4, int8 networks agree bit
@@ -11,8 +11,8 @@
 //! | `device` | opens a GPU, compiles programs, allocates memory, returns failures as errors |
 //! | `input` | converts camera formats to groups of four channels, and decides the depth of pixels from readings |
 //! | `method` | runs a network (`chain`), the plane sweep (`sweep`, `hidden`), or the network on the sweep's field |
-//! | `fft` | applies a filter in the Fourier domain in three dispatches |
-//! | `encode` | filters, largest amplitude, double phase, levels, local and midpoint correction |
+//! | `fft` | applies a filter in the Fourier domain in three dispatches; `paths` several and their adjoints |
+//! | `encode` | filters, largest amplitude, double phase, levels, local and midpoint correction, natural focus |
 //! | `pipeline` | runs all stages, with three frames in flight |
 //! | `probe` | compares a small frame with the CPU's |
 //! | `renderer` | reopens a lost device |

@@ -25,6 +25,8 @@ use sweep::Sweeper;
 /// A method for one frame size.
 pub(super) struct MethodPlan {
     size: Size,
+    /// Whether a network's input, too, is made from the frame's surfaces.
+    keeps_surfaces: bool,
     /// Converts the frame to the input of the network or the sweep.
     packer: Packer,
     plan: Plan,
@@ -87,7 +89,7 @@ impl Trained {
 }
 
 impl MethodPlan {
-    /// Plans `method` for frames of `size` in `formats`.
+    /// Plans `method` for frames of `size` in `formats`. With `keeps_surfaces`, every method has [`Self::surfaces`].
     pub(super) fn new(
         device: &Device,
         method: &Method,
@@ -95,6 +97,7 @@ impl MethodPlan {
         display: &Display,
         formats: (Colour, Depth),
         options: ChainOptions,
+        keeps_surfaces: bool,
     ) -> Result<Self> {
         let source = Source::Frame(formats.0, formats.1);
         let how = |network: &Network| {
@@ -110,7 +113,11 @@ impl MethodPlan {
             Method::Network(network) => {
                 let how = how(network)?;
                 let form = Form::Chain(chain_of(network)?.0, how.0, how.1);
-                let packer = Packer::new(device, form, size, source, None)?;
+                let packer = if keeps_surfaces {
+                    Packer::by_surfaces(device, form, size, source, None)?
+                } else {
+                    Packer::new(device, form, size, source, None)?
+                };
                 let trained = Trained::new(device, network, how, size, &packer, options)?;
                 (packer, Plan::Network(trained))
             }
@@ -161,7 +168,12 @@ impl MethodPlan {
             }
             _ => return Err(GpuError::Refused("this method runs on the CPU only".into())),
         };
-        Ok(MethodPlan { size, packer, plan })
+        Ok(MethodPlan {
+            size,
+            keeps_surfaces,
+            packer,
+            plan,
+        })
     }
 
     /// Plans the input stage again for frames in `formats`.
@@ -175,10 +187,19 @@ impl MethodPlan {
         };
         let source = Source::Frame(formats.0, formats.1);
         let input = Some(self.packer.input.clone());
-        self.packer = device
-            .guarded_async(|| Packer::new(device, form, self.size, source, input))
-            .await?;
+        let (size, keeps_surfaces) = (self.size, self.keeps_surfaces);
+        let plan = || match keeps_surfaces {
+            true => Packer::by_surfaces(device, form, size, source, input),
+            false => Packer::new(device, form, size, source, input),
+        };
+        self.packer = device.guarded_async(plan).await?;
         Ok(())
+    }
+
+    /// Returns the surfaces of a frame after [`Self::condition`], (H, W) of red, green, blue and depth, if the plan
+    /// has them.
+    pub(super) fn surfaces(&self) -> Option<&wgpu::Buffer> {
+        self.packer.surfaces()
     }
 
     /// Uploads a frame. The upload is complete before the next submission starts.

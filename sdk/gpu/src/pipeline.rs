@@ -4,7 +4,7 @@
 use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, EncoderJob, LevelsBuffers, MeanPhase};
 use super::fft::{Convolution, Planes};
-use super::input::{Colour, Depth, Frame};
+use super::input::{Colour, Depth, Frame, ReadBack};
 use super::method::MethodPlan;
 use super::{GpuError, Result};
 #[cfg(not(target_arch = "wasm32"))]
@@ -27,6 +27,8 @@ const LEVELS_AT: usize = 256;
 const STAMPS_AT: u64 = 16;
 /// The number of time stamps of a frame: one before and one after each stage.
 const STAMPS: u32 = 10;
+/// The stage that encodes a field, which steps of natural focus continue.
+const ENCODE: u32 = 4;
 
 /// A description of the holograms to compute.
 #[derive(Clone)]
@@ -124,6 +126,8 @@ pub struct GpuPipeline {
     device: Arc<Device>,
     size: Size,
     method: MethodPlan,
+    /// Reads frames for the focal stack of steps of natural focus.
+    read_back: Option<ReadBack>,
     /// Of a field that a network writes and of one that a sweep writes. Empty for an encoding that was trained on the
     /// field's unmodified phase.
     mean: [Option<MeanPhase>; 2],
@@ -173,9 +177,6 @@ impl GpuPipeline {
                     .into(),
             ));
         }
-        if job.encoder.focus_steps > 0 {
-            return Err(GpuError::Refused("steps of natural focus, which are the CPU's".into()));
-        }
         if let Encoding::Deep(network) = &job.encoder.encoding {
             network.check_prefilter(display)?;
         }
@@ -185,7 +186,8 @@ impl GpuPipeline {
     fn build(device: &Arc<Device>, job: &Job, size: Size) -> Result<Self> {
         let (target, formats) = (&job.target, (job.colour, job.depth));
         let (display, encoder) = (&target.display, &job.encoder);
-        let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
+        let reads_back = encoder.focus_steps > 0;
+        let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain, reads_back)?;
         let of_phase = if encoder.encoding.keeps_phase() {
             None
         } else {
@@ -236,6 +238,7 @@ impl GpuPipeline {
             device: device.clone(),
             size,
             method,
+            read_back: reads_back.then(|| ReadBack::new(device, size)),
             mean,
             offset,
             encoder,
@@ -289,6 +292,8 @@ impl GpuPipeline {
     }
 
     /// Submits a frame whose smoothed brightness starts from the scale in `past`. At most [`FLIGHTS`] may be in flight.
+    /// Waits until the frame is read if its method or steps of natural focus depend on it, and, except in a browser,
+    /// for all of these steps but the last.
     ///
     /// # Errors
     /// Returns an error if the frame's byte lengths differ from the plan, too many frames are in flight or the device
@@ -305,16 +310,16 @@ impl GpuPipeline {
             self.method.upload(&device, frame)?;
             self.encoder.set_past(&device, past);
             let read = self.reading(slot);
-            if self.method.softness().is_some() {
+            if self.method.softness().is_some() || self.read_back.is_some() {
                 return Ok((device.queue.submit([read]), true));
             }
             Ok((device.queue.submit([read, self.making(slot, deliver)]), false))
         };
-        let (mut submission, is_measured) = device.guarded_async(work).await?;
-        if is_measured {
+        let (mut submission, is_awaited) = device.guarded_async(work).await?;
+        if is_awaited {
             self.method.choose(&device, past, &submission).await?;
-            let work = || Ok(device.queue.submit([self.making(slot, deliver)]));
-            submission = device.guarded_async(work).await?;
+            self.aim(&submission).await?;
+            submission = device.guarded_async(|| self.make(slot, deliver)).await?;
         }
         self.serial += 1;
         self.slots[slot].flight = Some(Flight {
@@ -326,6 +331,50 @@ impl GpuPipeline {
             slot,
             serial: self.serial,
         })
+    }
+
+    /// Lets steps of natural focus, if there are any, aim at the frame that `submission` reads.
+    async fn aim(&mut self, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        let device = self.device.clone();
+        if let (Some(read_back), Some(natural)) = (&mut self.read_back, self.encoder.natural_mut()) {
+            let frame = read_back.frame(&device, submission).await?;
+            let aim = || {
+                natural.aim(&device, frame);
+                Ok(())
+            };
+            device.guarded_async(aim).await?;
+        }
+        Ok(())
+    }
+
+    /// Submits the commands that make the hologram of the frame in slot `at`, which was read. Each step of natural
+    /// focus is a submission, because drivers give up on long ones.
+    fn make(&self, at: usize, deliver: Deliver) -> Result<wgpu::SubmissionIndex> {
+        let queue = &self.device.queue;
+        let mut submission = queue.submit([self.making(at, deliver)]);
+        let Some(natural) = self.encoder.natural() else {
+            return Ok(submission);
+        };
+        for step in 1..=natural.steps() {
+            let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
+            let is_last = step == natural.steps();
+            let ends = is_last.then_some(2 * ENCODE + 1);
+            self.pass(&mut encoder, at, [None, ends], |pass| {
+                natural.step(pass);
+                if is_last {
+                    natural.arrive(pass, at);
+                }
+            });
+            if is_last {
+                self.deliver(&mut encoder, at, deliver);
+            }
+            let next = queue.submit([encoder.finish()]);
+            // A wait for all steps would look like a hung device. A browser watches over its queue itself.
+            #[cfg(not(target_arch = "wasm32"))]
+            self.device.wait(&submission)?;
+            submission = next;
+        }
+        Ok(submission)
     }
 
     /// Reads a frame without making its hologram, so that the next one has its past.
@@ -355,19 +404,32 @@ impl GpuPipeline {
         index: u32,
         work: impl FnOnce(&mut wgpu::ComputePass<'_>),
     ) {
+        self.pass(encoder, at, [Some(2 * index), Some(2 * index + 1)], work);
+    }
+
+    /// Runs `work` between two time stamps of the frame in slot `at`, as far as they are given.
+    fn pass(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        at: usize,
+        [begin, end]: [Option<u32>; 2],
+        work: impl FnOnce(&mut wgpu::ComputePass<'_>),
+    ) {
         let stamps = self.slots[at].stamps.as_ref();
+        let stamps = stamps.filter(|_| begin.is_some() || end.is_some());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: None,
             timestamp_writes: stamps.map(|(set, _)| wgpu::ComputePassTimestampWrites {
                 query_set: set,
-                beginning_of_pass_write_index: Some(2 * index),
-                end_of_pass_write_index: Some(2 * index + 1),
+                beginning_of_pass_write_index: begin,
+                end_of_pass_write_index: end,
             }),
         });
         work(&mut pass);
     }
 
-    /// Returns the commands that read the frame in slot `at` and measure its depth, if the method depends on it.
+    /// Returns the commands that read the frame in slot `at`, measure its depth, if the method depends on it, and read
+    /// it back, if steps of natural focus do.
     fn reading(&self, at: usize) -> wgpu::CommandBuffer {
         let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
         if let Some(softness) = self.method.softness() {
@@ -378,12 +440,15 @@ impl GpuPipeline {
         if let Some(softness) = self.method.softness() {
             softness.copy(&mut encoder);
         }
+        if let (Some(read_back), Some(surfaces)) = (&self.read_back, self.method.surfaces()) {
+            read_back.copy(&mut encoder, surfaces);
+        }
         encoder.finish()
     }
 
-    /// Returns the commands that make the hologram of the frame in slot `at`, which was read.
+    /// Returns the commands that make the hologram of the frame in slot `at`, which was read, up to the first step of
+    /// natural focus if there are any.
     fn making(&self, at: usize, deliver: Deliver) -> wgpu::CommandBuffer {
-        let slot = &self.slots[at];
         let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
         self.encoder.reset(&mut encoder);
         let mean = &self.mean[usize::from(self.method.is_swept())];
@@ -398,7 +463,18 @@ impl GpuPipeline {
                 offset.run(pass);
             }
         });
-        self.stage(&mut encoder, at, 4, |pass| self.encoder.run(pass, at));
+        let is_last = self.encoder.natural().is_none();
+        let stamps = [Some(2 * ENCODE), is_last.then_some(2 * ENCODE + 1)];
+        self.pass(&mut encoder, at, stamps, |pass| self.encoder.run(pass, at));
+        if is_last {
+            self.deliver(&mut encoder, at, deliver);
+        }
+        encoder.finish()
+    }
+
+    /// Copies the results of the frame in slot `at` to memory that the CPU reads.
+    fn deliver(&self, encoder: &mut wgpu::CommandEncoder, at: usize, deliver: Deliver) {
+        let slot = &self.slots[at];
         encoder.copy_buffer_to_buffer(&self.encoder.largest, 0, &slot.readable, 0, 16);
         if let Some((set, resolved)) = &slot.stamps {
             let bytes = u64::from(STAMPS) * 8;
@@ -410,7 +486,6 @@ impl GpuPipeline {
             let levels = &self.buffers[at].levels;
             encoder.copy_buffer_to_buffer(levels, 0, &slot.readable, LEVELS_AT as u64, bytes);
         }
-        encoder.finish()
     }
 
     /// Returns the texture that holds or will hold a frame's levels: 8-bit RGBA, with the levels of red, green and
@@ -521,7 +596,7 @@ impl GpuPipeline {
                 depth: stage(1),
                 method: stage(2),
                 propagate: stage(3),
-                encode: stage(4),
+                encode: stage(ENCODE as usize),
             }),
         })
     }

@@ -468,6 +468,41 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     }
 }
 
+/// Runs steps of natural focus after networks in both number formats and after the sweep, with two frames in flight.
+#[test]
+fn natural_focus_is_that_of_the_cpu() {
+    let device = device();
+    let size = Size { width: 61, height: 47 };
+    let int8 = Network::from_onnx(include_bytes!("../../../models/natural-8-int8.onnx")).unwrap();
+    let float = Network::from_onnx(include_bytes!("../../../models/natural-8.onnx")).unwrap();
+    let half = if device.has_half() { Float::F16 } else { Float::F32 };
+    let display = Display::default();
+    for (method, offset_m, float, tolerance) in [
+        (Method::trained(Arc::new(int8)), 0.0, Float::F32, 0.002),
+        (Method::trained(Arc::new(float)), 1e-3, half, 0.05),
+        (Method::Sweep(Sweep::for_display(&display)), 0.0, Float::F32, 0.002),
+    ] {
+        let display = display.clone().with_offset_m(offset_m).unwrap();
+        let mut job = planned(size, method, &display, Encoding::ANTI_ALIAS, Brightness::Smoothed);
+        job.encoder.focus_steps = 3;
+        job.chain.float = float;
+        let frame = rgbd(size);
+        let dim = RgbdFrame::new(frame.rgb().mapv(|v| 0.5 * v), frame.depth().to_owned()).unwrap();
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        let submit = |frame| plan.submit(&Frame::of(frame), Deliver::Levels).unwrap();
+        let tickets = [&frame, &dim].map(submit);
+        for (ticket, frame) in tickets.into_iter().zip([&frame, &dim]) {
+            let (expected, scale) = on_cpu(&job, frame);
+            let mut levels = vec![0; 3 * size.pixels()];
+            let report = plan.collect(ticket, &mut levels).unwrap();
+            let apart = apart(&levels, &expected, &job.target.response);
+            println!("{}: {apart} {report:?}", plan.describe());
+            assert!(apart < tolerance, "{}: {apart}", plan.describe());
+            assert!((report.scale - scale).abs() < tolerance * scale, "{report:?} {scale}");
+        }
+    }
+}
+
 /// Bytes of camera planes for a sensor with odd sides and strides as in cameras.
 struct Sensor {
     format: ColourFormat,
@@ -942,6 +977,8 @@ fn small_jobs(Size { width: w, height: h }: Size) -> Vec<(Job, f32)> {
     midpoint.chain.fusion = Fusion::Pairs;
     let mut half = job(network(Model::new(5, 8)), 0.0, Encoding::ANTI_ALIAS, maximal);
     half.chain.float = Float::F16;
+    let mut natural = job(network(Model::int8(3, 8)), 1e-3, Encoding::ANTI_ALIAS, maximal);
+    natural.encoder.focus_steps = 2;
     vec![
         (
             job(network(Model::int8(3, 8)), 0.0, Encoding::ANTI_ALIAS, maximal),
@@ -953,6 +990,7 @@ fn small_jobs(Size { width: w, height: h }: Size) -> Vec<(Job, f32)> {
         (midpoint, 0.002),
         // One 8-bit step of a pre-filter outweighs rounding.
         (job(network(halved), 0.0, Encoding::Deep(of(prefilter)), maximal), 0.02),
+        (natural, 0.002),
     ]
 }
 
@@ -1044,6 +1082,7 @@ fn every_program_agrees_with_the_cpu_on_readings() {
         (Size { width: 37, height: 13 }, 0),
         (Size { width: 11, height: 5 }, 1),
         (Size { width: 9, height: 7 }, 4),
+        (Size { width: 11, height: 5 }, 6),
     ] {
         let (mut job, tolerance) = jobs[which].clone();
         job.chain.fusion = Fusion::Layers;

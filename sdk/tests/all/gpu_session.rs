@@ -108,6 +108,24 @@ fn images_of_an_f32_network_are_near_the_cpus() {
     }
 }
 
+/// Runs steps of natural focus on a video that stands partly still, from depth of the frame's size and from readings.
+#[test]
+fn steps_of_natural_focus_are_those_of_the_cpu() {
+    let mut plain = options(Size { width: W, height: H });
+    plain.encoder.focus_steps = 2;
+    let cpu = VideoSession::new(plain.clone()).unwrap();
+    let gpu = VideoSession::new(on_gpu(plain)).unwrap();
+    let planar = Scene::new(Size { width: W, height: H }, 10);
+    let metres = planar.depth_bytes(DepthFormat::MetresF32);
+    for frame in [frame_at(1), frame_at(2), frame(3 * 33_000_000, &planar, &metres)] {
+        let expected = cpu.process(&frame).unwrap();
+        let made = gpu.process(&frame).unwrap();
+        let share = differing(made.levels(), expected.levels(), 0.01);
+        assert!(share < 0.05, "{share}");
+    }
+    assert_eq!(gpu.statistics().backend.name, gpu.gpu().unwrap().name());
+}
+
 /// Runs the plane sweep, alone and under a network, at separate quality levels, on camera frames.
 #[test]
 #[ignore = "slow: 20 seconds of a core in software"]
@@ -438,9 +456,6 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.quality_levels[0].method.clone());
     (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
     cases.push((one, "one laser"));
-    let mut natural = SessionOptions::for_focus(gpu.target.clone(), Focus::Natural { steps: 2 }).unwrap();
-    (natural.backend, natural.gpu) = (gpu.backend, gpu.gpu.clone());
-    cases.push((natural, "steps of natural focus"));
     // One line is too long for any workgroup's memory.
     let mut long = gpu.clone();
     let text = "width = 9000\nheight = 4\noffset_mm = 2";

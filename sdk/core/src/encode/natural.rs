@@ -47,7 +47,7 @@ pub const MOMENTUM: f32 = 0.8;
 /// γ of one map. Several maps share the light, and half of it is stable.
 pub const RATE: f32 = 1.0;
 /// The amplitude that keeps the division by a finite.
-const FLOOR: f32 = 1e-3;
+pub const FLOOR: f32 = 1e-3;
 /// The largest number of steps.
 pub(super) const MAX_STEPS: usize = 1000;
 
@@ -162,6 +162,21 @@ impl NaturalSteps {
             registration: RegistrationPlan::new(size, colours.len(), &target.registration)?,
             illumination: (target.illumination.clone()).map(|light| (light, target.modulator())),
         })
+    }
+
+    /// Returns K_p without the aperture, colour by colour, on planes of [`Self::padded_size`].
+    pub fn paths(&self) -> &[Transfer] {
+        &self.paths
+    }
+
+    /// Returns the padded size of the paths.
+    pub fn padded_size(&self) -> Size {
+        self.fft.padded_size()
+    }
+
+    /// Returns the stack that the steps aim at, without the memory of the paths.
+    pub fn into_stack(self) -> FocalStack {
+        self.stack
     }
 
     /// Returns working memory for `maps` maps and one call at a time, sized for the current thread pool.

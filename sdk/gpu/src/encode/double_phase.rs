@@ -14,7 +14,7 @@ pub(super) struct DoublePhase {
     peak: Option<Dispatch>,
     /// One dispatch for each output buffer if there is no correction.
     encode: Vec<Dispatch>,
-    local: Option<Local>,
+    pub(super) local: Option<Local>,
 }
 
 impl DoublePhase {
@@ -33,7 +33,8 @@ impl DoublePhase {
         } else {
             None
         };
-        let (local, encode) = if job.options.local_steps + job.options.midpoint_steps > 0 {
+        let steps = job.options.local_steps + job.options.midpoint_steps + job.options.focus_steps;
+        let (local, encode) = if steps > 0 {
             (Some(Local::new(device, job, shared, buffers)?), Vec::new())
         } else {
             let program = device.program("double phase", shared.source.clone(), "encode");
@@ -60,7 +61,7 @@ impl DoublePhase {
         }
     }
 
-    /// Encodes into the output buffers with that index.
+    /// Encodes into the output buffers with that index, or only starts the steps of natural focus.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         if let Some(peak) = &self.peak {
             peak.run(pass);

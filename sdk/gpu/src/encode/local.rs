@@ -1,7 +1,8 @@
-//! Runs the correction: one dispatch to start, one for each local step, then midpoint steps. The last dispatch writes
-//! levels. The counterpart of [`phasefront_core::encode::local`].
+//! Runs the correction: one dispatch to start, one for each local step, then midpoint steps or the start of those of
+//! natural focus. The last dispatch writes levels. The counterpart of [`phasefront_core::encode::local`].
 
 use super::midpoint::Midpoint;
+use super::natural::Natural;
 use super::shared::Shared;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
@@ -19,14 +20,15 @@ pub(super) struct Local {
     keep: Option<Dispatch>,
     /// The start and all local steps before the last dispatch.
     begin: Vec<Dispatch>,
-    last: Last,
+    pub(super) last: Last,
 }
 
 /// The dispatches that write levels.
-enum Last {
+pub(super) enum Last {
     /// A local step for each output buffer.
     Local(Vec<Dispatch>),
     Midpoint(Box<Midpoint>),
+    Natural(Box<Natural>),
 }
 
 impl Local {
@@ -82,18 +84,20 @@ impl Local {
             arguments
         };
         let grid = [width.div_ceil(SIDE), height.div_ceil(SIDE)];
-        let (steps, to_midpoint) = (job.options.local_steps, job.options.midpoint_steps > 0);
+        let steps = job.options.local_steps;
+        let (to_midpoint, to_natural) = (job.options.midpoint_steps > 0, job.options.focus_steps > 0);
         let program = device.program("a local step", source.clone(), "step_on");
-        let before = if to_midpoint { steps } else { steps - 1 };
+        let before = if to_midpoint || to_natural { steps } else { steps - 1 };
         for step in 0..before {
             let mut arguments = of_step(step, &[0, 1, 3, 5, 9]);
             arguments.push((12, missing[(step + 1) % 2].as_entire_binding()));
             begin.push(program.on(device, &arguments, [grid[0], grid[1], 3])?);
         }
+        let left = [&wanted, &missing[before % 2]];
         let last = if to_midpoint {
-            let missing = [&wanted, &missing[before % 2]];
-            let midpoint = Midpoint::new(device, job, shared, &source, missing, buffers)?;
-            Last::Midpoint(Box::new(midpoint))
+            Last::Midpoint(Box::new(Midpoint::new(device, job, shared, &source, left, buffers)?))
+        } else if to_natural {
+            Last::Natural(Box::new(Natural::new(device, job, shared, &source, left, buffers)?))
         } else {
             let program = device.program("the last local step", source, "finish");
             let arguments = of_step(before, &[0, 1, 3, 5, 8]);
@@ -104,8 +108,10 @@ impl Local {
 
     /// Sets the previous frame of the next submission.
     pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
-        if let Last::Midpoint(midpoint) = &self.last {
-            midpoint.set_past(device, past);
+        match &self.last {
+            Last::Local(_) => {}
+            Last::Midpoint(midpoint) => midpoint.still.set_past(device, past),
+            Last::Natural(natural) => natural.still.set_past(device, past),
         }
     }
 
@@ -116,12 +122,13 @@ impl Local {
         }
     }
 
-    /// Corrects into the output buffers with that index.
+    /// Corrects into the output buffers with that index, or only starts the steps of natural focus.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         self.begin.iter().for_each(|step| step.run(pass));
         match &self.last {
             Last::Local(finish) => finish[buffers].run(pass),
             Last::Midpoint(midpoint) => midpoint.run(pass, buffers),
+            Last::Natural(natural) => natural.begin(pass),
         }
     }
 }

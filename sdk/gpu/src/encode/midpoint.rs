@@ -2,19 +2,19 @@
 //! [`phasefront_core::encode::midpoint`].
 
 use super::shared::Shared;
+use super::still::{self, Still};
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
-use crate::device::{Constants, Device, Dispatch};
+use crate::device::{Device, Dispatch};
 use crate::fft::{Convolution, Planes};
 use num_complex::Complex32;
 use phasefront_core::Size;
-use phasefront_core::encode::midpoint::{GAIN, MidpointSteps, STILL, WAVE};
-use phasefront_core::frame::Past;
+use phasefront_core::encode::midpoint::{GAIN, MidpointSteps, WAVE};
 
 /// The midpoint steps of one field into several output buffers.
 pub(super) struct Midpoint {
     steps: usize,
-    bound: Constants,
+    pub(super) still: Still,
     depart: Dispatch,
     /// Propagates to the midpoint: the wanted field, then the displayed wave through the aperture.
     aim: Convolution,
@@ -37,19 +37,17 @@ impl Midpoint {
         buffers: &[LevelsBuffers],
     ) -> Result<Self> {
         let Size { width, height } = job.size;
-        let room = |what| device.buffer(what, 24 * height * width);
-        let aim = room("the wave at the midpoint")?;
-        let (phasors, kept) = (
-            room("the displayed wave")?,
-            room("the wanted field of the frame before")?,
-        );
-        let bound = device.constants("what stands still", bytemuck::cast_slice(&[-1.0f32; 4]))?;
-        let source = format!(
-            "const WAVE: f32 = {WAVE:?};\nconst GAIN: f32 = {GAIN:?};\n{source}{}",
-            include_str!("midpoint.wgsl")
-        );
+        let aim = device.buffer("the wave at the midpoint", 24 * height * width)?;
+        let still = Still::new(device, job.size)?;
+        let source = [
+            &format!("const WAVE: f32 = {WAVE:?};\nconst GAIN: f32 = {GAIN:?};\n"),
+            source,
+            still::SOURCE,
+            include_str!("midpoint.wgsl"),
+        ]
+        .concat();
         let by_rows = [width.div_ceil(COLUMNS), height, 3];
-        let dispatch = |what: &str, entry: &'static str, bindings: &[u32], own: &[(u32, &wgpu::Buffer)]| {
+        let dispatch = |what: &str, entry, bindings: &[u32], own: &[(u32, &wgpu::Buffer)]| {
             let mut arguments = shared.arguments(bindings);
             arguments.extend(own.iter().map(|(at, buffer)| (*at, buffer.as_entire_binding())));
             device
@@ -75,24 +73,17 @@ impl Midpoint {
             through.collect::<Vec<_>>()
         });
         let [there, here] = (stopped.each_ref()).map(|ways| ways.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let arrive = device.program("levels after the midpoint", source.clone(), "arrive");
-        let mut arguments = shared.arguments(&[0, 8]);
-        arguments.push((16, phasors.as_entire_binding()));
+        let begun = [
+            (10, wanted),
+            (14, &aim),
+            (15, missing),
+            (16, &still.phasors),
+            (17, &still.kept),
+            (18, &still.bound.buffer),
+        ];
         Ok(Midpoint {
             steps: job.options.midpoint_steps,
-            depart: dispatch(
-                "the way to the midpoint",
-                "depart",
-                &[0, 1, 3, 5],
-                &[
-                    (10, wanted),
-                    (14, &aim),
-                    (15, missing),
-                    (16, &phasors),
-                    (17, &kept),
-                    (18, &bound.buffer),
-                ],
-            )?,
+            depart: dispatch("the way to the midpoint", "depart", &[0, 1, 3, 5], &begun)?,
             aim: convolution(&aim, &free, back[0].padded_size())?,
             back: convolution(missing, &there, back[0].padded_size())?,
             ask: dispatch(
@@ -106,17 +97,11 @@ impl Midpoint {
                 "a step at the midpoint",
                 "follow",
                 &[0, 1, 5, 9],
-                &[(15, missing), (16, &phasors)],
+                &[(15, missing), (16, &still.phasors)],
             )?,
-            arrive: shared.levels_program(device, &arrive, &arguments, [by_rows[0], height, 1], buffers)?,
-            bound,
+            arrive: still.arrive(device, shared, source.clone(), buffers)?,
+            still,
         })
-    }
-
-    /// Sets the previous frame of the next submission.
-    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
-        let bound = past.map_or(-1.0, |past| (STILL * past.scale).powi(2));
-        (device.queue).write_buffer(&self.bound.buffer, 0, bytemuck::cast_slice(&[bound; 4]));
     }
 
     /// Corrects into the output buffers with that index.

@@ -1,33 +1,21 @@
-// Steps at the midpoint, appended to local.wgsl. See encode/midpoint.rs. `depart` starts from the result of double
-// phase or local steps, or, at static pixels, from the previous frame's final phasors. `ask` and `follow` are the two
-// halves of a step, each after a propagation through the aperture. `arrive` writes levels. The header from midpoint.rs
-// defines WAVE and GAIN.
+// Steps at the midpoint, appended to local.wgsl and still.wgsl. See encode/midpoint.rs. `depart` starts from the result
+// of double phase or local steps, or, at static pixels, from the previous frame's final phasors. `ask` and `follow` are
+// the two halves of a step, each after a propagation through the aperture. The header from midpoint.rs defines WAVE and
+// GAIN.
 
 // T, the wanted field over the scale: at the modulator, then at the midpoint.
 @group(0) @binding(14) var<storage, read_write> aim: array<vec2f>;
 // L·e, then u, r and Kᴴ·r.
 @group(0) @binding(15) var<storage, read_write> missing: array<vec2f>;
-// L·e. Between frames it holds the previous frame's values.
-@group(0) @binding(16) var<storage, read_write> phasors: array<vec2f>;
-// The previous frame's wanted field at the modulator.
-@group(0) @binding(17) var<storage, read_write> kept: array<vec2f>;
-// The square of the largest change of a static pixel. It is negative if there is no previous frame.
-@group(0) @binding(18) var<uniform> bound: vec4f;
-
-fn place(at: vec3u) -> u32 { return at.z * frame.plane + at.y * u32(frame.width) + at.x; }
 
 // On entry `missing` holds g − L·e.
 @compute @workgroup_size(64)
 fn depart(@builtin(global_invocation_id) at: vec3u) {
     if (i32(at.x) >= frame.width) { return; }
     let u = goal(at.z, i32(at.x), i32(at.y), 1.0);
-    let change = u - kept[place(at)];
     let g = u * over(full_light());
-    let e = select(g - missing[place(at)], phasors[place(at)], dot(change, change) <= bound.x);
-    kept[place(at)] = u;
     aim[place(at)] = g;
-    missing[place(at)] = e;
-    phasors[place(at)] = e;
+    missing[place(at)] = start(at, u, g - missing[place(at)]);
 }
 
 @compute @workgroup_size(64)
@@ -47,14 +35,4 @@ fn follow(@builtin(global_invocation_id) at: vec3u) {
     let e = z * (light(at.z, i32(at.x), i32(at.y)) / sqrt(max(dot(z, z), 1.17549435e-38)));
     missing[place(at)] = e;
     phasors[place(at)] = e;
-}
-
-@compute @workgroup_size(64)
-fn arrive(@builtin(global_invocation_id) at: vec3u) {
-    if (i32(at.x) >= frame.width) { return; }
-    var rgb = vec3u(0);
-    for (var c = 0u; c < 3u; c++) {
-        rgb[c] = level(angle(phasors[place(vec3u(at.xy, c))]), c, i32(at.x), i32(at.y));
-    }
-    put(i32(at.x), i32(at.y), rgb);
 }

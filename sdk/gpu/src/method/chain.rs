@@ -298,7 +298,9 @@ impl Maker<'_> {
             all.chain.tanh,
             InputKind::REMAINDER_GAIN
         );
-        let source = self.source(layer, &weights, false, &more) + include_str!("chain_last.wgsl");
+        let source = self.source(layer, &weights, false, &more)
+            + include_str!("../direction.wgsl")
+            + include_str!("chain_last.wgsl");
         let program = self.device.program("the last layer", source, "last");
         let mut arguments = self.arguments(&weights, from, &input.last);
         arguments.push((5, plan.planes.as_entire_binding()));

@@ -888,8 +888,9 @@ fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
 #[ignore = "slow: 30 seconds of a core in software"]
 fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     let folder = Folder::new().with_frame();
-    for method in ["network", "sweep"] {
-        let more = ["--method", method, "--scale", "1", "--offset-mm", "3"];
+    let natural = ["--focus", "natural", "--focus-steps", "2"];
+    for (method, focus) in [("network", &[][..]), ("sweep", &[]), ("sweep", &natural)] {
+        let more = [&["--method", method, "--scale", "1", "--offset-mm", "3"], focus].concat();
         folder.succeeds(&with(&[&more[..], &["-o", "cpu.png"]].concat()));
         let arguments = with(&[&more[..], &["-o", "gpu.png"]].concat());
         let report = report_on_gpu(&folder, &arguments);
