@@ -400,6 +400,7 @@ impl MethodPlan {
             }
             Chosen::Seeded(..) => panic!("a seeded network makes no wave"),
         };
+        let size = self.size.pixels();
         let mut turns = [Complex32::ONE; 3];
         let is_turned = is_whole && mean_phase == MeanPhase::Removed;
         let mut changed = None;
@@ -407,7 +408,9 @@ impl MethodPlan {
             Some(standing) => {
                 standing.finish(is_whole);
                 if is_turned {
-                    turns = standing.turns(pixels, of_surfaces, reach);
+                    turns = standing.turns(of_surfaces, reach, |colour, differs, sums| {
+                        pixels.turn_where(colour, size, differs, sums)
+                    });
                 }
                 changed = Some(Changed {
                     changes: of_surfaces.unwrap_or(&standing.changes),
@@ -416,7 +419,6 @@ impl MethodPlan {
                 });
             }
             None if is_turned => {
-                let size = self.size.pixels();
                 let turns = turns[..self.colours].iter_mut().enumerate();
                 turns.for_each(|(colour, turn)| *turn = pixels.turn_of(colour, size));
             }

@@ -13,7 +13,6 @@
 use crate::Size;
 use crate::frame::RgbdFrame;
 use crate::method::mean_phase::Sums;
-use crate::method::wave::Pixels;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
@@ -206,16 +205,21 @@ impl Standing {
         self.number
     }
 
-    /// Returns the factor that removes the mean phase of each colour of the wave `pixels`. It stays as it was while its
-    /// phase is within [`TURN_TOLERANCE`] of the wave's own. The pixels differ from those before within `reach` of
-    /// `changes`, or of the shown frame's.
-    pub(super) fn turns(&mut self, pixels: Pixels<'_>, changes: Option<&Changes>, reach: usize) -> [Complex32; 3] {
+    /// Returns the factor that removes the mean phase of each colour of the wave. It stays as it was while its phase is
+    /// within [`TURN_TOLERANCE`] of the wave's own. `own` returns that of a colour, whose values differ from those
+    /// before within `reach` of `changes`, or of the shown frame's.
+    pub(super) fn turns(
+        &mut self,
+        changes: Option<&Changes>,
+        reach: usize,
+        own: impl Fn(usize, &(dyn Fn(Range<usize>) -> bool + Sync), &mut Sums) -> Complex32,
+    ) -> [Complex32; 3] {
         let (keeps, size) = (self.keeps, self.frame.size());
         let changes = changes.unwrap_or(&self.changes);
         if !keeps || changes.blocks.contains(&true) {
             let differs = |values: Range<usize>| !keeps || changes.any_value(values, size, reach);
             for (colour, turn) in self.turns[..self.frame.colours()].iter_mut().enumerate() {
-                let own = pixels.turn_where(colour, size.pixels(), differs, &mut self.sums);
+                let own = own(colour, &differs, &mut self.sums);
                 if !keeps || (own * turn.conj()).arg().abs() > TURN_TOLERANCE {
                     *turn = own;
                 }

@@ -442,8 +442,9 @@ impl SweepPlan {
         let Some([rows, columns]) = part(&rows, &columns) else {
             return;
         };
-        // The number of tiles does not depend on the threads, because the rounding depends on the tiles.
-        for [rows, columns] in self.layout.tiles(rows, columns, 2) {
+        // The rounding depends on the tiles, so they do not depend on the threads, and a whole frame has its own.
+        let is_whole = [rows.len(), columns.len()] == [self.size.height, self.size.width];
+        for [rows, columns] in self.layout.tiles(rows, columns, if is_whole { 1 } else { 2 }) {
             if let Some([rows, columns]) = part(&rows, &columns) {
                 order.push([rows, columns.start / RUN * RUN..columns.end]);
             }

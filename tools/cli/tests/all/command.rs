@@ -597,10 +597,11 @@ fn options_that_cannot_be_meant_are_named() {
     let folder = Folder::new().with_frame();
     for (name, arguments, words) in [
         (
-            "no planes",
-            made(&["--method", "layers", "--planes", "0"]),
-            &["plane"][..],
+            "an offset out of reach",
+            made(&["--offset-mm", "9000"]),
+            &["9000", "smaller"][..],
         ),
+        ("no planes", made(&["--method", "layers", "--planes", "0"]), &["plane"]),
         (
             "more planes than fit in memory",
             made(&["--method", "layers", "--planes", "4000000000"]),
@@ -651,11 +652,6 @@ fn options_that_cannot_be_meant_are_named() {
             "raw depth without a scale",
             made(&["--depth-unit", "raw"]),
             &["--depth-scale"],
-        ),
-        (
-            "an offset out of reach",
-            made(&["--offset-mm", "9000"]),
-            &["9000", "smaller"],
         ),
         (
             "an offset that is no number",

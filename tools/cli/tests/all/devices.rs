@@ -377,7 +377,6 @@ fn what_is_wrong_is_one_line() {
         (&["link", "pattern", "--size", "100x100", "-o", "f.png"], "512"),
         (&["link", "read", "rgb.png"], "512"),
         (&["show", "none.png"], "none.png"),
-        (&["show", "rgb.png", "--rate", "0"], "--rate"),
     ] {
         let errors = folder.fails(arguments, 1);
         assert!(
