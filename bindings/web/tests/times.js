@@ -12,8 +12,8 @@ export function frame(i = 0, moves = false) {
       data.set([0.3 * stripe, stripe, (255 * x) / WIDTH, 255], 4 * (y * WIDTH + x));
     }
   }
-  const metres = Float32Array.from({ length: 160 * 120 }, (_, i) => {
-    const [x, y] = [i % 160, Math.floor(i / 160)];
+  const metres = Float32Array.from({ length: 160 * 120 }, (_, at) => {
+    const [x, y] = [at % 160, Math.floor(at / 160)];
     const r = Math.hypot(x - 70 - (moves ? 2 * i : 0), y - 60) / 30;
     return r < 1 ? 0.6 - 0.15 * Math.sqrt(1 - r * r) : 1.2 + (0.5 * x) / 160;
   });
