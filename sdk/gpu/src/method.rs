@@ -6,7 +6,7 @@ mod softness;
 mod sweep;
 
 use super::device::Device;
-use super::input::{Colour, Depth, Form, Frame, Packer, Source};
+use super::input::{ChainInput, Colour, Depth, Form, Frame, Packer, Source};
 use super::numbers::Numbers;
 use super::{GpuError, Result};
 use chain::{ChainOptions, ChainPlan, End, chain_of};
@@ -88,6 +88,22 @@ impl Trained {
     }
 }
 
+/// Plans the input stage, which with `keeps_surfaces` also writes the frame's surfaces.
+fn packer(
+    device: &Device,
+    form: Form<'_>,
+    size: Size,
+    source: Source<'_>,
+    input: Option<ChainInput>,
+    keeps_surfaces: bool,
+) -> Result<Packer> {
+    if keeps_surfaces {
+        Packer::by_surfaces(device, form, size, source, input)
+    } else {
+        Packer::new(device, form, size, source, input)
+    }
+}
+
 impl MethodPlan {
     /// Plans `method` for frames of `size` in `formats`. With `keeps_surfaces`, every method has [`Self::surfaces`].
     pub(super) fn new(
@@ -113,11 +129,7 @@ impl MethodPlan {
             Method::Network(network) => {
                 let how = how(network)?;
                 let form = Form::Chain(chain_of(network)?.0, how.0, how.1);
-                let packer = if keeps_surfaces {
-                    Packer::by_surfaces(device, form, size, source, None)?
-                } else {
-                    Packer::new(device, form, size, source, None)?
-                };
+                let packer = packer(device, form, size, source, None, keeps_surfaces)?;
                 let trained = Trained::new(device, network, how, size, &packer, options)?;
                 (packer, Plan::Network(trained))
             }
@@ -188,11 +200,9 @@ impl MethodPlan {
         let source = Source::Frame(formats.0, formats.1);
         let input = Some(self.packer.input.clone());
         let (size, keeps_surfaces) = (self.size, self.keeps_surfaces);
-        let plan = || match keeps_surfaces {
-            true => Packer::by_surfaces(device, form, size, source, input),
-            false => Packer::new(device, form, size, source, input),
-        };
-        self.packer = device.guarded_async(plan).await?;
+        self.packer = device
+            .guarded_async(|| packer(device, form, size, source, input, keeps_surfaces))
+            .await?;
         Ok(())
     }
 
