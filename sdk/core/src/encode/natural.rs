@@ -34,18 +34,21 @@ use rayon::prelude::*;
 
 /// The share of the volume between the first and the last plane.
 pub const SPAN: f64 = 0.9;
-/// The largest blur, in pixels, that neighbouring planes have of each other. Wider, pixels between them are not sharp.
-const SPACING_PX: f64 = 3.0;
+/// The largest blur, in pixels, that neighbouring planes have of each other. Wider, the steps fit the planes alone: at 3
+/// pixels eight maps have 1 dB less between them, and nearer than 2 pixels gains 0.1 dB.
+const SPACING_PX: f64 = 2.0;
 /// The least and the largest number of planes P, spread evenly over [`SPAN`] of the volume.
-const PLANES: [f64; 2] = [3.0, 15.0];
+const PLANES: [f64; 2] = [3.0, 21.0];
 /// How much more a pixel counts in focus than far out of focus.
 pub const IN_FOCUS: f64 = 2.0;
 /// The blur, in pixels, over which that falls to 1/e.
 pub const FOCUS_PX: f64 = 3.0;
 /// μ, the share of the last step that a step continues.
 pub const MOMENTUM: f32 = 0.8;
-/// γ of one map. Several maps share the light, and half of it is stable.
+/// γ of one map, half of what diverges.
 pub const RATE: f32 = 1.0;
+/// γ of several maps, of which each changes the amplitudes less. Three diverge.
+const RATE_OF_SEVERAL: f32 = 1.5;
 /// The amplitude that keeps the division by a finite.
 pub const FLOOR: f32 = 1e-3;
 /// The largest number of steps.
@@ -101,6 +104,11 @@ impl NaturalScratch {
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.cancel = cancel.clone();
     }
+}
+
+/// Returns γ of `maps` maps.
+fn rate(maps: usize) -> f32 {
+    if maps == 1 { RATE } else { RATE_OF_SEVERAL }
 }
 
 /// Returns z of the planes for `display`, in metres.
@@ -358,7 +366,7 @@ impl NaturalSteps {
                     .for_each(|(x, (column, sum))| path.add_adjoint(x, column, sum));
             }
         }
-        let rate = if maps.len() == 1 { RATE } else { RATE / 2.0 };
+        let rate = rate(maps.len());
         let share = 2.0 / planes as f32;
         for (map, phases) in maps.iter_mut().zip(phases) {
             fft.columns_inverse(&mut map.sum, |x, column| self.opening.stop(x, padded, column), work);
@@ -429,7 +437,7 @@ pub fn reference(
     steps: usize,
 ) {
     let (count, planes) = (maps.len(), wanted.len());
-    let rate = f64::from(if count == 1 { RATE } else { RATE / 2.0 });
+    let rate = f64::from(rate(count));
     let mut speeds = vec![vec![0.0; light.len()]; count];
     for _ in 0..steps {
         let shown = |map: &Vec<f64>| -> Vec<Complex64> {
