@@ -77,7 +77,7 @@ const SIZES: [Size; 3] = [
 
 #[test]
 fn chains_in_f32_and_f16_agree_with_the_definition() {
-    chains_in_f32_and_f16(2);
+    chains_in_f32_and_f16(3);
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
 
 #[test]
 fn chains_in_int8_have_the_bits_of_the_cpu() {
-    chains_in_int8(2);
+    chains_in_int8(3);
 }
 
 #[test]

@@ -9,6 +9,7 @@
 //! * [`white`] says what a meter's readings of three lasers mean.
 //! * [`learned`] fits a model of what is left to photographs of holograms.
 //! * [`diagnosis`] says why a photograph of a hologram looks wrong.
+//! * [`link`] says how cable, driver and converter change the pixels on their way to the modulator.
 //! * [`rehearse`] does all of it on a simulated display.
 //!
 //! [`phasefront_io::display::calibration`] reads and writes the calibration files. [`curves::report`] and
@@ -19,6 +20,7 @@ mod cholesky;
 pub mod curves;
 pub mod diagnosis;
 pub mod learned;
+pub mod link;
 pub mod optics;
 pub mod rehearse;
 pub mod simulated_display;

@@ -24,6 +24,7 @@ fn faulty() -> (SimulatedDisplay, Target) {
 }
 
 #[test]
+#[ignore = "slow: 10 seconds of a core"]
 fn a_learned_model_improves_what_is_displayed() {
     let (simulated, target) = faulty();
     let without = judge(&simulated, &target, 0).unwrap();

@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 use phasefront::Size;
-use phasefront_cli::modulator::link;
+use phasefront_calibration::link;
 use phasefront_command::flags::parse_size;
 use phasefront_command::terminal;
 use phasefront_io::hologram::packed;

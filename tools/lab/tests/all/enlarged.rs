@@ -45,7 +45,7 @@ fn wrong_detections(scenes: u64) -> Vec<String> {
 
 #[test]
 fn depth_of_full_resolution_is_not_taken_for_enlarged() {
-    assert_eq!(wrong_detections(2), Vec::<String>::new());
+    assert_eq!(wrong_detections(1), Vec::<String>::new());
 }
 
 #[test]
