@@ -34,8 +34,8 @@ use rayon::prelude::*;
 
 /// The share of the volume between the first and the last plane.
 pub const SPAN: f64 = 0.9;
-/// The largest blur, in pixels, that neighbouring planes have of each other. Wider, the steps fit the planes alone: at 3
-/// pixels eight maps have 1 dB less between them, and nearer than 2 pixels gains 0.1 dB.
+/// The largest blur, in pixels, that neighbouring planes have of each other. Wider, the steps fit the planes alone: at
+/// 3 pixels eight maps have 1 dB less, and nearer than 2 pixels they gain 0.1 dB.
 const SPACING_PX: f64 = 2.0;
 /// The least and the largest number of planes P, spread evenly over [`SPAN`] of the volume.
 const PLANES: [f64; 2] = [3.0, 21.0];
