@@ -6,6 +6,8 @@
 fetched="$cache/maven/fetched-$(cat android/pom.xml android/consumer/pom.xml | sha256sum | cut -c 1-16)"
 offline=()
 [ ! -e "$fetched" ] || offline=(--offline -Daether.offline.protocols=file)
+# Its programs end before the second compiler of the virtual machine has paid for itself.
+export MAVEN_OPTS="${MAVEN_OPTS:-} -XX:TieredStopAtLevel=1"
 maven() {
     mvn --batch-mode "${offline[@]}" "-Dmaven.repo.local=$cache/maven" --file android/pom.xml "$@"
 }
