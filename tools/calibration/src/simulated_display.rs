@@ -455,7 +455,7 @@ impl SimulatedDisplay {
 }
 
 /// Returns a standard normal random number (Box and Muller, 1958).
-fn normal(dice: &mut Dice) -> f64 {
+pub(crate) fn normal(dice: &mut Dice) -> f64 {
     let radius = (-2.0 * (1.0 - dice.unit()).ln()).sqrt();
     radius * (2.0 * PI * dice.unit()).cos()
 }

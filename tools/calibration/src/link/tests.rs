@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 use super::*;
+use crate::simulated_display::normal;
 use phasefront_io::dice::Dice;
 use phasefront_io::hologram::packed::Kind;
 
@@ -248,15 +249,9 @@ fn faulty() -> Vec<(&'static str, [Link; 3])> {
     ]
 }
 
-/// Adds the noise of a camera, of standard deviation `sigma` (Box and Muller).
+/// Adds the noise of a camera, of standard deviation `sigma`.
 fn with_noise(mut picture: Picture, sigma: f64, dice: &mut Dice) -> Picture {
-    for pair in picture.as_flattened_mut().chunks_mut(2) {
-        let radius = sigma * (-2.0 * (1.0 - dice.unit()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * dice.unit()).sin_cos();
-        pair.iter_mut()
-            .zip([cos, sin])
-            .for_each(|(value, share)| *value += radius * share);
-    }
+    (picture.as_flattened_mut().iter_mut()).for_each(|value| *value += sigma * normal(dice));
     picture
 }
 
