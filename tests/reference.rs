@@ -6,14 +6,14 @@
 
 use ndarray::{Array2, Array3, s};
 use phasefront_core::Size;
-use rustfft::FftPlanner;
+use rustfft::FftPlannerScalar;
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
 
 /// Returns the Fourier transform F, or F⁻¹ with its factor 1/(H·W).
 pub fn fft2(plane: &Array2<Complex64>, inverse: bool) -> Array2<Complex64> {
     let (h, w) = plane.dim();
-    let mut planner = FftPlanner::<f64>::new();
+    let mut planner = FftPlannerScalar::<f64>::new();
     let mut plan = |n| {
         if inverse {
             planner.plan_fft_inverse(n)

@@ -470,6 +470,7 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
 
 /// Runs steps of natural focus after networks in both number formats and after the sweep, with two frames in flight.
 #[test]
+#[ignore = "slow: 20 seconds of a core in software"]
 fn natural_focus_is_that_of_the_cpu() {
     let device = device();
     let size = Size { width: 61, height: 47 };

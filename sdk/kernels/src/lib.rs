@@ -10,7 +10,7 @@
 //! `unsafe` is confined to those files and two that serve the optics: [`wide!`] runs plain loops in the widest vectors,
 //! and [`each_tile_rows`] lets threads fill a plane whose tiles are stored column by column.
 //!
-//! [`fir`] is separate: it is the filter that propagates a wave from plane to plane.
+//! [`fir`] is separate: it is the filter that propagates a wave from plane to plane. So are the Fourier [`transforms`].
 //!
 //! On some instruction sets the hidden layers of the int8 chain run in tiles of 4×4 outputs, which takes a quarter of
 //! the products and gives the same bits (`winograd`).
@@ -21,6 +21,7 @@
 //! This crate does not depend on ONNX, tract or optics.
 
 mod f32;
+mod fft;
 pub mod fir;
 mod int8;
 mod isa;
@@ -52,6 +53,7 @@ mod wasm;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 pub use f32::{F32Chain, F32Layer};
+pub use fft::transforms;
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
 #[cfg(feature = "peak")]

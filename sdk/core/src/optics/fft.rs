@@ -16,11 +16,8 @@ pub use convolve::ConvolveScratch;
 pub use passes::{Scratch, Work};
 pub use size::fast_size;
 
+use phasefront_kernels::transforms;
 use rustfft::Fft;
-#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
-use rustfft::FftPlanner as Planner;
-#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
-use rustfft::FftPlannerWasmSimd as Planner;
 use std::sync::Arc;
 
 /// The number of parts of a pass for each thread. More than one lets other threads take over the work of a delayed
@@ -44,15 +41,6 @@ pub fn frequency(k: usize, n: usize) -> f64 {
     signed / n as f64
 }
 
-/// Returns a planner of 1D transforms. A browser's module names the one with SIMD: the planner that chooses while it
-/// runs brings all transforms without SIMD too, a tenth of the module.
-pub(super) fn planner() -> Planner<f32> {
-    #[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
-    return Planner::new();
-    #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
-    return Planner::new().expect("rustfft has SIMD for f32");
-}
-
 /// Returns the number of parts of a pass on the current thread pool.
 fn parts() -> usize {
     match rayon::current_num_threads() {
@@ -70,20 +58,13 @@ impl Fft2 {
             height: padded_height,
         } = padded_size;
         assert!(0 < height && height <= padded_height && 0 < width && width <= padded_width);
-        let mut planner = planner();
         Fft2 {
             height,
             width,
             padded_height,
             padded_width,
-            row: [
-                planner.plan_fft_forward(padded_width),
-                planner.plan_fft_inverse(padded_width),
-            ],
-            column: [
-                planner.plan_fft_forward(padded_height),
-                planner.plan_fft_inverse(padded_height),
-            ],
+            row: transforms(padded_width),
+            column: transforms(padded_height),
         }
     }
 

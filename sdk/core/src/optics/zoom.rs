@@ -1,7 +1,8 @@
 //! The Fourier transform at points of any spacing: the chirp z-transform (Rabiner, Schafer and Rader, 1969).
 
-use crate::optics::fft::{fast_size, planner};
+use crate::optics::fft::fast_size;
 use num_complex::{Complex32, Complex64};
+use phasefront_kernels::transforms;
 use rustfft::Fft;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -25,8 +26,7 @@ impl Zoom {
     pub fn new(length: usize, spacing: f64) -> Self {
         assert!(length > 0);
         let padded = fast_size(2 * length - 1);
-        let mut planner = planner();
-        let fft = [planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded)];
+        let fft = transforms(padded);
         // n·m = (n² + m² − (m − n)²)/2, so that the sum is a convolution.
         let chirp = |at: f64| narrow(Complex64::cis((PI * spacing * at * at).rem_euclid(2.0 * PI)));
         let middle = (length as f64 - 1.0) / 2.0;

@@ -1,6 +1,8 @@
 //! Tests the conversion from an image to the input of each modulator and back, and the one-line error for each wrong
 //! input.
 use crate::folder;
+use crate::reference::fft2;
+use ndarray::Array2;
 use phasefront::Size;
 
 use folder::{Folder, SMALL_HOLOGRAM};
@@ -125,34 +127,19 @@ fn a_view_is_not_turned_by_what_the_panel_adds() {
 fn shown_on(levels: &[u16], turns: [f64; 3], picture: &image::RgbImage) -> [f64; 3] {
     use num_complex::Complex64;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let mut planner = rustfft::FftPlanner::new();
-    let mut transform = |field: &mut [Complex64], inverse: bool| {
-        let direction = match inverse {
-            true => rustfft::FftDirection::Inverse,
-            false => rustfft::FftDirection::Forward,
-        };
-        planner.plan_fft(width, direction).process(field);
-        let columns = planner.plan_fft(height, direction);
-        for x in 0..width {
-            let mut column: Vec<_> = (0..height).map(|y| field[y * width + x]).collect();
-            columns.process(&mut column);
-            (0..height).for_each(|y| field[y * width + x] = column[y]);
-        }
-    };
     std::array::from_fn(|colour| {
         let levels = &levels[colour * width * height..][..width * height];
         let phase = |level: &u16| f64::from(*level) / 256.0 * turns[colour] * std::f64::consts::TAU;
-        let mut field: Vec<_> = levels.iter().map(|level| Complex64::cis(phase(level))).collect();
-        transform(&mut field, false);
-        for (at, value) in field.iter_mut().enumerate() {
+        let field = Array2::from_shape_fn((height, width), |(y, x)| Complex64::cis(phase(&levels[y * width + x])));
+        let mut spectrum = fft2(&field, false);
+        for ((y, x), value) in spectrum.indexed_iter_mut() {
             let frequency = |at: usize, of: usize| (at.min(of - at)) as f64 / of as f64;
-            let (fy, fx) = (frequency(at / width, height), frequency(at % width, width));
+            let (fy, fx) = (frequency(y, height), frequency(x, width));
             if fx * fx + fy * fy > 0.25 {
                 *value = Complex64::ZERO;
             }
         }
-        transform(&mut field, true);
-        let seen: Vec<f64> = field.iter().map(|value| value.norm()).collect();
+        let seen: Vec<f64> = fft2(&spectrum, true).iter().map(|value| value.norm()).collect();
         let want: Vec<f64> = picture
             .pixels()
             .map(|pixel| f64::from(pixel.0[colour]) / 255.0)
