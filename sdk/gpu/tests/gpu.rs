@@ -36,21 +36,17 @@ use phasefront_gpu::{
     GpuLevels, GpuNetworkPlan, GpuPipeline, GpuView, Job,
 };
 use pollster::block_on;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Duration;
 
-/// Returns the device of all tests.
+/// Returns a device that other tests may hold too.
 fn device() -> Arc<Device> {
-    static DEVICE: OnceLock<Result<Arc<Device>, phasefront_gpu::GpuError>> = OnceLock::new();
-    let opened = DEVICE.get_or_init(|| {
-        let software = DeviceOptions {
-            name: Some(driver::software()),
-            ..Default::default()
-        };
-        let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software));
-        opened.map(Arc::new)
-    });
-    driver::opened(opened.as_ref()).clone()
+    static DEVICES: driver::Devices<Device> = driver::Devices::new();
+    let software = DeviceOptions {
+        name: Some(driver::software()),
+        ..Default::default()
+    };
+    DEVICES.device(|| Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software)))
 }
 
 fn largest_difference(a: &[f32], b: &[f32]) -> f32 {

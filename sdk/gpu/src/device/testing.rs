@@ -6,20 +6,15 @@ mod driver;
 #[path = "../../../../tests/skip.rs"]
 pub(crate) mod skip;
 
-use super::super::Result;
 use super::{Device, DeviceOptions};
 pub(crate) use driver::opened;
 use num_complex::Complex32;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-/// Returns the device of all tests: a GPU or a software driver.
+/// Returns a device that other tests may hold too: of a GPU or of a software driver.
 pub(crate) fn device() -> Arc<Device> {
-    static DEVICE: OnceLock<Result<Arc<Device>>> = OnceLock::new();
-    let opened = DEVICE.get_or_init(|| {
-        let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
-        opened.map(Arc::new)
-    });
-    driver::opened(opened.as_ref()).clone()
+    static DEVICES: driver::Devices<Device> = driver::Devices::new();
+    DEVICES.device(|| Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software())))
 }
 
 pub(crate) fn software() -> DeviceOptions {

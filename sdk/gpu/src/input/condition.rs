@@ -97,6 +97,7 @@ impl Conditioning {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::{Colour, ColourData, Depth, DepthData, Form, Frame, Packer, Source};
+    use crate::device::Device;
     use crate::device::testing::{device, run};
     use phasefront_core::Size;
     use phasefront_core::depth::condition::{ConditionScratch, Conditioner};
@@ -158,14 +159,19 @@ mod tests {
     }
 
     /// Returns the depth that the GPU decides and that of the CPU, for a frame that was found.
-    fn both(packer: &Packer, plan: &Conditioner, rgb: &[f32], scratch: &mut ConditionScratch) -> (Vec<f32>, Vec<f32>) {
-        let device = device();
+    fn both(
+        device: &Device,
+        packer: &Packer,
+        plan: &Conditioner,
+        rgb: &[f32],
+        scratch: &mut ConditionScratch,
+    ) -> (Vec<f32>, Vec<f32>) {
         let frame = Frame {
             colour: ColourData::Planar(rgb),
             depth: DepthData::Readings(plan.readings(scratch)),
         };
-        packer.upload(&device, &frame).unwrap();
-        run(&device, |pass| {
+        packer.upload(device, &frame).unwrap();
+        run(device, |pass| {
             packer.run(pass);
             packer.condition(pass);
         });
@@ -218,7 +224,7 @@ mod tests {
                 let readings = plan.readings(&scratch);
                 is_shifted |= cells == out && readings.axes()[0].cell[9] != 9;
                 readings.kinds().for_each(|kind| kinds[usize::from(kind)] += 1);
-                let (made, expected) = both(&packer, &plan, &rgb, &mut scratch);
+                let (made, expected) = both(&device, &packer, &plan, &rgb, &mut scratch);
                 let apart = made.iter().zip(&expected).map(|(a, b)| (a - b).abs());
                 differ += apart.filter(|apart| apart.is_nan() || *apart > 1e-5).count();
                 others += made.iter().zip(&expected).filter(|(a, b)| a != b).count();
