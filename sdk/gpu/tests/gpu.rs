@@ -73,7 +73,7 @@ const SIZES: [Size; 3] = [
 
 #[test]
 fn chains_in_f32_and_f16_agree_with_the_definition() {
-    chains_in_f32_and_f16(3);
+    chains_in_f32_and_f16(5);
 }
 
 #[test]
