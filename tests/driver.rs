@@ -21,7 +21,8 @@ impl<T> Devices<T> {
         Devices([const { OnceLock::new() }; 2])
     }
 
-    /// Returns the device that fewer tests hold, or fails as [`opened`] does.
+    /// Returns the device that fewer tests hold, or fails as [`opened`] does. A test takes it once and passes it on:
+    /// buffers of one device are unknown to the other.
     pub(crate) fn device<E: Display>(&self, open: impl Fn() -> Result<T, E>) -> Arc<T> {
         let [first, second] = &self.0;
         let held = |device: &OnceLock<Arc<T>>| device.get().map_or(0, Arc::strong_count);
