@@ -355,12 +355,12 @@ impl GpuPipeline {
         let Some(natural) = self.encoder.natural() else {
             return Ok(submission);
         };
-        for step in 1..=natural.steps() {
+        for step in 0..natural.steps() {
             let mut encoder = (self.device.inner).create_command_encoder(&Default::default());
-            let is_last = step == natural.steps();
+            let is_last = step + 1 == natural.steps();
             let ends = is_last.then_some(2 * ENCODE + 1);
             self.pass(&mut encoder, at, [None, ends], |pass| {
-                natural.step(pass);
+                natural.step(step, pass);
                 if is_last {
                     natural.arrive(pass, at);
                 }

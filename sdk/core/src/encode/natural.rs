@@ -3,9 +3,9 @@
 //! A smooth wave is sharp in focus but shows halos and rings out of focus, where the world is soft. Each step looks at
 //! the displayed light at several planes and moves the phases so that its amplitudes come nearer to those of the stack.
 //!
-//! Let φₙ be the phases of map n of N, which the eye adds, L the light on the modulator, K_p the path to plane p of P
-//! behind the aperture, A_p the amplitudes of the stack divided by the scale, and w_p the weight of a pixel, which is
-//! larger where plane p is in focus. A step is
+//! Let φₙ be the phases of map n of N, which the eye adds, L the light on the modulator, K_p the path to plane p behind
+//! the aperture, A_p the amplitudes of the stack divided by the scale, and w_p the weight of a pixel, which is larger
+//! where plane p is in focus. A step looks at P planes, those of its turn, and is
 //!
 //!   uₙ = K_p·L·exp(iφₙ),  a = √(Σₙ|uₙ|²/N),  r_p = w_p·(a − A_p)/a,
 //!   vₙ ← μ·vₙ + 2/P·Im(Σ_p K_pᴴ(r_p·uₙ)·conj(L·exp(iφₙ))),  φₙ ← φₙ − γ·vₙ,
@@ -37,17 +37,20 @@ pub const SPAN: f64 = 0.9;
 /// The largest blur, in pixels, that neighbouring planes have of each other. Wider, the steps fit the planes alone: at
 /// 3 pixels eight maps have 1 dB less, and nearer than 2 pixels they gain 0.1 dB.
 const SPACING_PX: f64 = 2.0;
-/// The least and the largest number of planes P, spread evenly over [`SPAN`] of the volume.
+/// The least and the largest number of planes, spread evenly over [`SPAN`] of the volume.
 const PLANES: [f64; 2] = [3.0, 21.0];
+/// The steps that look at every plane once, each at planes as far apart as the others'. Two steps at half of the planes
+/// bring as much as two at all of them, three at a third bring less.
+pub const TURNS: usize = 2;
 /// How much more a pixel counts in focus than far out of focus.
 pub const IN_FOCUS: f64 = 2.0;
 /// The blur, in pixels, over which that falls to 1/e.
 pub const FOCUS_PX: f64 = 3.0;
 /// μ, the share of the last step that a step continues.
 pub const MOMENTUM: f32 = 0.8;
-/// γ of one map, half of what diverges.
-pub const RATE: f32 = 1.0;
-/// γ of several maps, of which each changes the amplitudes less. Three diverge.
+/// γ of one map. One diverges.
+pub const RATE: f32 = 0.8;
+/// γ of several maps, of which each changes the amplitudes less. @@ diverge.
 const RATE_OF_SEVERAL: f32 = 1.5;
 /// The amplitude that keeps the division by a finite.
 pub const FLOOR: f32 = 1e-3;
@@ -109,6 +112,11 @@ impl NaturalScratch {
 /// Returns γ of `maps` maps.
 fn rate(maps: usize) -> f32 {
     if maps == 1 { RATE } else { RATE_OF_SEVERAL }
+}
+
+/// Returns the numbers of those of `planes` planes that step number `step` looks at.
+pub fn turn(step: usize, planes: usize) -> impl ExactSizeIterator<Item = usize> {
+    (step % TURNS..planes).step_by(TURNS)
 }
 
 /// Returns z of the planes for `display`, in metres.
@@ -259,12 +267,12 @@ impl NaturalSteps {
         for colour in 0..self.display.colours() {
             self.aim_colour(colour, scratch);
             scratch.maps.iter_mut().for_each(|map| map.speed.fill(0.0));
-            for _ in 0..self.steps {
+            for number in 0..self.steps {
                 if scratch.cancel.requested() {
                     return;
                 }
                 let of_colour = maps.iter_mut().map(|map| &mut map[colour * plane..][..plane]);
-                self.step(colour, 1.0 / scale, of_colour, scratch);
+                self.step(number, colour, 1.0 / scale, of_colour, scratch);
             }
         }
     }
@@ -314,6 +322,7 @@ impl NaturalSteps {
 
     fn step<'a>(
         &self,
+        number: usize,
         colour: usize,
         per_scale: f32,
         phases: impl Iterator<Item = &'a mut [f32]>,
@@ -342,7 +351,7 @@ impl NaturalSteps {
             map.sum.fill(Complex32::ZERO);
         }
         let planes = self.stack.z_m().len();
-        for index in 0..planes {
+        for index in turn(number, planes) {
             let path = &self.paths[colour * planes + index];
             for map in maps.iter_mut() {
                 let from = |x: usize, column: &mut [Complex32]| {
@@ -367,7 +376,7 @@ impl NaturalSteps {
             }
         }
         let rate = rate(maps.len());
-        let share = 2.0 / planes as f32;
+        let share = 2.0 / turn(number, planes).len() as f32;
         for (map, phases) in maps.iter_mut().zip(phases) {
             fft.columns_inverse(&mut map.sum, |x, column| self.opening.stop(x, padded, column), work);
             fft.rows_inverse(&map.sum, rows, work);
@@ -439,7 +448,7 @@ pub fn reference(
     let (count, planes) = (maps.len(), wanted.len());
     let rate = f64::from(rate(count));
     let mut speeds = vec![vec![0.0; light.len()]; count];
-    for _ in 0..steps {
+    for step in 0..steps {
         let shown = |map: &Vec<f64>| -> Vec<Complex64> {
             let values = map.iter().zip(light);
             values
@@ -448,7 +457,7 @@ pub fn reference(
         };
         let shown: Vec<_> = maps.iter().map(shown).collect();
         let mut sums = vec![vec![Complex64::ZERO; light.len()]; count];
-        for p in 0..planes {
+        for p in turn(step, planes) {
             let mut views: Vec<_> = shown.iter().map(|wave| to_plane(p, wave)).collect();
             for x in 0..light.len() {
                 let intensity: f64 = views.iter().map(|view| view[x].norm_sqr()).sum();
@@ -461,9 +470,10 @@ pub fn reference(
                 sum.iter_mut().zip(back).for_each(|(sum, back)| *sum += back);
             }
         }
+        let share = 2.0 / turn(step, planes).len() as f64;
         for (((map, speed), sum), shown) in maps.iter_mut().zip(&mut speeds).zip(&sums).zip(&shown) {
             for (((phase, speed), sum), shown) in map.iter_mut().zip(speed).zip(sum).zip(shown) {
-                *speed = f64::from(MOMENTUM) * *speed + 2.0 / planes as f64 * (sum * shown.conj()).im;
+                *speed = f64::from(MOMENTUM) * *speed + share * (sum * shown.conj()).im;
                 *phase -= rate * *speed;
             }
         }

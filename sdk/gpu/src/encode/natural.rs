@@ -1,4 +1,4 @@
-//! Runs steps of natural focus. Each propagates to every plane and back and ends with a dispatch. The CPU computes the
+//! Runs steps of natural focus. Each propagates to the planes of its turn and back and ends with a dispatch. The CPU computes the
 //! focal stack that they aim at. The counterpart of [`phasefront_core::encode::natural`].
 
 use super::shared::Shared;
@@ -9,7 +9,7 @@ use crate::device::{Device, Dispatch};
 use crate::fft::{Paths, PathsJob};
 use phasefront_core::Size;
 use phasefront_core::display::Display;
-use phasefront_core::encode::natural::{FLOOR, FOCUS_PX, IN_FOCUS, MOMENTUM, NaturalSteps, RATE};
+use phasefront_core::encode::natural::{FLOOR, FOCUS_PX, IN_FOCUS, MOMENTUM, NaturalSteps, RATE, TURNS, turn};
 use phasefront_core::focus::{FocalStack, FocalStackScratch, motion_per_m};
 use phasefront_core::frame::RgbdFrame;
 
@@ -23,7 +23,8 @@ pub(crate) struct Natural {
     paths: Paths,
     /// One dispatch for each plane.
     miss: Vec<Dispatch>,
-    follow: Dispatch,
+    /// One dispatch for each turn.
+    follow: Vec<Dispatch>,
     /// One dispatch for each output buffer.
     arrive: Vec<Dispatch>,
 }
@@ -65,7 +66,7 @@ impl Natural {
             path.factors_through(display.aperture_radius())
         };
         let factors = (0..count).map(|plane| std::array::from_fn(|colour| through(colour, plane)));
-        let paths = Paths::new(device, &ends, factors)?;
+        let paths = Paths::new(device, &ends, factors, TURNS)?;
         let goal = Goal::new(device, size, ways.into_stack())?;
         let speeds = device.buffer("the speed of phases", 12 * size.pixels())?;
         let sums = device.buffer("the sums of weights", 12 * size.pixels())?;
@@ -84,8 +85,9 @@ impl Natural {
             let program = device.program(what, source.clone(), entry);
             program.on(device, &arguments, by_rows)
         };
-        let miss = |(number, amplitudes): (usize, &wgpu::Buffer)| {
-            let number = device.constants("the number of a plane", bytemuck::cast_slice(&[number as f32; 4]))?;
+        let number = |number: usize| device.constants("a number", bytemuck::cast_slice(&[number as f32; 4]));
+        let miss = |(plane, amplitudes): (usize, &wgpu::Buffer)| {
+            let number = number(plane)?;
             let own = [
                 (14, view),
                 (19, &goal.depths),
@@ -94,6 +96,11 @@ impl Natural {
                 (22, &number.buffer),
             ];
             dispatch("what is missing at a plane", "miss", &[0, 1, 5], &own)
+        };
+        let follow = |first: usize| {
+            let number = number(turn(first, count).len())?;
+            let own = [(14, view), (15, &speeds), (16, &still.phasors), (22, &number.buffer)];
+            dispatch("a step of natural focus", "follow", &[0, 1, 5, 9], &own)
         };
         let begun = [
             (10, wanted),
@@ -109,12 +116,7 @@ impl Natural {
             weigh: dispatch("weights", "weigh", &[0], &[(19, &goal.depths), (20, &sums)])?,
             paths,
             miss: goal.planes.iter().enumerate().map(miss).collect::<Result<_>>()?,
-            follow: dispatch(
-                "a step of natural focus",
-                "follow",
-                &[0, 1, 5, 9],
-                &[(14, view), (15, &speeds), (16, &still.phasors)],
-            )?,
+            follow: (0..TURNS).map(follow).collect::<Result<_>>()?,
             arrive: still.arrive(device, shared, source.clone(), buffers)?,
             still,
             goal,
@@ -148,10 +150,11 @@ impl Natural {
         self.weigh.run(pass);
     }
 
-    /// Runs one step.
-    pub(crate) fn step(&self, pass: &mut wgpu::ComputePass<'_>) {
-        self.paths.run(pass, |pass, plane| self.miss[plane].run(pass));
-        self.follow.run(pass);
+    /// Runs step `number` of a frame.
+    pub(crate) fn step(&self, number: usize, pass: &mut wgpu::ComputePass<'_>) {
+        let turn = number % TURNS;
+        self.paths.run(turn, pass, |pass, plane| self.miss[plane].run(pass));
+        self.follow[turn].run(pass);
     }
 
     /// Writes levels into the output buffers with that index.
@@ -239,7 +242,7 @@ mod tests {
         encoder.reset(&mut commands);
         let mut pass = commands.begin_compute_pass(&Default::default());
         encoder.run(&mut pass, 0);
-        (0..natural.steps()).for_each(|_| natural.step(&mut pass));
+        (0..natural.steps()).for_each(|number| natural.step(number, &mut pass));
         natural.arrive(&mut pass, 0);
         drop(pass);
         device.queue.submit([commands.finish()]);

@@ -1,6 +1,6 @@
 // Steps of natural focus, appended to direction.wgsl, local.wgsl and still.wgsl. See encode/natural.rs. `depart` starts
 // from the result of double phase or local steps, or, at static pixels, from the previous frame's final phasors, and
-// `weigh` sums the weights of all planes. A step runs `miss` at each plane and then `follow`. The header from
+// `weigh` sums the weights of all planes. A step runs `miss` at each plane of its turn and then `follow`. The header from
 // natural.rs defines the constants in capitals.
 
 // g − L·e, then u and r·u at a plane, then Σ Kᴴ(r·u).
@@ -12,8 +12,8 @@
 @group(0) @binding(20) var<storage, read_write> sums: array<f32>;
 // The amplitudes of the stack at a plane, A times the scale.
 @group(0) @binding(21) var<storage, read> stack: array<f32>;
-// The number of that plane.
-@group(0) @binding(22) var<uniform> plane: vec4f;
+// The number of that plane, and for `follow` how many planes the step looks at.
+@group(0) @binding(22) var<uniform> number: vec4f;
 
 // Returns the weight of a pixel at plane `p` before it is divided by the mean over all planes.
 fn weight(at: vec3u, p: f32) -> f32 {
@@ -43,7 +43,7 @@ fn miss(@builtin(global_invocation_id) at: vec3u) {
     if (i32(at.x) >= frame.width) { return; }
     let u = view[place(at)];
     let a = sqrt(dot(u, u)) + FLOOR;
-    let share = weight(at, plane.x) * f32(PLANES) / sums[place(at)];
+    let share = weight(at, number.x) * f32(PLANES) / sums[place(at)];
     view[place(at)] = u * (share * (a - stack[place(at)] * over(full_light())) / a);
 }
 
@@ -54,7 +54,7 @@ fn follow(@builtin(global_invocation_id) at: vec3u) {
     let e = phasors[place(at)];
     let gradient = view[place(at)];
     let slope = gradient.y * e.x - gradient.x * e.y;
-    let v = MOMENTUM * speeds[place(at)] + 2.0 / f32(PLANES) * slope;
+    let v = MOMENTUM * speeds[place(at)] + 2.0 / number.x * slope;
     speeds[place(at)] = v;
     let rotation = direction(-RATE / PI * v);
     let z = vec2f(e.x * rotation.x - e.y * rotation.y, e.x * rotation.y + e.y * rotation.x);

@@ -1,5 +1,6 @@
 //! Filters a field by several filters, one after another, and sums what comes back through their adjoints. The filters
-//! share the transforms of the field's rows, three buffers of spectra, and one table for a filter and its adjoint.
+//! share the transforms of the field's rows, three buffers of spectra, and one table for a filter and its adjoint. A run
+//! takes every filter or, in turn, every nth.
 
 use super::{Lines, Shared, Stage, is_even, roots, spectra_size};
 use crate::Result;
@@ -21,6 +22,7 @@ pub(crate) struct PathsJob<'a> {
 pub(crate) struct Paths {
     rows: Dispatch,
     ways: Vec<Way>,
+    turns: usize,
     to_view: Dispatch,
     of_view: Dispatch,
     sum_to_view: Dispatch,
@@ -34,11 +36,13 @@ struct Way {
 }
 
 impl Paths {
-    /// Plans paths with these `factors`, one filter for each colour, each as in [`super::Planes`].
+    /// Plans paths with these `factors`, one filter for each colour, each as in [`super::Planes`]. A run takes every
+    /// path number `turns`.
     pub(crate) fn new(
         device: &Device,
         job: &PathsJob<'_>,
         factors: impl IntoIterator<Item = [Vec<Complex32>; 3]>,
+        turns: usize,
     ) -> Result<Self> {
         let PathsJob {
             field,
@@ -57,7 +61,7 @@ impl Paths {
         let column_roots = roots(device, padded.height)?.buffer;
         let across = |buffer| Lines::rows(buffer, spectra);
         let down = |buffer| Lines::columns(buffer, spectra);
-        let mut ways = Vec::new();
+        let mut ways: Vec<Way> = Vec::new();
         for factors in factors {
             let one = factors[0].len();
             let [_, column, _] = Stage::of(padded, is_even(one, padded), false);
@@ -67,7 +71,7 @@ impl Paths {
             };
             let back = Stage {
                 conjugate: true,
-                add: !ways.is_empty(),
+                add: ways.len() >= turns,
                 ..there
             };
             let table = device.table("a path", bytemuck::cast_slice(&factors.concat()))?;
@@ -95,21 +99,23 @@ impl Paths {
         Ok(Paths {
             rows: shared.step("rows", row, &row_roots, (frame(field), across(&of_field)))?,
             ways,
+            turns,
             to_view: shared.step("rows to the view", back, &row_roots, (across(&of_view), frame(view)))?,
             of_view: shared.step("rows of the view", row, &row_roots, (frame(view), across(&of_view)))?,
             sum_to_view: shared.step("rows of the sum", back, &row_roots, (across(&sum), frame(view)))?,
         })
     }
 
-    /// Runs the paths on the field: writes its view at the end of each path, lets `change` change the view, and sends
-    /// it back. In the end the view is the sum of what came back.
+    /// Runs the paths of `turn` on the field: writes its view at the end of each path, lets `change` change the view,
+    /// and sends it back. In the end the view is the sum of what came back.
     pub(crate) fn run(
         &self,
+        turn: usize,
         pass: &mut wgpu::ComputePass<'_>,
         mut change: impl FnMut(&mut wgpu::ComputePass<'_>, usize),
     ) {
         self.rows.run(pass);
-        for (path, way) in self.ways.iter().enumerate() {
+        for (path, way) in self.ways.iter().enumerate().skip(turn).step_by(self.turns) {
             way.there.run(pass);
             self.to_view.run(pass);
             change(pass, path);
@@ -131,7 +137,7 @@ mod tests {
     const PITCH_M: f64 = 8e-6;
     const WAVELENGTHS_M: [f64; 3] = [638e-9, 520e-9, 450e-9];
     /// They need equal padding.
-    const DISTANCES_M: [f64; 2] = [2e-3, -2e-3];
+    const DISTANCES_M: [f64; 3] = [2e-3, -2e-3, 2e-3];
     /// Changes a view in a way that does not commute with filters.
     const FLATTEN: &str = "
         @group(0) @binding(0) var<storage, read_write> view: array<vec2f>;
@@ -153,11 +159,11 @@ mod tests {
     fn what_comes_back_is_that_of_the_cpu() {
         let device = device();
         let lens = Aberration::new([[0.3, 0.0, 1.5, 0.0, 0.2]; 3]).unwrap();
-        for (size, aberration) in [
-            (Size { width: 47, height: 61 }, None),
-            (Size { width: 66, height: 40 }, None),
-            (Size { width: 30, height: 22 }, Some(&lens)),
-            (Size { width: 1, height: 1 }, None),
+        for (size, aberration, turns) in [
+            (Size { width: 47, height: 61 }, None, 1),
+            (Size { width: 66, height: 40 }, None, 2),
+            (Size { width: 30, height: 22 }, Some(&lens), 2),
+            (Size { width: 1, height: 1 }, None, 1),
         ] {
             let reversed = aberration.map(Aberration::reversed);
             let there = DISTANCES_M.map(|distance_m| propagators(size, distance_m, aberration));
@@ -175,25 +181,27 @@ mod tests {
             let made = device.guarded(|| {
                 let grid = [given.len().div_ceil(64), 1, 1];
                 let flatten = flatten.on(&device, &[(0, view.as_entire_binding())], grid)?;
-                Ok((Paths::new(&device, &job, factors)?, flatten))
+                Ok((Paths::new(&device, &job, factors, turns)?, flatten))
             });
             let (paths, flatten) = made.unwrap();
             // The sum of one run must not add to the next one's.
-            for _ in 0..2 {
-                run(&device, |pass| paths.run(pass, |pass, _| flatten.run(pass)));
-            }
-            let mut expected = vec![Complex32::ZERO; given.len()];
-            for (there, back) in there.iter().zip(&back) {
-                for (c, sum) in expected.chunks_exact_mut(size.pixels()).enumerate() {
-                    let mut plane = given[c * size.pixels()..][..size.pixels()].to_vec();
-                    there[c].propagate(&mut plane, &mut there[c].scratch());
-                    plane.iter_mut().for_each(|value| value.im *= 0.25);
-                    back[c].propagate(&mut plane, &mut back[c].scratch());
-                    sum.iter_mut().zip(plane).for_each(|(sum, value)| *sum += value);
+            let in_turn = |turn: usize| run(&device, |pass| paths.run(turn, pass, |pass, _| flatten.run(pass)));
+            (0..turns).for_each(in_turn);
+            for turn in 0..turns {
+                in_turn(turn);
+                let mut expected = vec![Complex32::ZERO; given.len()];
+                for (there, back) in there.iter().zip(&back).skip(turn).step_by(turns) {
+                    for (c, sum) in expected.chunks_exact_mut(size.pixels()).enumerate() {
+                        let mut plane = given[c * size.pixels()..][..size.pixels()].to_vec();
+                        there[c].propagate(&mut plane, &mut there[c].scratch());
+                        plane.iter_mut().for_each(|value| value.im *= 0.25);
+                        back[c].propagate(&mut plane, &mut back[c].scratch());
+                        sum.iter_mut().zip(plane).for_each(|(sum, value)| *sum += value);
+                    }
                 }
+                let worst = apart(&read(&device, &view, expected.len()), &expected);
+                assert!(worst < 1e-4, "{size:?} {} {turn}: {worst}", aberration.is_some());
             }
-            let worst = apart(&read(&device, &view, expected.len()), &expected);
-            assert!(worst < 1e-4, "{size:?} {}: {worst}", aberration.is_some());
         }
     }
 }
