@@ -41,7 +41,7 @@ pub(crate) struct MultiplexCommand {
     /// The one colour of --packed; without it, a frame holds the maps of all three colours, red first
     #[arg(long, value_parser = packed::COLOURS, requires = "packed", help_heading = "Output")]
     colour: Option<String>,
-    /// Compare the mean of the first 1, 2, 4, 8 … maps with the wave
+    /// Compare the mean of the first 1, 2, 4, 8 … and of all maps with the wave
     #[arg(long, help_heading = "Output")]
     judge: bool,
     /// Output folder of the maps: phase_000.png …
@@ -194,7 +194,7 @@ impl MultiplexCommand {
     }
 }
 
-/// Compares the mean of the first 1, 2, 4 … of `maps` with `wave` and with what incoherent light shows of `frame`.
+/// Compares the mean of the first 1, 2, 4 … and of all `maps` with `wave` and with what incoherent light shows of `frame`.
 fn judged(
     plan: &Multiplex<'_>,
     frame: &RgbdFrame,
@@ -202,7 +202,7 @@ fn judged(
     maps: &[Map],
 ) -> Result<(Vec<serde_json::Value>, String)> {
     let counts = [1, 2, 4, 8, 12, 24, 48, 96].into_iter();
-    let counts: Vec<usize> = counts.filter(|n| *n <= maps.len()).collect();
+    let counts: Vec<usize> = counts.filter(|n| *n < maps.len()).chain([maps.len()]).collect();
     let natural = plan.judge_natural(frame, maps, &counts)?;
     let (mut rows, mut text) = (Vec::new(), String::new());
     for ((n, f), natural) in counts.iter().zip(plan.judge(wave, maps, &counts)?).zip(natural) {
