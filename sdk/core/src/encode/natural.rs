@@ -39,19 +39,14 @@ pub const SPAN: f64 = 0.9;
 const SPACING_PX: f64 = 2.0;
 /// The least and the largest number of planes, spread evenly over [`SPAN`] of the volume.
 const PLANES: [f64; 2] = [3.0, 21.0];
-/// The steps that look at every plane once, each at planes as far apart as the others'. Two steps at half of the planes
-/// bring as much as two at all of them, three at a third bring less.
-pub const TURNS: usize = 2;
+/// The fewest planes of a step that does not look at all of them.
+const FEWEST: usize = 4;
 /// How much more a pixel counts in focus than far out of focus.
 pub const IN_FOCUS: f64 = 2.0;
 /// The blur, in pixels, over which that falls to 1/e.
 pub const FOCUS_PX: f64 = 3.0;
 /// μ, the share of the last step that a step continues.
 pub const MOMENTUM: f32 = 0.8;
-/// γ of one map. One diverges.
-pub const RATE: f32 = 0.8;
-/// γ of several maps, of which each changes the amplitudes less. @@ diverge.
-const RATE_OF_SEVERAL: f32 = 1.5;
 /// The amplitude that keeps the division by a finite.
 pub const FLOOR: f32 = 1e-3;
 /// The largest number of steps.
@@ -109,14 +104,20 @@ impl NaturalScratch {
     }
 }
 
-/// Returns γ of `maps` maps.
-fn rate(maps: usize) -> f32 {
-    if maps == 1 { RATE } else { RATE_OF_SEVERAL }
+/// Returns γ of `maps` maps: the more there are, the less each changes the amplitudes. One map diverges at 1.
+pub fn rate(maps: usize) -> f32 {
+    (0.4 + 0.3 * maps as f32).min(1.5)
+}
+
+/// Returns after how many steps each of `planes` planes has had its turn. Steps that take the even and the odd planes in
+/// turn bring as much as steps at all planes, steps at a third bring less.
+pub fn turns(planes: usize) -> usize {
+    if planes < 2 * FEWEST { 1 } else { 2 }
 }
 
 /// Returns the numbers of those of `planes` planes that step number `step` looks at.
 pub fn turn(step: usize, planes: usize) -> impl ExactSizeIterator<Item = usize> {
-    (step % TURNS..planes).step_by(TURNS)
+    (step % turns(planes)..planes).step_by(turns(planes))
 }
 
 /// Returns z of the planes for `display`, in metres.

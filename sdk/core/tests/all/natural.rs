@@ -106,6 +106,18 @@ fn a_point_is_sharp_in_focus_and_a_disc_out_of_focus() {
     assert!((radius - per_m * 3e-3).abs() < 0.5, "{radius}");
 }
 
+#[test]
+fn every_plane_has_its_turn() {
+    for planes in 3..=21 {
+        let turns = natural::turns(planes);
+        let steps = (5..5 + turns).map(|step| natural::turn(step, planes));
+        assert!(steps.clone().all(|turn| turn.len() >= 3), "{planes}");
+        let mut seen: Vec<_> = steps.flatten().collect();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..planes).collect::<Vec<_>>());
+    }
+}
+
 /// Returns w_p of each plane of `z_m` for pixels at `pixels_m`.
 fn weights(pixels_m: &[f64], z_m: &[f64], per_m: f64) -> Vec<Vec<f64>> {
     let weight = |pixel_m: &f64, z_m: &f64| {
@@ -127,6 +139,7 @@ fn steps_of_natural_focus_agree_with_sums_in_f64() {
         ("", (24, 37), None, 1, 1),
         ("offset_mm = 2\naperture_radius = 0.9", (30, 21), Some(&laser), 1, 3),
         ("wavelengths_nm = [532]\noffset_mm = -1", (24, 37), None, 3, 2),
+        ("volume_depth_mm = 0.5", (20, 18), None, 4, 2),
         ("", (1, 5), None, 2, 2),
     ] {
         let size = Size::from_shape((h, w));

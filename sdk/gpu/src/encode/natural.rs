@@ -9,7 +9,7 @@ use crate::device::{Device, Dispatch};
 use crate::fft::{Paths, PathsJob};
 use phasefront_core::Size;
 use phasefront_core::display::Display;
-use phasefront_core::encode::natural::{FLOOR, FOCUS_PX, IN_FOCUS, MOMENTUM, NaturalSteps, RATE, TURNS, turn};
+use phasefront_core::encode::natural::{FLOOR, FOCUS_PX, IN_FOCUS, MOMENTUM, NaturalSteps, rate, turn, turns};
 use phasefront_core::focus::{FocalStack, FocalStackScratch, motion_per_m};
 use phasefront_core::frame::RgbdFrame;
 
@@ -66,7 +66,7 @@ impl Natural {
             path.factors_through(display.aperture_radius())
         };
         let factors = (0..count).map(|plane| std::array::from_fn(|colour| through(colour, plane)));
-        let paths = Paths::new(device, &ends, factors, TURNS)?;
+        let paths = Paths::new(device, &ends, factors, turns(count))?;
         let goal = Goal::new(device, size, ways.into_stack())?;
         let speeds = device.buffer("the speed of phases", 12 * size.pixels())?;
         let sums = device.buffer("the sums of weights", 12 * size.pixels())?;
@@ -116,7 +116,7 @@ impl Natural {
             weigh: dispatch("weights", "weigh", &[0], &[(19, &goal.depths), (20, &sums)])?,
             paths,
             miss: goal.planes.iter().enumerate().map(miss).collect::<Result<_>>()?,
-            follow: (0..TURNS).map(follow).collect::<Result<_>>()?,
+            follow: (0..turns(count)).map(follow).collect::<Result<_>>()?,
             arrive: still.arrive(device, shared, source.clone(), buffers)?,
             still,
             goal,
@@ -152,7 +152,7 @@ impl Natural {
 
     /// Runs step `number` of a frame.
     pub(crate) fn step(&self, number: usize, pass: &mut wgpu::ComputePass<'_>) {
-        let turn = number % TURNS;
+        let turn = number % self.follow.len();
         self.paths.run(turn, pass, |pass, plane| self.miss[plane].run(pass));
         self.follow[turn].run(pass);
     }
@@ -183,7 +183,7 @@ fn header(display: &Display, z_m: &[f64]) -> String {
         "const IN_FOCUS: f32 = {IN_FOCUS:?};
         const FOCUS_PX: f32 = {FOCUS_PX:?};
         const MOMENTUM: f32 = {MOMENTUM:?};
-        const RATE: f32 = {RATE:?};
+        const RATE: f32 = {:?};
         const FLOOR: f32 = {FLOOR:?};
         const PLANES: u32 = {}u;
         const FIRST_M: f32 = {:?};
@@ -191,6 +191,7 @@ fn header(display: &Display, z_m: &[f64]) -> String {
         const VOLUME_M: f32 = {:?};
         const PER_M: vec3f = vec3f({});
         ",
+        rate(1),
         z_m.len(),
         z_m[0] as f32,
         (z_m[1] - z_m[0]) as f32,
@@ -315,13 +316,13 @@ mod tests {
         let lens = Aberration::new([[0.0, 0.0, 1.5, 0.0, 0.0]; 3]).unwrap();
         let (fixed, most) = (Brightness::Fixed(1.2), Brightness::FrameMax);
         let size = |width, height| Size { width, height };
-        for (size, offset_m, radius, steps, lit, correction, brightness) in [
-            (size(47, 61), 0.0, 1.0, (1, 3), false, None, fixed),
-            (size(47, 31), 2e-3, 0.9, (0, 2), true, None, most),
-            (size(40, 26), 1e-3, 1.0, (2, 3), true, Some(lens), fixed),
-            (size(1, 1), 0.0, 1.0, (0, 3), false, None, most),
+        for (size, offset_m, toml, steps, lit, correction, brightness) in [
+            (size(47, 61), 0.0, "", (1, 3), false, None, fixed),
+            (size(47, 31), 2e-3, "aperture_radius = 0.9", (0, 2), true, None, most),
+            (size(40, 26), 1e-3, "volume_depth_mm = 2", (2, 3), true, Some(lens), fixed),
+            (size(1, 1), 0.0, "", (0, 3), false, None, most),
         ] {
-            let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
+            let display = Display::from_toml(toml).unwrap();
             let display = display.with_size(size).unwrap();
             let target = Target {
                 illumination: lit.then(|| laser.clone()),
