@@ -18,6 +18,7 @@ use crate::method::sweep::hidden::{Hidden, HiddenScratch, NOTHING};
 use crate::method::sweep::{MAX_REACH, hidden_reach};
 use crate::optics::asm::reach_m;
 use crate::runtime::error::{Error, Result};
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -26,6 +27,8 @@ use std::ops::Range;
 const PINHOLES: usize = 48;
 /// The largest sideways motion between neighbouring slices, in pixels.
 const STEP_PX: f64 = 0.4;
+/// The points from which a run is copied as a whole.
+const COPIED: usize = 16;
 /// The value of a pixel that no surface covers. Intensities are not negative.
 const UNCOVERED: f32 = -1.0;
 
@@ -55,16 +58,27 @@ pub struct FocalStackScratch {
 /// The points of one row of the frame, from the farthest slice to the nearest. Where two meet, the later one covers.
 #[derive(Default)]
 struct Row {
-    points: Vec<Point>,
-    /// The first point of each slice in that order, and the number of points.
+    runs: Vec<Run>,
+    /// The first run of each slice in that order, and the number of runs.
     starts: Vec<usize>,
 }
 
+/// Points beside one another whose light is that of pixels beside one another.
 #[derive(Clone, Copy)]
-struct Point {
+struct Run {
     x: u32,
-    /// The pixel whose light the point emits.
+    /// The pixel whose light the first point emits.
     source: u32,
+    length: u32,
+}
+
+/// The points of one row, sorted as in [`Row`], while it is prepared.
+#[derive(Default)]
+struct Sorting {
+    /// The column and the source of each point.
+    points: Vec<(u32, u32)>,
+    /// The end of each slice's points.
+    ends: Vec<usize>,
 }
 
 /// Returns `count` points spread evenly over the unit disc, (y, x): Vogel's sunflower (Mathematical Biosciences 44,
@@ -155,7 +169,10 @@ impl FocalStack {
         self.hidden.find(depth, &mut scratch.sources, &mut scratch.hidden);
         let sources = &scratch.sources;
         let rows = scratch.rows.par_iter_mut().enumerate();
-        rows.for_each(|(y, row)| self.sort_row(y, depth, sources, row));
+        rows.for_each_init(Sorting::default, |sorting, (y, row)| {
+            self.sort_row(y, depth, sources, sorting);
+            row.take(sorting);
+        });
     }
 
     fn slice(&self, depth: f32) -> usize {
@@ -196,25 +213,21 @@ impl FocalStack {
             || (y + 1 < height && deeper(y + 1, x))
     }
 
-    fn sort_row(&self, y: usize, depth: &[f32], sources: &[u32], row: &mut Row) {
+    fn sort_row(&self, y: usize, depth: &[f32], sources: &[u32], Sorting { points, ends }: &mut Sorting) {
         let last = self.slices - 1;
-        row.starts.clear();
-        row.starts.resize(self.slices + 1, 0);
-        self.points_of_row(y, depth, sources, |slice, _, _| row.starts[last - slice] += 1);
+        ends.clear();
+        ends.resize(self.slices, 0);
+        self.points_of_row(y, depth, sources, |slice, _, _| ends[last - slice] += 1);
         let mut total = 0;
-        for start in &mut row.starts {
-            total += std::mem::replace(start, total);
+        for end in ends.iter_mut() {
+            total += std::mem::replace(end, total);
         }
-        row.points.clear();
-        row.points.resize(total, Point { x: 0, source: 0 });
-        // Each start moves to the next slice's while its points are written.
-        let Row { points, starts } = row;
+        points.resize(total, (0, 0));
+        // Each start becomes the end while the slice's points are written.
         self.points_of_row(y, depth, sources, |slice, x, source| {
-            points[starts[last - slice]] = Point { x: x as u32, source };
-            starts[last - slice] += 1;
+            points[ends[last - slice]] = (x as u32, source);
+            ends[last - slice] += 1;
         });
-        starts.rotate_right(1);
-        starts[0] = 0;
     }
 
     /// Writes the amplitudes of plane `index` in `colour` into `out`, (H, W), from the colour's `amplitude`, (H, W),
@@ -248,11 +261,7 @@ impl FocalStack {
                     seen.fill(UNCOVERED);
                     self.view(y, motions, rows, intensity, seen);
                     let stays = self.stays(y, motions);
-                    for (x, seen) in seen[self.margin..][..width].iter().enumerate() {
-                        let covered = *seen >= 0.0;
-                        out[x] += if covered { *seen } else { 0.0 };
-                        hits[x] += u32::from(covered || !stays.contains(&x));
-                    }
+                    add_view(&seen[self.margin..][..width], out, &mut hits, stays);
                 }
                 for ((x, sum), hits) in out.iter_mut().enumerate().zip(&hits) {
                     *sum = if *hits > 0 {
@@ -283,13 +292,60 @@ impl FocalStack {
             let Some(row) = y.checked_add_signed(-*dy as isize).and_then(|y| rows.get(y)) else {
                 continue;
             };
-            let points = &row.points[row.starts[from_far]..row.starts[from_far + 1]];
             let first = self.margin.wrapping_add_signed(*dx as isize);
-            for point in points {
-                seen[first + point.x as usize] = intensity[point.source as usize];
+            for run in &row.runs[row.starts[from_far]..row.starts[from_far + 1]] {
+                let [x, source, length] = [run.x, run.source, run.length].map(|value| value as usize);
+                let (seen, light) = (&mut seen[first + x..][..length], &intensity[source..][..length]);
+                if length < COPIED {
+                    seen.iter_mut().zip(light).for_each(|(seen, light)| *seen = *light);
+                } else {
+                    seen.copy_from_slice(light);
+                }
             }
         }
     }
+}
+
+impl Row {
+    /// Stores the points of `sorting` as runs.
+    fn take(&mut self, sorting: &Sorting) {
+        self.runs.clear();
+        self.starts.clear();
+        self.starts.push(0);
+        let mut from = 0;
+        for end in &sorting.ends {
+            let first = self.runs.len();
+            for (x, source) in &sorting.points[from..*end] {
+                match self.runs[first..].last_mut() {
+                    Some(run) if (run.x + run.length, run.source + run.length) == (*x, *source) => run.length += 1,
+                    _ => self.runs.push(Run {
+                        x: *x,
+                        source: *source,
+                        length: 1,
+                    }),
+                }
+            }
+            self.starts.push(self.runs.len());
+            from = *end;
+        }
+    }
+}
+
+/// Adds the intensities `seen` through a pinhole to `sums`, and counts in `hits` the rays that meet a surface or leave
+/// the frame, as all do outside the columns `stays`.
+fn add_view(seen: &[f32], sums: &mut [f32], hits: &mut [u32], stays: Range<usize>) {
+    let start = stays.start.min(seen.len());
+    let end = stays.end.max(start);
+    wide!({
+        for ((seen, sum), hits) in seen.iter().zip(sums.iter_mut()).zip(hits.iter_mut()) {
+            let covered = *seen >= 0.0;
+            *sum += if covered { *seen } else { 0.0 };
+            *hits += u32::from(covered);
+        }
+        for x in (0..start).chain(end..seen.len()) {
+            hits[x] += u32::from(seen[x] < 0.0);
+        }
+    });
 }
 
 /// Computes plane `index` of `colour` naively, as the oracle for tests: for each pinhole, every point is compared with

@@ -319,7 +319,15 @@ mod tests {
         for (size, offset_m, toml, steps, lit, correction, brightness) in [
             (size(47, 61), 0.0, "", (1, 3), false, None, fixed),
             (size(47, 31), 2e-3, "aperture_radius = 0.9", (0, 2), true, None, most),
-            (size(40, 26), 1e-3, "volume_depth_mm = 2", (2, 3), true, Some(lens), fixed),
+            (
+                size(40, 26),
+                1e-3,
+                "volume_depth_mm = 2",
+                (2, 3),
+                true,
+                Some(lens),
+                fixed,
+            ),
             (size(1, 1), 0.0, "", (0, 3), false, None, most),
         ] {
             let display = Display::from_toml(toml).unwrap();
