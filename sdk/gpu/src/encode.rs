@@ -127,8 +127,11 @@ impl Encoder {
 
     /// Sets the previous frame of the next submission. Smoothed brightness, midpoint steps and those of natural focus
     /// continue from it.
-    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
+    pub(super) fn set_past(&mut self, device: &Device, past: Option<Past>) {
         self.double_phase.set_past(device, past);
+        if let Some(natural) = self.natural_mut() {
+            natural.set_past(past.is_some());
+        }
         if let Some(smoother) = &self.smoother {
             smoother.set_past(device, past);
         }

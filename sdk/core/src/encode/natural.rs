@@ -83,6 +83,8 @@ pub struct NaturalScratch {
     maps: Vec<OfMap>,
     /// A plane for registration.
     moved: [Vec<Complex32>; 2],
+    /// The number of the first step, so that few steps of each frame of a video look at all planes in the end.
+    first: usize,
     cancel: Cancel,
 }
 
@@ -113,6 +115,11 @@ pub fn rate(maps: usize) -> f32 {
 /// turn bring as much as steps at all planes, steps at a third bring less.
 pub fn turns(planes: usize) -> usize {
     if planes < 2 * FEWEST { 1 } else { 2 }
+}
+
+/// Returns the number of a frame's first step, if that of the frame before was `last` and `follows`, else 0.
+pub fn first_step(last: usize, steps: usize, planes: usize, follows: bool) -> usize {
+    if follows { (last + steps) % turns(planes) } else { 0 }
 }
 
 /// Returns the numbers of those of `planes` planes that step number `step` looks at.
@@ -219,6 +226,7 @@ impl NaturalSteps {
                 })
                 .collect(),
             moved: [vec![Complex32::ZERO; moved], vec![Complex32::ZERO; moved]],
+            first: 0,
             cancel: Cancel::default(),
         }
     }
@@ -235,12 +243,13 @@ impl NaturalSteps {
     }
 
     /// Stores `field`, (C, H, W) at the modulator. If the frame follows one of scale `past`, its unchanged pixels start
-    /// from their previous phases.
+    /// from their previous phases, and the planes go on having their turns.
     ///
     /// # Panics
     /// Panics if `field` does not have C·H·W values.
     pub fn keep(&self, field: &[Complex32], past: Option<f32>, scratch: &mut NaturalScratch) {
         scratch.still.keep(field, past);
+        scratch.first = first_step(scratch.first, self.steps, self.stack.z_m().len(), past.is_some());
     }
 
     /// Corrects `phases`, (C, H, W) in \[0, 2π), toward the stack of the stored frame. `scale` is the amplitude that
@@ -268,7 +277,7 @@ impl NaturalSteps {
         for colour in 0..self.display.colours() {
             self.aim_colour(colour, scratch);
             scratch.maps.iter_mut().for_each(|map| map.speed.fill(0.0));
-            for number in 0..self.steps {
+            for number in scratch.first..scratch.first + self.steps {
                 if scratch.cancel.requested() {
                     return;
                 }

@@ -168,7 +168,7 @@ mod tests {
             let area = size.height * size.width;
             let mut values = field(area);
             let buffer = upload(&device, &values);
-            let (encoder, buffers) = device
+            let (mut encoder, buffers) = device
                 .guarded(|| {
                     let buffers = [LevelsBuffers::new(&device, size)?];
                     let job = EncoderJob {

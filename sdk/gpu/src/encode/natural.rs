@@ -9,13 +9,17 @@ use crate::device::{Device, Dispatch};
 use crate::fft::{Paths, PathsJob};
 use phasefront_core::Size;
 use phasefront_core::display::Display;
-use phasefront_core::encode::natural::{FLOOR, FOCUS_PX, IN_FOCUS, MOMENTUM, NaturalSteps, rate, turn, turns};
+use phasefront_core::encode::natural::{
+    FLOOR, FOCUS_PX, IN_FOCUS, MOMENTUM, NaturalSteps, first_step, rate, turn, turns,
+};
 use phasefront_core::focus::{FocalStack, FocalStackScratch, motion_per_m};
 use phasefront_core::frame::RgbdFrame;
 
 /// The steps of natural focus of one field into several output buffers.
 pub(crate) struct Natural {
     steps: usize,
+    /// The number of the frame's first step.
+    first: usize,
     pub(super) still: Still,
     goal: Goal,
     depart: Dispatch,
@@ -112,6 +116,7 @@ impl Natural {
         ];
         Ok(Natural {
             steps: job.options.focus_steps,
+            first: 0,
             depart: dispatch("the start of natural focus", "depart", &[0, 1, 3, 5], &begun)?,
             weigh: dispatch("weights", "weigh", &[0], &[(19, &goal.depths), (20, &sums)])?,
             paths,
@@ -126,6 +131,11 @@ impl Natural {
     /// Returns the number of steps.
     pub(crate) fn steps(&self) -> usize {
         self.steps
+    }
+
+    /// Lets the planes go on having their turns if the next submission `follows` a frame.
+    pub(super) fn set_past(&mut self, follows: bool) {
+        self.first = first_step(self.first, self.steps, self.goal.planes.len(), follows);
     }
 
     /// Computes and uploads the focal stack of `frame`, which the next submission aims at.
@@ -152,7 +162,7 @@ impl Natural {
 
     /// Runs step `number` of a frame.
     pub(crate) fn step(&self, number: usize, pass: &mut wgpu::ComputePass<'_>) {
-        let turn = number % self.follow.len();
+        let turn = (self.first + number) % self.follow.len();
         self.paths.run(turn, pass, |pass, plane| self.miss[plane].run(pass));
         self.follow[turn].run(pass);
     }
