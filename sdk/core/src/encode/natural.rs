@@ -111,8 +111,8 @@ pub fn rate(maps: usize) -> f32 {
     (0.4 + 0.3 * maps as f32).min(1.5)
 }
 
-/// Returns after how many steps each of `planes` planes has had its turn. Steps that take the even and the odd planes in
-/// turn bring as much as steps at all planes, steps at a third bring less.
+/// Returns after how many steps each of `planes` planes has had its turn. Steps that take the even and the odd planes
+/// in turn bring as much as steps at all planes, steps at a third bring less.
 pub fn turns(planes: usize) -> usize {
     if planes < 2 * FEWEST { 1 } else { 2 }
 }

@@ -1,5 +1,5 @@
-//! Runs steps of natural focus. Each propagates to the planes of its turn and back and ends with a dispatch. The CPU computes the
-//! focal stack that they aim at. The counterpart of [`phasefront_core::encode::natural`].
+//! Runs steps of natural focus. Each propagates to the planes of its turn and back and ends with a dispatch. The CPU
+//! computes the focal stack that they aim at. The counterpart of [`phasefront_core::encode::natural`].
 
 use super::shared::Shared;
 use super::still::{self, Still};

@@ -1,7 +1,7 @@
 // Steps of natural focus, appended to direction.wgsl, local.wgsl and still.wgsl. See encode/natural.rs. `depart` starts
 // from the result of double phase or local steps, or, at static pixels, from the previous frame's final phasors, and
-// `weigh` sums the weights of all planes. A step runs `miss` at each plane of its turn and then `follow`. The header from
-// natural.rs defines the constants in capitals.
+// `weigh` sums the weights of all planes. A step runs `miss` at each plane of its turn and then `follow`. The header
+// from natural.rs defines the constants in capitals.
 
 // g − L·e, then u and r·u at a plane, then Σ Kᴴ(r·u).
 @group(0) @binding(14) var<storage, read_write> view: array<vec2f>;

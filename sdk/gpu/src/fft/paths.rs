@@ -1,6 +1,6 @@
-//! Filters a field by several filters, one after another, and sums what comes back through their adjoints. The filters
-//! share the transforms of the field's rows, three buffers of spectra, and one table for a filter and its adjoint. A run
-//! takes every filter or, in turn, every nth.
+//! Filters a field by several filters, one after another, and sums what comes back through their adjoints. The
+//! filters share the transforms of the field's rows, three buffers of spectra, and one table for a filter and its
+//! adjoint. A run takes every filter or, in turn, every nth.
 
 use super::{Lines, Shared, Stage, is_even, roots, spectra_size};
 use crate::Result;

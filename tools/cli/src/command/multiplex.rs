@@ -194,7 +194,8 @@ impl MultiplexCommand {
     }
 }
 
-/// Compares the mean of the first 1, 2, 4 … and of all `maps` with `wave` and with what incoherent light shows of `frame`.
+/// Compares the mean of the first 1, 2, 4 … and of all `maps` with `wave` and with what incoherent light shows of
+/// `frame`.
 fn judged(
     plan: &Multiplex<'_>,
     frame: &RgbdFrame,
