@@ -73,22 +73,22 @@ impl Start<'_> {
                 let row = self.read(y, read);
                 wide!(threshold.draw(row, out));
             }
-            (Some(blur), threshold) => wide!({
+            (Some(blur), threshold) => {
                 let (half, kept) = (blur.half(), ring.len() / width);
                 while *next <= (y + half).min(height - 1) {
                     let row = self.read(*next, read);
                     let to = &mut ring[*next % kept * width..][..width];
                     match threshold {
-                        None => blur.blur_row(row, to),
-                        Some(threshold) => {
+                        None => wide!(blur.blur_row(row, to)),
+                        Some(threshold) => wide!({
                             threshold.draw(row, damped);
                             blur.blur_row(damped, to);
-                        }
+                        }),
                     }
                     *next += 1;
                 }
-                blur.blur_down(ring, y, height, out);
-            }),
+                wide!(blur.blur_down(ring, y, height, out));
+            }
         }
         if let Some((light, modulator)) = self.light {
             light.divide_row(out, self.colour * height + y, height, modulator);

@@ -321,19 +321,8 @@ impl PerPixel {
         let (colour, y, x) = self.place(first);
         let end = self.corner.1 + self.window.width;
         assert!(x + phases.len() <= end, "a run beyond its row");
-        let knots = self.intervals + 1;
         let (i, fy) = self.split(y);
-        // Interpolates a node's curve and its turn in y.
-        let column = |j: usize, curve: &mut [f32; MAX_INTERVALS + 1]| {
-            let (top, bottom) = (self.node(colour, i, j), self.node(colour, i + 1, j));
-            let lines = self.levels[top * knots..][..knots]
-                .iter()
-                .zip(&self.levels[bottom * knots..][..knots]);
-            for (value, (top, bottom)) in curve.iter_mut().zip(lines) {
-                *value = top + (bottom - top) * fy;
-            }
-            self.turn[top] + (self.turn[bottom] - self.turn[top]) * fy
-        };
+        let column = |j: usize, curve: &mut _| self.column((colour, i, j), fy, curve);
         let mut j = x / self.spacing;
         let mut left = [0.0; MAX_INTERVALS + 1];
         let mut right = left;
@@ -365,6 +354,19 @@ impl PerPixel {
             j += 1;
             (left, left_turn) = (right, right_turn);
         }
+    }
+
+    /// Interpolates the curve of node (colour, i, j), a fraction `fy` of the way to the node below, into `curve`. Returns
+    /// its turn.
+    #[inline(always)]
+    fn column(&self, (colour, i, j): (usize, usize, usize), fy: f32, curve: &mut [f32; MAX_INTERVALS + 1]) -> f32 {
+        let (top, bottom) = (self.node(colour, i, j), self.node(colour, i + 1, j));
+        let knots = self.intervals + 1;
+        let of_node = |node: usize| &self.levels[node * knots..][..knots];
+        for ((value, top), bottom) in curve.iter_mut().zip(of_node(top)).zip(of_node(bottom)) {
+            *value = top + (bottom - top) * fy;
+        }
+        self.turn[top] + (self.turn[bottom] - self.turn[top]) * fy
     }
 
     /// Returns the smallest phase whose curve reaches `level` at value `at` of a stack, in \[0, 2π).
@@ -409,6 +411,7 @@ impl Between<'_> {
     // These are index loops over arrays of one fixed length. All of them vectorise except the middle one, which looks
     // up knots.
     #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
     fn levels(&self, phases: &[f32], first: f32, levels: &mut [u8]) {
         let mut wanted = [0.0; LANES];
         wanted[..phases.len()].copy_from_slice(phases);
