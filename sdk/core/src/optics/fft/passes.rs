@@ -7,6 +7,10 @@ use rayon::prelude::*;
 /// The number of columns gathered at a time: one cache line of complex numbers.
 const BLOCK: usize = 8;
 
+/// The number of rows of which all columns of a block are gathered before the next ones, so that their cache lines stay
+/// in the first-level cache.
+const GROUP: usize = 256;
+
 /// The working memory of an [`Fft2`] for one call at a time.
 pub struct Scratch {
     /// The rows, (H, W').
@@ -198,18 +202,12 @@ impl Fft2 {
 /// Transposes a strip: `to[i][j] = from[j][first + i]` for j < `count`, with rows of `to_stride` and `from_stride`
 /// values.
 fn gather(from: &[Complex32], from_stride: usize, first: usize, to: &mut [Complex32], to_stride: usize, count: usize) {
-    let lanes = to.len() / to_stride;
-    if lanes == BLOCK {
-        for (j, line) in from.chunks_exact(from_stride).take(count).enumerate() {
-            let line: &[Complex32; BLOCK] = line[first..first + BLOCK].try_into().expect("a slice of BLOCK values");
-            for (i, value) in line.iter().enumerate() {
-                to[i * to_stride + j] = *value;
-            }
-        }
-    } else {
-        for (j, line) in from.chunks_exact(from_stride).take(count).enumerate() {
-            for (i, value) in line[first..first + lanes].iter().enumerate() {
-                to[i * to_stride + j] = *value;
+    let groups = from[..count * from_stride].chunks(GROUP * from_stride);
+    for (group, lines) in groups.enumerate() {
+        for (i, to) in to.chunks_exact_mut(to_stride).enumerate() {
+            let lines = lines.chunks_exact(from_stride);
+            for (to, line) in to[group * GROUP..].iter_mut().zip(lines) {
+                *to = line[first + i];
             }
         }
     }
