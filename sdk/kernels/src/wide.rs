@@ -9,8 +9,9 @@ use crate::Isa;
 /// result is bit-identical.
 ///
 /// It is a macro, so that each instruction set gets its own copy: a closure with several callers would be compiled
-/// once, for none of them. Everything that the expression calls must therefore be inlined too. A call of a function that
-/// is not inlined and returns a slice even keeps the expression itself from being inlined; `tests/vectors` finds that.
+/// once, for none of them. Everything that the expression calls must therefore be inlined too. A call of a function
+/// that is not inlined and returns a slice even keeps the expression itself from being inlined; `tests/vectors` finds
+/// that.
 #[macro_export]
 macro_rules! wide {
     ($work:expr) => {

@@ -356,8 +356,8 @@ impl PerPixel {
         }
     }
 
-    /// Interpolates the curve of node (colour, i, j), a fraction `fy` of the way to the node below, into `curve`. Returns
-    /// its turn.
+    /// Interpolates the curve of node (colour, i, j), a fraction `fy` of the way to the node below, into `curve`.
+    /// Returns its turn.
     #[inline(always)]
     fn column(&self, (colour, i, j): (usize, usize, usize), fy: f32, curve: &mut [f32; MAX_INTERVALS + 1]) -> f32 {
         let (top, bottom) = (self.node(colour, i, j), self.node(colour, i + 1, j));
