@@ -27,8 +27,8 @@ use std::ops::Range;
 const PINHOLES: usize = 48;
 /// The largest sideways motion between neighbouring slices, in pixels.
 const STEP_PX: f64 = 0.4;
-/// The points from which a run is copied as a whole.
-const COPIED: usize = 16;
+/// The points that are copied together.
+const COPIED: usize = 8;
 /// The value of a pixel that no surface covers. Intensities are not negative.
 const UNCOVERED: f32 = -1.0;
 
@@ -259,7 +259,7 @@ impl FocalStack {
                 out.fill(0.0);
                 for motions in motions.chunks_exact(self.slices) {
                     seen.fill(UNCOVERED);
-                    self.view(y, motions, rows, intensity, seen);
+                    wide!(self.view(y, motions, rows, intensity, seen));
                     let stays = self.stays(y, motions);
                     add_view(&seen[self.margin..][..width], out, &mut hits, stays);
                 }
@@ -287,6 +287,7 @@ impl FocalStack {
     }
 
     /// Paints row `y` of a pinhole's view, from the farthest slice to the nearest.
+    #[inline(always)]
     fn view(&self, y: usize, motions: &[(i32, i32)], rows: &[Row], intensity: &[f32], seen: &mut [f32]) {
         for (from_far, (dy, dx)) in motions.iter().rev().enumerate() {
             let Some(row) = y.checked_add_signed(-*dy as isize).and_then(|y| rows.get(y)) else {
@@ -296,11 +297,7 @@ impl FocalStack {
             for run in &row.runs[row.starts[from_far]..row.starts[from_far + 1]] {
                 let [x, source, length] = [run.x, run.source, run.length].map(|value| value as usize);
                 let (seen, light) = (&mut seen[first + x..][..length], &intensity[source..][..length]);
-                if length < COPIED {
-                    seen.iter_mut().zip(light).for_each(|(seen, light)| *seen = *light);
-                } else {
-                    seen.copy_from_slice(light);
-                }
+                paint(light, seen);
             }
         }
     }
@@ -328,6 +325,21 @@ impl Row {
             self.starts.push(self.runs.len());
             from = *end;
         }
+    }
+}
+
+/// Copies `light` to `seen`, of the same length. Most runs are short, so a call for each would take longest.
+#[inline(always)]
+fn paint(light: &[f32], seen: &mut [f32]) {
+    let Some(end) = light.last_chunk::<COPIED>() else {
+        return seen.iter_mut().zip(light).for_each(|(seen, light)| *seen = *light);
+    };
+    let (pieces, _) = seen.as_chunks_mut::<COPIED>();
+    for (seen, light) in pieces.iter_mut().zip(light.as_chunks::<COPIED>().0) {
+        *seen = *light;
+    }
+    if let Some(seen) = seen.last_chunk_mut() {
+        *seen = *end;
     }
 }
 
