@@ -298,10 +298,7 @@ impl NaturalSteps {
         let per_m = motion_per_m(&self.display, self.display.wavelengths_m()[colour]);
         let weight = |depth: f32, z_m: f64| {
             let blur = (self.display.z_of_depth(depth.into()) - z_m) * per_m;
-            let square = (blur / FOCUS_PX).powi(2);
-            // Below e⁻³⁰ the sum is 1.
-            let near = if square > 30.0 { 0.0 } else { (-square).exp() };
-            (1.0 + IN_FOCUS * near) as f32
+            (1.0 + IN_FOCUS * (-(blur / FOCUS_PX).powi(2)).exp()) as f32
         };
         for (weights, z_m) in scratch.weights.chunks_exact_mut(plane).zip(self.stack.z_m()) {
             let values = weights.par_iter_mut().zip(&scratch.depth);
