@@ -53,6 +53,16 @@ impl Pixel {
     pub const fn im(self) -> i32 {
         self.0 as i32 >> 16
     }
+
+    /// Returns this pixel with a share of it, in units of 2⁻¹⁵, replaced with the same share of `light`. The parts of
+    /// both must differ by less than 2¹⁵.
+    #[inline(always)]
+    pub const fn blend(self, light: Pixel, share: i32) -> Pixel {
+        const fn part(part: i32, light: i32, share: i32) -> i32 {
+            part + ((share * (light - part) + (1 << 14)) >> 15)
+        }
+        Pixel::new(part(self.re(), light.re(), share), part(self.im(), light.im(), share))
+    }
 }
 
 /// A filter c with c₋ⱼ = cⱼ, rounded to fixed point.
@@ -125,6 +135,11 @@ trait Lanes: Copy {
     /// # Safety
     /// See [`Lanes`].
     unsafe fn add(self, other: Self) -> Self;
+    /// Returns these pixels with a share of them replaced, as [`Fir::blend`].
+    ///
+    /// # Safety
+    /// See [`Lanes`].
+    unsafe fn blend(self, light: Self, share: Self) -> Self;
     /// Returns sums of `start`.
     ///
     /// # Safety
@@ -135,7 +150,8 @@ trait Lanes: Copy {
     /// # Safety
     /// See [`Lanes`].
     unsafe fn multiply(self, tap: &Tap, sums: Self::Sums) -> Self::Sums;
-    /// Shifts sums to the right by `shift` bits and saturates them, to [`LEAST`] and [`MOST`].
+    /// Shifts sums to the right by `shift` bits, 1 to 15, and saturates them, to [`LEAST`] and [`MOST`]. A pixel of
+    /// twice the size saturates to the whole range of 16 bits, which packing does without further instructions.
     ///
     /// # Safety
     /// See [`Lanes`].
@@ -167,11 +183,12 @@ impl<const ROWS: usize> Run<ROWS> {
     }
 }
 
-/// The kernels for one row and for two.
+/// The kernels for one row and for two, and that of [`Fir::blend`] for slices of equal length.
 #[derive(Clone, Copy)]
 struct Kernels {
     one: unsafe fn(&Taps, Run<1>),
     two: unsafe fn(&Taps, Run<2>),
+    blend: unsafe fn(&mut [Pixel], &[Pixel], &[Pixel]),
 }
 
 /// The filter's kernel for one instruction set.
@@ -262,6 +279,33 @@ impl Fir {
         let run = run(taps, ring, pitch, centre, from, out);
         // SAFETY: the run is checked, and `new` has detected the instruction set.
         unsafe { (self.kernels.two)(taps, run) };
+    }
+
+    /// Replaces a share of each pixel of `field` with the same share of `light`, as [`Pixel::blend`] does. Both parts
+    /// of a pixel of `share` are −s·2¹⁵, where s is the share, 0 to 1.
+    ///
+    /// # Panics
+    /// Panics if the lengths differ or are not a multiple of [`RUN`].
+    pub fn blend(&self, field: &mut [Pixel], light: &[Pixel], share: &[Pixel]) {
+        assert!(field.len().is_multiple_of(RUN) && light.len() == field.len() && share.len() == field.len());
+        // SAFETY: the assert above holds, and `new` has detected the instruction set.
+        unsafe { (self.kernels.blend)(field, light, share) };
+    }
+}
+
+/// Blends whole registers.
+///
+/// # Safety
+/// The lengths must be equal and multiples of [`RUN`], and the caller must have detected the instruction set of `V`.
+#[inline(always)]
+unsafe fn blend<V: Lanes>(field: &mut [Pixel], light: &[Pixel], share: &[Pixel]) {
+    for x in (0..field.len()).step_by(V::LANES) {
+        // SAFETY: the lengths are equal, and whole registers divide them.
+        unsafe {
+            let at = field.as_mut_ptr().add(x);
+            let [light, share] = [V::load(light.as_ptr().add(x)), V::load(share.as_ptr().add(x))];
+            V::load(at).blend(light, share).store(at);
+        }
     }
 }
 
@@ -482,6 +526,31 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn every_kernel_blends_as_a_pixel_does() {
+        let field = noise(96, 5);
+        // Half of the range, so that no parts differ by 2¹⁵ or more.
+        let light = noise(96, 3)
+            .into_iter()
+            .map(|pixel| Pixel::new(pixel.re() / 2, pixel.im() / 2));
+        let light: Vec<_> = light.collect();
+        let shares: Vec<i32> = (0..96)
+            .map(|x| [0, 1, 16384, 32767, 32768, 341 * x][x as usize % 6])
+            .collect();
+        let expected = field.iter().zip(&light).zip(&shares);
+        let expected: Vec<_> = expected
+            .map(|((pixel, light), share)| pixel.blend(*light, *share))
+            .collect();
+        let share: Vec<_> = shares.iter().map(|share| Pixel::new(-share, -share)).collect();
+        for isa in Isa::fir() {
+            let mut blended = field.clone();
+            Fir::new(isa)
+                .expect("an available set has kernels")
+                .blend(&mut blended, &light, &share);
+            assert!(blended == expected, "{isa}");
         }
     }
 

@@ -185,6 +185,8 @@ pub struct SweepPlan {
 pub struct SweepScratch {
     positions: Vec<f32>,
     slots: Vec<Slot>,
+    /// The least and the most of the slots of each [`RUN`] pixels of a row.
+    ranges: Vec<[Slot; 2]>,
     sources: Vec<u32>,
     hidden: HiddenScratch,
     tiles: Workers<TileScratch>,
@@ -301,6 +303,7 @@ impl SweepPlan {
         SweepScratch {
             positions: vec![0.0; size],
             slots: vec![0; size],
+            ranges: vec![[0; 2]; width.div_ceil(RUN) * height],
             sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
@@ -355,6 +358,7 @@ impl SweepPlan {
         let SweepScratch {
             positions,
             slots,
+            ranges,
             sources,
             hidden,
             tiles,
@@ -365,18 +369,31 @@ impl SweepPlan {
         } = scratch;
         let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
         let (rgb, depth) = frame.values();
-        let part = BLOCK * self.size.width;
-        let parts = (slots.par_chunks_mut(part)).zip(positions.par_chunks_mut(part));
-        (parts.zip(depth.par_chunks(part)).enumerate())
-            .filter(|(row, _)| changed(row * BLOCK..(row + 1) * BLOCK))
-            .for_each(|(_, ((slots, positions), depth))| {
-                wide!(
-                    for ((slot, position), d) in slots.iter_mut().zip(positions).zip(depth) {
-                        *position = self.sweep.position(*d);
-                        *slot = Sweep::slot(*position);
+        let Size { width, .. } = self.size;
+        let (part, runs) = (BLOCK * width, width.div_ceil(RUN));
+        let parts = (slots.par_chunks_mut(part)).zip(ranges.par_chunks_mut(BLOCK * runs));
+        (parts
+            .zip(positions.par_chunks_mut(part))
+            .zip(depth.par_chunks(part))
+            .enumerate())
+        .filter(|(row, _)| changed(row * BLOCK..(row + 1) * BLOCK))
+        .for_each(|(_, (((slots, ranges), positions), depth))| {
+            wide!({
+                for ((slot, position), d) in slots.iter_mut().zip(positions).zip(depth) {
+                    *position = self.sweep.position(*d);
+                    *slot = Sweep::slot(*position);
+                }
+                for (slots, ranges) in slots.chunks_exact(width).zip(ranges.chunks_exact_mut(runs)) {
+                    let (whole, rest) = slots.as_chunks::<RUN>();
+                    for (range, slots) in ranges.iter_mut().zip(whole) {
+                        *range = shares::range(slots);
                     }
-                );
+                    if let (Some(range), false) = (ranges.last_mut(), rest.is_empty()) {
+                        *range = shares::range(rest);
+                    }
+                }
             });
+        });
         let layers = self.sweep.hidden_layers;
         let affected = changes.map(|changes| {
             of_surfaces.blocks.copy_from_slice(&changes.blocks);
@@ -392,6 +409,7 @@ impl SweepPlan {
             rgb,
             positions,
             slots,
+            ranges,
             hidden: &sources[..layers * size],
             size: self.size,
         };

@@ -1,12 +1,12 @@
 //! The filter for AVX-512 with VNNI: 16 pixels per register.
 #![allow(unsafe_code)]
 
-use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
+use super::{Kernels, Lanes, Pixel, Run, Tap, Taps};
 use std::arch::x86_64::*;
 
 /// Returns the kernels if the processor supports it.
 pub(super) fn kernels() -> Option<Kernels> {
-    crate::x86::avx512_vnni::available().then_some(Kernels { one, two })
+    crate::x86::avx512_vnni::available().then_some(Kernels { one, two, blend })
 }
 
 /// # Safety
@@ -23,6 +23,14 @@ unsafe fn one(taps: &Taps, run: Run<1>) {
 unsafe fn two(taps: &Taps, run: Run<2>) {
     // SAFETY: the caller upholds this function's contract.
     unsafe { super::two::<__m512i, 2>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::blend`].
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+unsafe fn blend(field: &mut [Pixel], light: &[Pixel], share: &[Pixel]) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::blend::<__m512i>(field, light, share) }
 }
 
 impl Lanes for __m512i {
@@ -48,6 +56,12 @@ impl Lanes for __m512i {
     }
 
     #[inline(always)]
+    unsafe fn blend(self, light: Self, share: Self) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
+        unsafe { _mm512_add_epi16(self, _mm512_mulhrs_epi16(_mm512_sub_epi16(self, light), share)) }
+    }
+
+    #[inline(always)]
     unsafe fn sums(start: i32) -> Self::Sums {
         // SAFETY: the caller upholds the contract of the trait.
         unsafe { [_mm512_set1_epi32(start); 2] }
@@ -66,15 +80,13 @@ impl Lanes for __m512i {
     unsafe fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
         // SAFETY: the caller upholds the contract of the trait.
         unsafe {
-            let shift = _mm_cvtsi32_si128(shift as i32);
-            let [re, im] = [_mm512_sra_epi32(re, shift), _mm512_sra_epi32(im, shift)];
+            // A shift by a vector takes half the time of one by a number that is not a constant.
+            let shift = _mm512_set1_epi32(shift as i32 - 1);
+            let [re, im] = [_mm512_srav_epi32(re, shift), _mm512_srav_epi32(im, shift)];
             // Each 128-bit lane has four real and four imaginary parts.
             let order = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
-            let parts = _mm512_shuffle_epi8(_mm512_packs_epi32(re, im), order);
-            _mm512_max_epi16(
-                _mm512_min_epi16(parts, _mm512_set1_epi16(MOST)),
-                _mm512_set1_epi16(LEAST),
-            )
+            let doubled = _mm512_shuffle_epi8(_mm512_packs_epi32(re, im), order);
+            _mm512_srai_epi16::<1>(doubled)
         }
     }
 }

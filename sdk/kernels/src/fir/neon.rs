@@ -1,10 +1,10 @@
 //! The filter for NEON: 8 pixels per pair of registers, real and imaginary. NEON is part of every ARM64 processor.
 #![allow(unsafe_code)]
 
-use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
+use super::{Kernels, Lanes, Pixel, Run, Tap, Taps};
 use std::arch::aarch64::*;
 
-pub(super) const KERNELS: Kernels = Kernels { one, two };
+pub(super) const KERNELS: Kernels = Kernels { one, two, blend };
 
 /// # Safety
 /// The contract of [`super::one`].
@@ -18,6 +18,13 @@ unsafe fn one(taps: &Taps, run: Run<1>) {
 unsafe fn two(taps: &Taps, run: Run<2>) {
     // SAFETY: the caller upholds this function's contract.
     unsafe { super::two::<int16x8x2_t, 1>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::blend`].
+unsafe fn blend(field: &mut [Pixel], light: &[Pixel], share: &[Pixel]) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::blend::<int16x8x2_t>(field, light, share) }
 }
 
 impl Lanes for int16x8x2_t {
@@ -44,6 +51,13 @@ impl Lanes for int16x8x2_t {
     }
 
     #[inline(always)]
+    unsafe fn blend(self, light: Self, share: Self) -> Self {
+        // SAFETY: the caller upholds the contract of the trait.
+        let part = |part, light, share| unsafe { vaddq_s16(part, vqrdmulhq_s16(vsubq_s16(part, light), share)) };
+        int16x8x2_t(part(self.0, light.0, share.0), part(self.1, light.1, share.1))
+    }
+
+    #[inline(always)]
     unsafe fn sums(start: i32) -> Self::Sums {
         // SAFETY: the caller upholds the contract of the trait.
         unsafe { [[vdupq_n_s32(start); 2]; 2] }
@@ -58,9 +72,8 @@ impl Lanes for int16x8x2_t {
     unsafe fn narrow(sums: Self::Sums, shift: u32) -> Self {
         // SAFETY: the caller upholds the contract of the trait.
         let [re, im] = sums.map(|sums| unsafe {
-            let [lower, upper] = sums.map(|sums| vshlq_s32(sums, vdupq_n_s32(-(shift as i32))));
-            let parts = vqmovn_high_s32(vqmovn_s32(lower), upper);
-            vmaxq_s16(vminq_s16(parts, vdupq_n_s16(MOST)), vdupq_n_s16(LEAST))
+            let [lower, upper] = sums.map(|sums| vshlq_s32(sums, vdupq_n_s32(1 - shift as i32)));
+            vshrq_n_s16::<1>(vqmovn_high_s32(vqmovn_s32(lower), upper))
         });
         int16x8x2_t(re, im)
     }

@@ -5,7 +5,7 @@ use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
 
 const LANES: usize = 8;
 
-pub(super) const KERNELS: Kernels = Kernels { one, two };
+pub(super) const KERNELS: Kernels = Kernels { one, two, blend };
 
 /// # Safety
 /// The contract of [`super::one`].
@@ -19,6 +19,13 @@ unsafe fn one(taps: &Taps, run: Run<1>) {
 unsafe fn two(taps: &Taps, run: Run<2>) {
     // SAFETY: the caller upholds this function's contract.
     unsafe { super::two::<[Pixel; LANES], 1>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::blend`].
+unsafe fn blend(field: &mut [Pixel], light: &[Pixel], share: &[Pixel]) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::blend::<[Pixel; LANES]>(field, light, share) }
 }
 
 impl Lanes for [Pixel; LANES] {
@@ -40,6 +47,11 @@ impl Lanes for [Pixel; LANES] {
     #[inline(always)]
     unsafe fn add(self, other: Self) -> Self {
         std::array::from_fn(|i| Pixel::new(self[i].re() + other[i].re(), self[i].im() + other[i].im()))
+    }
+
+    #[inline(always)]
+    unsafe fn blend(self, light: Self, share: Self) -> Self {
+        std::array::from_fn(|i| self[i].blend(light[i], -share[i].re()))
     }
 
     #[inline(always)]

@@ -1,9 +1,9 @@
 //! The filter for WebAssembly: 4 pixels per register.
 
-use super::{Kernels, LEAST, Lanes, MOST, Pixel, Run, Tap, Taps};
+use super::{Kernels, Lanes, Pixel, Run, Tap, Taps};
 use std::arch::wasm32::*;
 
-pub(super) const KERNELS: Kernels = Kernels { one, two };
+pub(super) const KERNELS: Kernels = Kernels { one, two, blend };
 
 /// # Safety
 /// The contract of [`super::one`].
@@ -17,6 +17,13 @@ unsafe fn one(taps: &Taps, run: Run<1>) {
 unsafe fn two(taps: &Taps, run: Run<2>) {
     // SAFETY: the caller upholds this function's contract.
     unsafe { super::two::<v128, 2>(taps, run) }
+}
+
+/// # Safety
+/// The contract of [`super::blend`].
+unsafe fn blend(field: &mut [Pixel], light: &[Pixel], share: &[Pixel]) {
+    // SAFETY: the caller upholds this function's contract.
+    unsafe { super::blend::<v128>(field, light, share) }
 }
 
 impl Lanes for v128 {
@@ -41,6 +48,11 @@ impl Lanes for v128 {
     }
 
     #[inline(always)]
+    unsafe fn blend(self, light: Self, share: Self) -> Self {
+        i16x8_add(self, i16x8_q15mulr_sat(i16x8_sub(self, light), share))
+    }
+
+    #[inline(always)]
     unsafe fn sums(start: i32) -> Self::Sums {
         [i32x4_splat(start); 2]
     }
@@ -55,9 +67,8 @@ impl Lanes for v128 {
 
     #[inline(always)]
     unsafe fn narrow([re, im]: Self::Sums, shift: u32) -> Self {
-        let parts = i16x8_narrow_i32x4(i32x4_shr(re, shift), i32x4_shr(im, shift));
-        let parts = i16x8_shuffle::<0, 4, 1, 5, 2, 6, 3, 7>(parts, parts);
-        i16x8_max(i16x8_min(parts, i16x8_splat(MOST)), i16x8_splat(LEAST))
+        let doubled = i16x8_narrow_i32x4(i32x4_shr(re, shift - 1), i32x4_shr(im, shift - 1));
+        i16x8_shr(i16x8_shuffle::<0, 4, 1, 5, 2, 6, 3, 7>(doubled, doubled), 1)
     }
 }
 

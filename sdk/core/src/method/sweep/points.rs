@@ -187,10 +187,9 @@ impl Points {
         let (rows, columns) = tile.around();
         for y in rows {
             let slots = &tile.surfaces.slots[y * width..][..width];
-            let planes = |x: usize| match slots.get(x..).and_then(<[Slot]>::first_chunk::<RUN>) {
-                Some(run) => range(run),
-                None => range(slots.get(x..).unwrap_or_default()),
-            };
+            let runs = width.div_ceil(RUN);
+            let ranges = &tile.surfaces.ranges[y * runs..][..runs];
+            let planes = |x: usize| ranges.get(x / RUN).copied().unwrap_or_default();
             // Runs of whole registers cost less than runs of the points that are on one plane.
             let mut x = columns.start / RUN * RUN;
             let mut next = planes(x);
@@ -288,14 +287,6 @@ fn outside(part: Range<usize>, whole: &Range<usize>) -> usize {
     (whole.start + 1)
         .saturating_sub(part.end)
         .max((part.start + 1).saturating_sub(whole.end))
-}
-
-/// Returns the least and the most of slots.
-#[inline(always)]
-fn range(slots: &[Slot]) -> [Slot; 2] {
-    let least = slots.iter().fold(Slot::MAX, |least, slot| least.min(*slot));
-    let most = slots.iter().fold(0, |most, slot| most.max(*slot));
-    [least, most]
 }
 
 #[cfg(test)]

@@ -39,6 +39,14 @@ impl Sweep {
     }
 }
 
+/// Returns the least and the most of slots.
+#[inline(always)]
+pub(super) fn range(slots: &[Slot]) -> [Slot; 2] {
+    let least = slots.iter().fold(Slot::MAX, |least, slot| least.min(*slot));
+    let most = slots.iter().fold(0, |most, slot| most.max(*slot));
+    [least, most]
+}
+
 /// Returns the share of a point at `position` on plane `k`.
 #[inline(always)]
 pub(super) fn share(position: f32, k: f32) -> f32 {

@@ -1,9 +1,9 @@
 //! One tile of the sweep. It processes the planes that hold points in the tile or its halo, from back to front.
 //!
 //! Light reaches a pixel of the hologram only from within its spread over the distance. A tile therefore needs only a
-//! halo as wide as the spread from plane k, and the required field shrinks plane by plane to the tile itself. Likewise,
-//! there is no light farther from the points behind a plane than the distance it can have spread. Each row's field is
-//! therefore computed only from the leftmost to the rightmost pixel that light can reach, its [`Span`].
+//! halo as wide as the spread from plane k, and the required field shrinks plane by plane. Likewise, there is no light
+//! farther from the points behind a plane than the distance it can have spread. Each row's field is therefore computed
+//! only from the leftmost to the rightmost pixel that light can reach, its [`Span`].
 
 use super::Sweep;
 use super::filters::{Filters, Optics};
@@ -19,6 +19,8 @@ use std::ops::Range;
 /// The number of pixels beyond light's reach that are also computed, because a fitted filter's light spreads slightly
 /// farther.
 pub const MARGIN: usize = 10;
+/// The same around a tile.
+const HALO_MARGIN: usize = 8;
 
 /// The surfaces of a frame: the positions and colours of the points of each pixel.
 #[derive(Clone, Copy)]
@@ -29,6 +31,8 @@ pub(super) struct Surfaces<'a> {
     pub(super) positions: &'a [f32],
     /// The planes of each pixel's point, (H, W).
     pub(super) slots: &'a [Slot],
+    /// The least and the most of the slots of each [`RUN`] pixels of a row.
+    pub(super) ranges: &'a [[Slot; 2]],
     /// The pixels that the hidden layers continue, (layers, H, W).
     pub(super) hidden: &'a [u32],
     pub(super) size: Size,
@@ -56,8 +60,14 @@ impl Layout {
     /// Creates the layout of tiles in a frame of `size`.
     pub(super) fn new(size: Size, sweep: Sweep, optics: &[Optics], filters: &[Filters]) -> Self {
         let planes = sweep.planes;
-        // Light passes from plane k to plane 0, and from there to the hologram.
-        let halo = |optics: &Optics, k: usize| optics.reach(optics.home_m.abs() + k as f64 * optics.step_m) + MARGIN;
+        // Light goes from plane k to plane 0, and from there to the hologram. If that lies behind plane 0, light
+        // returns to where it was, except for what points block on the way. Half of the detour holds nearly all of
+        // that.
+        let halo = |optics: &Optics, k: usize| {
+            let (home_m, depth_m) = (optics.home_m, k as f64 * optics.step_m);
+            let direct_m = home_m.abs().max((home_m + depth_m).abs());
+            optics.reach((direct_m + home_m.abs() + depth_m) / 2.0) + HALO_MARGIN
+        };
         let halos: Vec<Vec<usize>> = (optics.iter())
             .map(|optics| (0..planes).map(|k| halo(optics, k)).collect())
             .collect();
@@ -133,6 +143,9 @@ pub(super) struct TileScratch {
     /// The last rows filtered along x, in rows of `stride`.
     ring: Aligned,
     pub(super) points: Points,
+    /// The light of a run of points, and the shares that it takes ([`Fir::blend`]).
+    emitted: Vec<Pixel>,
+    blocked: Vec<Pixel>,
     /// The span of possible light in each row of the field.
     lit: Vec<Span>,
     /// The registers that hold `lit`.
@@ -168,6 +181,8 @@ impl TileScratch {
             field: Aligned::new(rows * stride),
             ring: Aligned::new((2 * layout.longest + 2) * stride),
             points: Points::new(layout, pixels, hidden_layers),
+            emitted: vec![Pixel::ZERO; stride],
+            blocked: vec![Pixel::ZERO; stride],
             lit,
             filtered: vec![NOWHERE; rows],
             wider: Vec::with_capacity(rows_and_more),
@@ -236,7 +251,14 @@ impl Tile<'_> {
     /// Replaces the field's share with the points of plane `k` where they are (Eq. 3 and 4): they emit light with phase
     /// 0 and block the light from behind.
     fn scatter(&self, colour: usize, k: usize, scratch: &mut TileScratch) {
-        let TileScratch { field, points, lit, .. } = scratch;
+        let TileScratch {
+            field,
+            points,
+            lit,
+            emitted,
+            blocked,
+            ..
+        } = scratch;
         for (lit, around) in lit.iter_mut().zip(points.around(k)) {
             *lit = join(*lit, *around);
         }
@@ -246,17 +268,23 @@ impl Tile<'_> {
         let field = field.pixels();
         for point in points.hidden(k) {
             let pixel = &mut field[point.at as usize];
-            *pixel = blend(*pixel, light(rgb[point.from as usize]), point.share);
+            *pixel = pixel.blend(light(rgb[point.from as usize]), point.share);
         }
         wide!({
             for run in points.front(k) {
                 let (at, from) = (run.at as usize, run.from as usize);
                 let count = run.count as usize;
-                let field = &mut field[at..at + count];
                 let points = rgb[from..from + count].iter().zip(&positions[from..from + count]);
-                for (pixel, (amplitude, position)) in field.iter_mut().zip(points) {
-                    *pixel = blend(*pixel, light(*amplitude), in_units(share(*position, k as f32)));
+                for ((emitted, blocked), (amplitude, position)) in emitted.iter_mut().zip(&mut *blocked).zip(points) {
+                    *emitted = light(*amplitude);
+                    let part = -in_units(share(*position, k as f32));
+                    *blocked = Pixel::new(part, part);
                 }
+                // A run ends within a register only at the edge of the frame.
+                let whole = count.next_multiple_of(RUN);
+                blocked[count..whole].fill(Pixel::ZERO);
+                self.fir
+                    .blend(&mut field[at..at + whole], &emitted[..whole], &blocked[..whole]);
             }
         });
     }
@@ -340,15 +368,8 @@ impl Tile<'_> {
     }
 }
 
-/// Returns an amplitude in units of [`UNIT`].
+/// Returns the light of a point of phase 0, in units of [`UNIT`].
 #[inline(always)]
-fn light(amplitude: f32) -> i32 {
-    round(amplitude * UNIT)
-}
-
-/// Replaces a share of `pixel`, in units of [`in_units`], with the same share of `light`.
-#[inline(always)]
-fn blend(pixel: Pixel, light: i32, share: i32) -> Pixel {
-    let part = |part: i32, light: i32| part + ((share * (light - part) + 16384) >> 15);
-    Pixel::new(part(pixel.re(), light), part(pixel.im(), 0))
+fn light(amplitude: f32) -> Pixel {
+    Pixel::new(round(amplitude * UNIT), 0)
 }
