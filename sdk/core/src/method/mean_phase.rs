@@ -23,7 +23,7 @@ pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
         return;
     }
     for plane in field.chunks_exact_mut(size) {
-        let turn = turn_of(plane, |value| value);
+        let turn = turn_of(plane);
         plane.par_chunks_mut(PART).for_each(|part| {
             wide!({
                 for value in part {
@@ -35,11 +35,8 @@ pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
 }
 
 /// Returns the factor that removes the mean phase of a field with these values.
-pub(super) fn turn_of<T: Copy + Sync>(values: &[T], value: impl Fn(T) -> Complex32 + Copy + Sync) -> Complex32 {
-    turn(sum(
-        &|part| sum_part(values, part, value),
-        0..values.len().div_ceil(PART),
-    ))
+pub(super) fn turn_of(values: &[Complex32]) -> Complex32 {
+    turn(sum(&|part| sum_part(values, part), 0..values.len().div_ceil(PART)))
 }
 
 /// The number of values of a part, which one thread takes at a time.
@@ -64,24 +61,23 @@ impl Sums {
 
     /// Sums the values of `colour` again where they differ from before. `differs` tells it of a range of values.
     /// Returns what [`turn_of`] returns, with the same bits.
-    pub(super) fn turn_of<T: Copy + Sync>(
+    pub(super) fn turn_of(
         &mut self,
         colour: usize,
-        values: &[T],
-        value: impl Fn(T) -> Complex32 + Copy + Sync,
+        values: &[Complex32],
         differs: impl Fn(Range<usize>) -> bool + Sync,
     ) -> Complex32 {
         let count = self.size.div_ceil(PART);
         let parts = &mut self.parts[colour * count..][..count];
         (parts.par_iter_mut().enumerate())
             .filter(|(part, _)| differs(part * PART..((part + 1) * PART).min(values.len())))
-            .for_each(|(part, of_part)| *of_part = sum_part(values, part, value));
+            .for_each(|(part, of_part)| *of_part = sum_part(values, part));
         turn(sum(&|part| parts[part], 0..count))
     }
 }
 
 /// Returns the factor that removes the phase of `sum`.
-fn turn(sum: Complex64) -> Complex32 {
+pub(super) fn turn(sum: Complex64) -> Complex32 {
     let turn = Complex64::from_polar(1.0, -sum.arg());
     Complex32::new(turn.re as f32, turn.im as f32)
 }
@@ -102,7 +98,7 @@ fn sum(of_part: &(impl Fn(usize) -> Complex64 + Sync), parts: Range<usize>) -> C
 }
 
 /// Sums part `part` of the values.
-fn sum_part<T: Copy>(values: &[T], part: usize, value: impl Fn(T) -> Complex32) -> Complex64 {
+fn sum_part(values: &[Complex32], part: usize) -> Complex64 {
     const LANES: usize = 16;
     let values = &values[part * PART..((part + 1) * PART).min(values.len())];
     wide!({
@@ -110,10 +106,10 @@ fn sum_part<T: Copy>(values: &[T], part: usize, value: impl Fn(T) -> Complex32) 
         let mut sums = [Complex32::ZERO; LANES];
         for run in runs {
             for (sum, of) in sums.iter_mut().zip(run) {
-                *sum += value(*of);
+                *sum += *of;
             }
         }
-        let all = sums.into_iter().chain(rest.iter().map(|of| value(*of)));
+        let all = sums.into_iter().chain(rest.iter().copied());
         all.map(|v| Complex64::new(v.re.into(), v.im.into())).sum()
     })
 }
@@ -132,7 +128,7 @@ mod tests {
         for (plane, wave) in field.chunks_exact(20_000).zip(wave.chunks_exact(20_000)) {
             let sum: Complex32 = plane.iter().sum();
             assert!(sum.arg().abs() < 1e-4);
-            let turn = turn_of(wave, |value| value);
+            let turn = turn_of(wave);
             assert!(plane.iter().zip(wave).all(|(u, w)| *u == w * turn));
         }
     }
@@ -143,18 +139,14 @@ mod tests {
             .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i % 5) as f32))
             .collect();
         let mut sums = Sums::new(2, values.len());
-        let mut turn = |values: &[Complex32], differs: &(dyn Fn(Range<usize>) -> bool + Sync)| {
-            sums.turn_of(1, values, |value| value, differs)
-        };
-        assert_eq!(turn(&values, &|_| true), turn_of(&values, |value| value));
+        let mut turn =
+            |values: &[Complex32], differs: &(dyn Fn(Range<usize>) -> bool + Sync)| sums.turn_of(1, values, differs);
+        assert_eq!(turn(&values, &|_| true), turn_of(&values));
         for at in [PART, 3 * PART + 5] {
             values[at] = Complex32::new(0.0, 3e4);
-            assert_eq!(
-                turn(&values, &|part| part.contains(&at)),
-                turn_of(&values, |value| value)
-            );
+            assert_eq!(turn(&values, &|part| part.contains(&at)), turn_of(&values));
         }
         values[0] = Complex32::new(0.0, -3e4);
-        assert_ne!(turn(&values, &|_| false), turn_of(&values, |value| value));
+        assert_ne!(turn(&values, &|_| false), turn_of(&values));
     }
 }

@@ -191,9 +191,13 @@ impl Standing {
                 .zip(self.changes.blocks.par_chunks(across))
                 .for_each(|((shown, new), blocks)| {
                     for (shown, new) in shown.chunks_exact_mut(width).zip(new.chunks_exact(width)) {
-                        let parts = shown.chunks_mut(BLOCK).zip(new.chunks(BLOCK)).zip(blocks);
-                        for ((shown, new), _) in parts.filter(|(_, changed)| **changed) {
-                            shown.copy_from_slice(new);
+                        let mut left = 0;
+                        for run in blocks.chunk_by(|a, b| a == b) {
+                            let right = (left + run.len() * BLOCK).min(width);
+                            if run[0] {
+                                shown[left..right].copy_from_slice(&new[left..right]);
+                            }
+                            left = right;
                         }
                     }
                 });

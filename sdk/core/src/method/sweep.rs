@@ -30,7 +30,7 @@ use crate::Size;
 use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::method::standing::{BLOCK, Changes};
-use crate::method::wave::{Pixels, Wave};
+use crate::method::wave::{PixelSum, Pixels, Wave};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use filters::Filters;
@@ -190,8 +190,9 @@ pub struct SweepScratch {
     sources: Vec<u32>,
     hidden: HiddenScratch,
     tiles: Workers<TileScratch>,
-    /// The swept wave, (C, H, W).
+    /// The swept wave, (C, H, W), and the sum of each colour's pixels.
     wave: Vec<Pixel>,
+    sums: [PixelSum; 3],
     /// The blocks whose visible or hidden surfaces have changed since the frame before.
     changes: Changes,
     /// The rows and columns of the tiles that are computed, the largest first.
@@ -207,7 +208,7 @@ impl SweepScratch {
 
     /// Returns the swept wave, (C, H, W).
     pub(super) fn wave(&self) -> Pixels<'_> {
-        Pixels::Fixed(&self.wave)
+        Pixels::Fixed(&self.wave, &self.sums)
     }
 
     /// Returns the blocks whose light the last call of [`SweepPlan::sweep_where`] with changes has changed.
@@ -308,6 +309,7 @@ impl SweepPlan {
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| TileScratch::new(&self.layout, size, layers)),
             wave: vec![Pixel::ZERO; self.filters.len() * size],
+            sums: [[0; 2]; 3],
             changes: Changes::all(self.size),
             order: Vec::with_capacity(self.layout.tiles(0..height, 0..width, 2).count()),
             cancel: Cancel::default(),
@@ -363,6 +365,7 @@ impl SweepPlan {
             hidden,
             tiles,
             wave,
+            sums,
             changes: of_surfaces,
             order,
             cancel,
@@ -415,7 +418,9 @@ impl SweepPlan {
         };
         let mut waves = wave.chunks_exact_mut(size);
         // An array of the largest number of colours avoids an allocation.
-        let waves: [_; 3] = std::array::from_fn(|_| Mutex::new(waves.next().unwrap_or_default()));
+        let waves = sums
+            .each_mut()
+            .map(|sum| Mutex::new((waves.next().unwrap_or_default(), sum)));
         self.arrange(affected, order);
         let next = AtomicUsize::new(0);
         let take = || {
@@ -439,8 +444,9 @@ impl SweepPlan {
                         scratch.points.gather(&tile);
                         for (colour, filters) in self.filters.iter().enumerate() {
                             tile.sweep(colour, filters, scratch);
-                            let mut wave = waves[colour].lock().unwrap_or_else(PoisonError::into_inner);
-                            tile.store(&mut wave, scratch);
+                            let mut plane = waves[colour].lock().unwrap_or_else(PoisonError::into_inner);
+                            let (wave, sum) = &mut *plane;
+                            tile.store(wave, sum, scratch);
                         }
                     });
                 }

@@ -3,7 +3,7 @@
 use super::mean_phase::{self, Sums};
 use super::standing::Changed;
 use crate::Size;
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 use phasefront_kernels::fir::Pixel;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
@@ -15,11 +15,14 @@ pub(super) const UNIT: f32 = 8192.0;
 /// The number of values that one thread takes at a time.
 const PART: usize = 1 << 14;
 
+/// The sums of the real and of the imaginary parts of pixels.
+pub(crate) type PixelSum = [i64; 2];
+
 /// Pixels of a wave.
 #[derive(Clone, Copy)]
 pub(crate) enum Pixels<'a> {
-    /// Fixed point of the plane sweep, in 1/[`UNIT`].
-    Fixed(&'a [Pixel]),
+    /// Fixed point of the plane sweep, in 1/[`UNIT`], and the sum of each colour's pixels.
+    Fixed(&'a [Pixel], &'a [PixelSum; 3]),
     /// Values of a network.
     Float(&'a [Complex32]),
 }
@@ -49,7 +52,7 @@ pub(crate) struct WavePlane<'a> {
 impl<'a> Pixels<'a> {
     fn len(self) -> usize {
         match self {
-            Pixels::Fixed(pixels) => pixels.len(),
+            Pixels::Fixed(pixels, _) => pixels.len(),
             Pixels::Float(values) => values.len(),
         }
     }
@@ -57,7 +60,7 @@ impl<'a> Pixels<'a> {
     /// Returns `count` pixels from `from` on.
     fn part(self, from: usize, count: usize) -> Self {
         match self {
-            Pixels::Fixed(pixels) => Pixels::Fixed(&pixels[from..][..count]),
+            Pixels::Fixed(pixels, sums) => Pixels::Fixed(&pixels[from..][..count], sums),
             Pixels::Float(values) => Pixels::Float(&values[from..][..count]),
         }
     }
@@ -65,8 +68,8 @@ impl<'a> Pixels<'a> {
     /// Returns the factor that removes the mean phase of colour `colour`, which has `size` pixels.
     pub(super) fn turn_of(self, colour: usize, size: usize) -> Complex32 {
         match self.part(colour * size, size) {
-            Pixels::Fixed(pixels) => mean_phase::turn_of(pixels, value),
-            Pixels::Float(values) => mean_phase::turn_of(values, |value| value),
+            Pixels::Fixed(_, sums) => turn_of_sum(sums[colour]),
+            Pixels::Float(values) => mean_phase::turn_of(values),
         }
     }
 
@@ -79,8 +82,8 @@ impl<'a> Pixels<'a> {
         sums: &mut Sums,
     ) -> Complex32 {
         match self.part(colour * size, size) {
-            Pixels::Fixed(pixels) => sums.turn_of(colour, pixels, value, differs),
-            Pixels::Float(values) => sums.turn_of(colour, values, |value| value, differs),
+            Pixels::Fixed(_, sums) => turn_of_sum(sums[colour]),
+            Pixels::Float(values) => sums.turn_of(colour, values, differs),
         }
     }
 }
@@ -95,7 +98,7 @@ impl<'a> Wave<'a> {
     #[inline(always)]
     pub(crate) fn value(&self, at: usize) -> Complex32 {
         let pixel = match self.pixels {
-            Pixels::Fixed(pixels) => value(pixels[at]),
+            Pixels::Fixed(pixels, _) => value(pixels[at]),
             Pixels::Float(values) => values[at],
         };
         pixel * self.turns[at / self.size.pixels()]
@@ -132,7 +135,7 @@ impl WavePlane<'_> {
     pub(crate) fn write(self, from: usize, to: &mut [Complex32]) {
         let turn = self.turn;
         match self.pixels.part(from, to.len()) {
-            Pixels::Fixed(pixels) => wide!(for (to, pixel) in to.iter_mut().zip(pixels) {
+            Pixels::Fixed(pixels, _) => wide!(for (to, pixel) in to.iter_mut().zip(pixels) {
                 *to = value(*pixel) * turn;
             }),
             Pixels::Float(values) => wide!(for (to, value) in to.iter_mut().zip(values) {
@@ -140,6 +143,11 @@ impl WavePlane<'_> {
             }),
         }
     }
+}
+
+/// Returns the factor that removes the mean phase of pixels with this sum.
+fn turn_of_sum([re, im]: PixelSum) -> Complex32 {
+    mean_phase::turn(Complex64::new(re as f64, im as f64))
 }
 
 /// Returns the value of a pixel in fixed point.

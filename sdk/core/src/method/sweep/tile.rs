@@ -11,7 +11,7 @@ use super::points::Points;
 use super::shares::{Slot, in_units, round, share};
 use super::spans::{NOWHERE, Span, join, widen, widen_down};
 use crate::Size;
-use crate::method::wave::UNIT;
+use crate::method::wave::{PixelSum, UNIT};
 use phasefront_kernels::fir::{Fir, Pixel, RUN, Taps};
 use phasefront_kernels::wide;
 use std::ops::Range;
@@ -356,14 +356,24 @@ impl Tile<'_> {
         }
     }
 
-    /// Writes the swept tile into a colour's plane of the frame's wave.
-    pub(super) fn store(&self, wave: &mut [Pixel], scratch: &mut TileScratch) {
+    /// Writes the swept tile into a colour's plane of the frame's wave, and keeps the sum of the plane's pixels.
+    pub(super) fn store(&self, wave: &mut [Pixel], sum: &mut PixelSum, scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let field = scratch.field.pixels();
         for (i, y) in self.rows.clone().enumerate() {
             let row = &field[(border + i) * stride + border..][..self.columns.len()];
             let at = y * self.surfaces.size.width + self.columns.start;
-            wave[at..][..row.len()].copy_from_slice(row);
+            let wave = &mut wave[at..][..row.len()];
+            // A row of the largest tile stays within 32 bits.
+            let mut grown = [0_i32; 2];
+            wide!(for (old, new) in wave.iter_mut().zip(row) {
+                grown[0] += new.re() - old.re();
+                grown[1] += new.im() - old.im();
+                *old = *new;
+            });
+            for (sum, grown) in sum.iter_mut().zip(grown) {
+                *sum += i64::from(grown);
+            }
         }
     }
 }
