@@ -370,33 +370,8 @@ impl SweepPlan {
             order,
             cancel,
         } = scratch;
-        let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
         let (rgb, depth) = frame.values();
-        let Size { width, .. } = self.size;
-        let (part, runs) = (BLOCK * width, width.div_ceil(RUN));
-        let parts = (slots.par_chunks_mut(part)).zip(ranges.par_chunks_mut(BLOCK * runs));
-        (parts
-            .zip(positions.par_chunks_mut(part))
-            .zip(depth.par_chunks(part))
-            .enumerate())
-        .filter(|(row, _)| changed(row * BLOCK..(row + 1) * BLOCK))
-        .for_each(|(_, (((slots, ranges), positions), depth))| {
-            wide!({
-                for ((slot, position), d) in slots.iter_mut().zip(positions).zip(depth) {
-                    *position = self.sweep.position(*d);
-                    *slot = Sweep::slot(*position);
-                }
-                for (slots, ranges) in slots.chunks_exact(width).zip(ranges.chunks_exact_mut(runs)) {
-                    let (whole, rest) = slots.as_chunks::<RUN>();
-                    for (range, slots) in ranges.iter_mut().zip(whole) {
-                        *range = shares::range(slots);
-                    }
-                    if let (Some(range), false) = (ranges.last_mut(), rest.is_empty()) {
-                        *range = shares::range(rest);
-                    }
-                }
-            });
-        });
+        self.place_points(changes, depth, positions, slots, ranges);
         let layers = self.sweep.hidden_layers;
         let affected = changes.map(|changes| {
             of_surfaces.blocks.copy_from_slice(&changes.blocks);
@@ -452,6 +427,43 @@ impl SweepPlan {
                 }
             });
         Ok(!cancel.requested())
+    }
+
+    /// Finds where the points of a frame's `depth` are among the planes, in the rows with `changes`.
+    fn place_points(
+        &self,
+        changes: Option<&Changes>,
+        depth: &[f32],
+        positions: &mut [f32],
+        slots: &mut [Slot],
+        ranges: &mut [[Slot; 2]],
+    ) {
+        let changed = |rows: Range<usize>| changes.is_none_or(|changes| changes.any(rows));
+        let Size { width, .. } = self.size;
+        let (part, runs) = (BLOCK * width, width.div_ceil(RUN));
+        let parts = (slots.par_chunks_mut(part)).zip(ranges.par_chunks_mut(BLOCK * runs));
+        (parts
+            .zip(positions.par_chunks_mut(part))
+            .zip(depth.par_chunks(part))
+            .enumerate())
+        .filter(|(row, _)| changed(row * BLOCK..(row + 1) * BLOCK))
+        .for_each(|(_, (((slots, ranges), positions), depth))| {
+            wide!({
+                for ((slot, position), d) in slots.iter_mut().zip(positions).zip(depth) {
+                    *position = self.sweep.position(*d);
+                    *slot = Sweep::slot(*position);
+                }
+                for (slots, ranges) in slots.chunks_exact(width).zip(ranges.chunks_exact_mut(runs)) {
+                    let (whole, rest) = slots.as_chunks::<RUN>();
+                    for (range, slots) in ranges.iter_mut().zip(whole) {
+                        *range = shares::range(slots);
+                    }
+                    if let (Some(range), false) = (ranges.last_mut(), rest.is_empty()) {
+                        *range = shares::range(rest);
+                    }
+                }
+            });
+        });
     }
 
     /// Finds the tiles to compute: those of the frame, or of the rectangle that holds what is `affected`, and of each
