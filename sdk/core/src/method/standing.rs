@@ -295,9 +295,11 @@ mod tests {
     use crate::method::mean_phase::MeanPhase;
     use crate::method::network::Network;
     use crate::method::sweep::{Sweep, SweepPlan};
-    use crate::method::{Method, MethodPlan, MethodScratch, Plan};
+    use crate::method::wave::Pixels;
+    use crate::method::{Method, MethodPlan, MethodScratch, Plan, Scratch};
     use crate::runtime::cancel::Cancel;
     use num_complex::Complex32;
+    use phasefront_kernels::fir::Pixel;
     use std::sync::Arc;
     use std::time::Duration;
 
@@ -399,6 +401,32 @@ mod tests {
                 let squares: f32 = field.iter().zip(&wave).map(|(a, b)| (a - b).norm_sqr()).sum();
                 let error = (squares / wave.len() as f32).sqrt();
                 assert!(error < 0.03, "{which} {i}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_sum_of_the_sweeps_pixels_is_kept_with_them() {
+        let plan = plan(2);
+        let mut scratch = keeping(&plan);
+        let cancel = Cancel::default();
+        scratch.set_cancel(&cancel);
+        for (i, past) in [None, PAST, PAST, None, PAST, PAST].into_iter().enumerate() {
+            // The fifth frame is given up.
+            match i {
+                4 => cancel.request(),
+                _ => cancel.clear(),
+            }
+            field(&plan, past, &scene(20 + 4 * i, [0.004, 0.01], 1), &mut scratch);
+            let Scratch::Sweep(swept) = &scratch.of_plan else {
+                panic!("the sweep's scratch");
+            };
+            let Pixels::Fixed(pixels, sums) = swept.wave() else {
+                panic!("the sweep's wave");
+            };
+            for (pixels, kept) in pixels.chunks_exact(SIZE.pixels()).zip(sums) {
+                let add = |[re, im]: [i64; 2], pixel: &Pixel| [re + i64::from(pixel.re()), im + i64::from(pixel.im())];
+                assert_eq!(pixels.iter().fold([0; 2], add), *kept, "{i}");
             }
         }
     }

@@ -67,9 +67,9 @@ impl<'a> Pixels<'a> {
 
     /// Returns the factor that removes the mean phase of colour `colour`, which has `size` pixels.
     pub(super) fn turn_of(self, colour: usize, size: usize) -> Complex32 {
-        match self.part(colour * size, size) {
+        match self {
             Pixels::Fixed(_, sums) => turn_of_sum(sums[colour]),
-            Pixels::Float(values) => mean_phase::turn_of(values),
+            Pixels::Float(values) => mean_phase::turn_of(&values[colour * size..][..size]),
         }
     }
 
@@ -81,9 +81,9 @@ impl<'a> Pixels<'a> {
         differs: impl Fn(Range<usize>) -> bool + Sync,
         sums: &mut Sums,
     ) -> Complex32 {
-        match self.part(colour * size, size) {
+        match self {
             Pixels::Fixed(_, sums) => turn_of_sum(sums[colour]),
-            Pixels::Float(values) => sums.turn_of(colour, values, differs),
+            Pixels::Float(values) => sums.turn_of(colour, &values[colour * size..][..size], differs),
         }
     }
 }
