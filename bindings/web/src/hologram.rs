@@ -1,15 +1,15 @@
 //! Results, which leave the module as copies, images into the memory of the page.
 
-#[cfg(not(target_feature = "atomics"))]
+#[cfg(feature = "webgpu")]
 use crate::error::error;
 use crate::error::{Answer, object, of_core, setting};
 use js_sys::{Array, Float32Array, Object, Uint8Array};
 use phasefront::Size;
-#[cfg(not(target_feature = "atomics"))]
+#[cfg(feature = "webgpu")]
 use phasefront::output::Levels;
 use phasefront::output::{Layout, Output, OutputSize, Placement};
 use phasefront::session::{FrameTimes, Hologram};
-#[cfg(not(target_feature = "atomics"))]
+#[cfg(feature = "webgpu")]
 use phasefront_gpu::{GpuError, GpuView, paint};
 use std::cell::RefCell;
 use std::time::Duration;
@@ -60,9 +60,9 @@ impl RawHologram {
     /// Checks whether the levels stayed on the GPU.
     #[wasm_bindgen(js_name = onGpu)]
     pub fn on_gpu(&self) -> bool {
-        #[cfg(not(target_feature = "atomics"))]
+        #[cfg(feature = "webgpu")]
         return self.core.on_gpu().is_some();
-        #[cfg(target_feature = "atomics")]
+        #[cfg(not(feature = "webgpu"))]
         false
     }
 
@@ -71,7 +71,7 @@ impl RawHologram {
     /// # Errors
     /// Rejects with an error of kind `setting` if the canvas has another context, and of kind `session` if the GPU was
     /// lost.
-    #[cfg(not(target_feature = "atomics"))]
+    #[cfg(feature = "webgpu")]
     #[wasm_bindgen(js_name = paintLevels)]
     pub async fn paint_levels(&self, canvas: JsValue) -> Answer<()> {
         let levels = self.core.on_gpu().ok_or_else(elsewhere)?;
@@ -94,7 +94,7 @@ impl RawHologram {
     ///
     /// # Errors
     /// Rejects in the cases of [`Self::write_preview`] and [`Self::paint_levels`].
-    #[cfg(not(target_feature = "atomics"))]
+    #[cfg(feature = "webgpu")]
     #[wasm_bindgen(js_name = paintPreview)]
     pub async fn paint_preview(&self, z_mm: f64, width: u32, height: u32, canvas: JsValue) -> Answer<()> {
         let levels = self.core.on_gpu().ok_or_else(elsewhere)?;
@@ -231,12 +231,12 @@ impl RawHologram {
     }
 }
 
-#[cfg(not(target_feature = "atomics"))]
+#[cfg(feature = "webgpu")]
 fn elsewhere() -> JsValue {
     setting("the levels are not on the GPU; write them into an image")
 }
 
-#[cfg(not(target_feature = "atomics"))]
+#[cfg(feature = "webgpu")]
 fn of_gpu(why: GpuError) -> JsValue {
     match why {
         GpuError::Core(why) => of_core(why),

@@ -26,10 +26,10 @@ mod options;
 mod session;
 #[cfg(target_arch = "wasm32")]
 mod target;
-#[cfg(target_arch = "wasm32")]
+#[cfg(all(target_arch = "wasm32", target_feature = "atomics"))]
 mod threads;
 
 #[cfg(target_arch = "wasm32")]
 pub use error::{start, version};
-#[cfg(target_arch = "wasm32")]
+#[cfg(all(target_arch = "wasm32", target_feature = "atomics"))]
 pub use threads::{help, of_this_module, start_threads};

@@ -5,7 +5,7 @@ use crate::network::RawNetwork;
 use crate::target::RawTarget;
 use phasefront::Size;
 use phasefront::input::DepthRange;
-#[cfg(not(target_feature = "atomics"))]
+#[cfg(feature = "webgpu")]
 use phasefront::session::Backend;
 use phasefront::session::{Focus, Quality, QualityLevel, SessionOptions};
 use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
@@ -180,19 +180,19 @@ impl RawOptions {
     /// Computes frames on the browser's GPU, or only on an adapter whose name contains `adapter`.
     ///
     /// # Errors
-    /// Throws an error of kind `setting` in the build with threads.
+    /// Throws an error of kind `setting` if this module has no WebGPU.
     pub fn webgpu(&mut self, adapter: Option<String>) -> Answer<()> {
-        #[cfg(not(target_feature = "atomics"))]
+        #[cfg(feature = "webgpu")]
         {
             self.core.backend = Backend::Gpu;
             self.core.gpu.device.name = adapter;
             Ok(())
         }
-        #[cfg(target_feature = "atomics")]
+        #[cfg(not(feature = "webgpu"))]
         {
             let _ = adapter;
             Err(setting(
-                "the build with threads has no WebGPU; import from phasefront, or leave out the backend",
+                "this module has no WebGPU; import from phasefront/webgpu, or leave out the backend",
             ))
         }
     }

@@ -118,6 +118,9 @@ export async function run() {
   modulator.writeOutput(hologram, grey, { image: 1 });
   if (images !== 3 || pixelBytes !== 1 || grey[0] !== levels[16 * 12 + 15]) throw new Error(`${images} ${grey}`);
   refused("setting", "lasers", () => Modulator.named("ti-plm-p47").writeOutput(hologram, grey));
+  const elsewhere = await Session.open({ target, backend: "webgpu" }).catch(({ kind, message }) => `${kind}: ${message}`);
+  if (!elsewhere.startsWith?.("setting: this module has no WebGPU; import from phasefront/webgpu"))
+    throw new Error(`${elsewhere}`);
   hologram.close();
   hologram.close();
   refused("session", "hologram is closed", () => hologram.levels);

@@ -20,7 +20,7 @@ test("apps that bundlers build of the package make levels", async (t) => {
   tool("publint", "--strict", "node_modules/phasefront");
   tool("vite", "build", "--logLevel", "error", "--outDir", "vite");
   tool("webpack", "--output-path", "webpack", "--no-performance");
-  const entries = ["copied.js", "session-worker=phasefront/session-worker"];
+  const entries = ["copied.js", "session-worker=phasefront/session-worker", "gpu-worker=phasefront/webgpu/session-worker"];
   tool("esbuild", ...entries, "--bundle", "--format=esm", "--loader:.wasm=file", "--log-level=error", "--outdir=esbuild");
   for (const [name, folder] of [["default", "webpack"], ["address", "webpack"], ["copied", "esbuild"]])
     copyFileSync(join(app, `${name}.html`), join(app, folder, `${name}.html`));

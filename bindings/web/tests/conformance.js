@@ -20,8 +20,8 @@ const HERE = {
 };
 
 /** The same of a session in a worker of its own. */
-const elsewhere = (settings) => ({
-  open: (options, mode) => WorkerSession.open(options, mode, settings),
+const elsewhere = (settings, backend) => ({
+  open: (options, mode) => WorkerSession.open({ ...options, backend }, mode, settings),
   network: (source) => source,
   target: ({ display, ...others }) =>
     "calibration" in others ? others : "lookUpTable" in others ? { display, ...others } : display,
@@ -104,7 +104,7 @@ export async function run() {
   return suite(HERE);
 }
 
-/** Returns the levels that sessions make in a worker of their own with `threads` threads. */
-export function inWorker(threads) {
-  return suite(elsewhere({ threads }));
+/** Returns the levels that sessions make in a worker of their own with `threads` threads, or on another backend. */
+export function inWorker(threads, backend) {
+  return suite(elsewhere({ threads }, backend));
 }

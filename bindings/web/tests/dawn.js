@@ -17,8 +17,8 @@ const hook = `export function resolve(name, context, next) {
   return next(name.startsWith("/phasefront/") ? ${JSON.stringify(at)} + name.slice(12) : name, context);
 }`;
 register(`data:text/javascript,${encodeURIComponent(hook)}`);
-const { load } = await import(`${at}phasefront.js`);
-await load(await readFile(`${folder}/raw/phasefront_web_bg.wasm`));
+const { load } = await import(`${at}webgpu/phasefront.js`);
+await load(await readFile(`${folder}/webgpu/raw/phasefront_web_bg.wasm`));
 const { run } = await import("./webgpu.js");
 for (const line of await run()) console.log(`Dawn: ${line}`);
 // Dawn keeps Node alive.

@@ -1,9 +1,10 @@
 // Tests the built package in browsers, without and with threads.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
+import { gzipSync } from "node:zlib";
 import { join } from "node:path";
 import { after, before, describe, test } from "node:test";
-import { BROWSERS, ROOT } from "./support.js";
+import { BROWSERS, BUILT, ROOT } from "./support.js";
 
 const suite = join(ROOT, "tests/conformance");
 const { cases } = JSON.parse(readFileSync(join(suite, "cases.json"), "utf8"));
@@ -27,6 +28,12 @@ function compare(results) {
   assert.equal(expected.length, 0);
 }
 
+test("the module that pages load first has less than a megabyte, gzip", (t) => {
+  const bytes = gzipSync(readFileSync(join(BUILT, "phasefront/raw/phasefront_web_bg.wasm"))).length;
+  t.diagnostic(`${bytes} bytes`);
+  assert.ok(bytes < 1e6, `${bytes} bytes`);
+});
+
 for (const [name, start] of Object.entries(BROWSERS))
   describe(name, () => {
     let browser, plain, isolated, levels;
@@ -49,9 +56,13 @@ for (const [name, start] of Object.entries(BROWSERS))
         assert.deepEqual(await browser.run(isolates ? isolated : plain, "conformance.js", "inWorker", threads), levels);
       });
 
+    test("makes the same levels with the module of WebGPU where there is none", async () => {
+      assert.deepEqual(await browser.run(plain, "conformance.js", "inWorker", undefined, "webgpu"), levels);
+    });
+
     test("refuses threads that it cannot have", async () => {
       for (const [address, folder, threads, said] of [
-        [plain, "/phasefront", 2, "session: 2 threads are asked for, and this build has one"],
+        [plain, "/phasefront", 2, "session: 2 threads are asked for, and this module has one"],
         [plain, "/phasefront/threads", 2, "session: threads share memory, which needs a page that is isolated"],
         [isolated, "/phasefront", 0, "setting: threads is 0"],
       ]) {

@@ -166,7 +166,7 @@ async function shows(canvas, { width, height, data }, most) {
 
 /** Compares the levels of WebGPU in a worker with those of the page. */
 export async function onWebgpu() {
-  const { Session, load } = await import("/phasefront/phasefront.js");
+  const { Session, load } = await import("/phasefront/webgpu/phasefront.js");
   await load();
   const options = {
     target: { ...target, volumeDepthMm: 1.5 },

@@ -1,5 +1,5 @@
 // Compares the levels of a session on WebGPU with those of the CPU, and tests what happens if there is no such GPU.
-import { Frame, Modulator, Network, PhasefrontError, Session, load } from "/phasefront/phasefront.js";
+import { Frame, Modulator, Network, PhasefrontError, Session, load } from "/phasefront/webgpu/phasefront.js";
 
 const ADAPTER = "swiftshader";
 

@@ -14,10 +14,10 @@ pub mod smoothing;
 pub mod softness;
 pub mod stream;
 
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, ArrayView2};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The least number that is no reading in depth of any unit but the normalized one. Renderers write 1e10 or the largest
 /// finite number where there is no surface.

@@ -17,9 +17,9 @@ use crate::display::Display;
 use crate::method::sweep::hidden::{Hidden, HiddenScratch, NOTHING};
 use crate::method::sweep::{MAX_REACH, hidden_reach};
 use crate::optics::asm::reach_m;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
 

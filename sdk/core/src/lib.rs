@@ -10,6 +10,7 @@
 //!
 //! | | |
 //! |---|---|
+//! | [`parallel`] | loops on the threads of a pool, or on one thread |
 //! | [`runtime`] | errors, cancellation, clock, stages, bounded file reading |
 //! | [`optics`] | propagation, Fourier transforms, aperture, aberrations |
 //! | [`display`] | the display, its modulator's response, its laser illumination, its correction |
@@ -37,4 +38,4 @@ pub mod pipeline;
 pub mod runtime;
 pub mod view;
 
-pub use phasefront_kernels::Size;
+pub use phasefront_kernels::{Size, parallel};

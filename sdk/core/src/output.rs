@@ -21,8 +21,8 @@ use crate::display::levels::Levels;
 use crate::display::response::Response;
 use crate::display::response::per_pixel::PerPixel;
 use crate::display::target::Target;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
-use rayon::prelude::*;
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 

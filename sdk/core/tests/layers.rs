@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 /// too.
 const LAYERS: &[&str] = &[
     "Size",
+    "parallel",
     "runtime::error",
     "runtime::caught",
     "runtime::file",

@@ -15,8 +15,8 @@ use phasefront_core::display::target::Target;
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::frame::Past;
 use phasefront_core::method::Method;
+use phasefront_core::parallel::prelude::*;
 use phasefront_core::pipeline::FrameTimes;
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
 

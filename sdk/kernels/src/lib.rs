@@ -25,6 +25,7 @@ mod fft;
 pub mod fir;
 mod int8;
 mod isa;
+pub mod parallel;
 #[cfg(feature = "peak")]
 mod peak;
 mod places;

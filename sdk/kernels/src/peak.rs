@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use crate::Isa;
+use crate::parallel;
 #[cfg(target_arch = "aarch64")]
 use std::arch::aarch64::*;
 use std::arch::asm;
@@ -128,7 +129,7 @@ pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
 /// Returns the sum of the threads' median rates. The median ignores interrupted rounds and the highest clock rates, as
 /// the median of frame times does.
 fn rate(burn: Burn, duration: Duration) -> f64 {
-    let rates = rayon::broadcast(|_| {
+    let rates = parallel::broadcast(|_| {
         let start = Instant::now();
         let mut rates = Vec::new();
         while rates.is_empty() || start.elapsed() < duration {

@@ -2,7 +2,7 @@
 //! transform of columns after one of rows thus accesses contiguous memory in a single buffer.
 #![allow(unsafe_code)]
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 

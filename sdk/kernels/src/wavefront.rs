@@ -11,6 +11,7 @@
 
 use crate::OUTPUTS;
 use crate::Size;
+use crate::parallel;
 use crate::places::{Places, runs};
 use crate::rows::{Band, Rows, grown};
 use std::ops::Range;
@@ -44,7 +45,7 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, size: Size) -> Tiling {
     let ring_column: usize = (0..layers)
         .map(|i| (chain.step() + 2) * chain.groups(i) * C::GROUP * size_of::<C::Element>())
         .sum();
-    let threads = rayon::current_num_threads();
+    let threads = parallel::current_num_threads();
     // At each edge between two bands layer i computes layers − 1 − i rows on both sides.
     let bands = 1 + height / (16 * layers.max(2) - 16);
     let bands_a_thread = (bands / threads).clamp(1, 3);
@@ -439,7 +440,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
         let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
         let first = halves.map(|half| half.0);
         let part = |top, planes| Band { top, width, planes };
-        rayon::join(
+        parallel::join(
             || self.bands(from, middle, part(band.top, first)),
             || self.bands(middle, to, part(band.top + rows, second)),
         );

@@ -646,17 +646,17 @@ fn extreme_values_saturate_alike() {
     }
 }
 
-/// Runs `work` in a pool of one thread. WebAssembly has no other.
+/// Runs `work` in a pool of one thread.
+#[cfg(not(target_family = "wasm"))]
 fn on_one_thread(work: impl FnOnce() + Send) {
-    if cfg!(target_family = "wasm") {
-        work()
-    } else {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .unwrap()
-            .install(work)
-    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    pool.unwrap().install(work);
+}
+
+/// Runs `work`. WebAssembly has one thread.
+#[cfg(target_family = "wasm")]
+fn on_one_thread(work: impl FnOnce()) {
+    work();
 }
 
 #[test]

@@ -1,32 +1,42 @@
 //! The threads on which a session computes.
 
+#[cfg(not(target_family = "wasm"))]
 use super::computing::Computing;
 use super::guarded::lock;
+#[cfg(not(target_family = "wasm"))]
 use super::options::SessionOptions;
 use super::process_id::ProcessId;
 use phasefront_core::runtime::error::{Error, Result};
 pub(super) use pollster::block_on;
+#[cfg(not(target_family = "wasm"))]
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
 
-/// A pool of threads; `None` on platforms without threads, such as WebAssembly, where the caller's thread computes.
-pub(super) struct Threads(Option<ThreadPool>);
+/// A pool of threads. WebAssembly cannot start any: there the caller's thread computes, with those that a page started.
+pub(super) struct Threads(#[cfg(not(target_family = "wasm"))] ThreadPool);
 
 impl Threads {
     /// Starts `threads` threads, or as many as the device has.
     ///
     /// # Errors
     /// Returns an error if threads cannot be started.
+    #[cfg(target_family = "wasm")]
     pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
-        if cfg!(target_family = "wasm") {
-            return match threads.map_or(1, NonZeroUsize::get) {
-                1 => Ok(Threads(None)),
-                many => Err(Error::Session(format!(
-                    "{many} threads are asked for, and WebAssembly has one; give 1, or none"
-                ))),
-            };
+        match threads.map_or(1, NonZeroUsize::get) {
+            1 => Ok(Threads()),
+            many => Err(Error::Session(format!(
+                "{many} threads are asked for, and WebAssembly has one; give 1, or none"
+            ))),
         }
+    }
+
+    /// Starts `threads` threads, or as many as the device has.
+    ///
+    /// # Errors
+    /// Returns an error if threads cannot be started.
+    #[cfg(not(target_family = "wasm"))]
+    pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .thread_name(|i| format!("phasefront {i}"))
             // These threads do nothing but compute.
@@ -38,7 +48,7 @@ impl Threads {
             None => pool,
         };
         let started = pool.build().map_err(|e| Error::Threads(Arc::new(e)))?;
-        Ok(Threads(Some(started)))
+        Ok(Threads(started))
     }
 
     /// Returns the threads of holograms without a session, which this process starts once.
@@ -61,18 +71,18 @@ impl Threads {
 
     /// Runs `work` on these threads and returns its result.
     pub(super) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        match &self.0 {
-            Some(pool) => pool.install(work),
-            None => work(),
-        }
+        #[cfg(target_family = "wasm")]
+        return work();
+        #[cfg(not(target_family = "wasm"))]
+        self.0.install(work)
     }
 
     /// Runs the future of `work` on these threads and blocks until it is done. On platforms without threads the caller
     /// awaits it, because a browser's GPU answers only while nothing blocks.
     pub(super) async fn run<R: Send>(&self, work: impl AsyncFnOnce() -> R + Send) -> R {
-        match &self.0 {
-            Some(pool) => pool.install(|| block_on(work())),
-            None => work().await,
-        }
+        #[cfg(target_family = "wasm")]
+        return work().await;
+        #[cfg(not(target_family = "wasm"))]
+        self.0.install(|| block_on(work()))
     }
 }

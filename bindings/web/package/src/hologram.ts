@@ -87,6 +87,12 @@ export interface OutputOptions {
   readonly rowStride?: number;
 }
 
+/** A hologram whose levels stayed on the GPU. Only the module with WebGPU has these functions. */
+type RawOnGpu = RawHologram & {
+  paintLevels(canvas: Canvas): Promise<void>;
+  paintPreview(zMm: number, width: number, height: number, canvas: Canvas): Promise<void>;
+};
+
 /** The hologram of one frame. It uses the module's memory until it is closed or garbage-collected. */
 export class Hologram {
   /** The metadata. */
@@ -201,8 +207,8 @@ export class Hologram {
     putPixels(canvas, size, (image) => this.writePreview(zMm, image));
   }
 
-  #draw(call: (raw: RawHologram) => Promise<void>): Promise<void> {
-    const drawn = this.call((raw) => guardAsync(() => call(raw)));
+  #draw(call: (raw: RawOnGpu) => Promise<void>): Promise<void> {
+    const drawn = this.call((raw) => guardAsync(() => call(raw as RawOnGpu)));
     this.#drawing = Promise.allSettled([this.#drawing, drawn]);
     return drawn;
   }

@@ -73,7 +73,7 @@ export type ModuleSource = string | URL | Request | Response | BufferSource | We
 export interface LoadOptions {
   /**
    * The number of threads that compute, including the calling worker's. In `phasefront/threads` it is by default that of
-   * the processor, at most 8; in `phasefront` it is 1.
+   * the processor, at most 8; in `phasefront` and `phasefront/webgpu` it is 1.
    */
   readonly threads?: number;
 }

@@ -100,8 +100,9 @@ export interface SessionOptions<N = Network, T = Target | Display> {
   /** The maximum number of pixels of a quality level and of the modulator. */
   readonly mostPixels?: number;
   /**
-   * The processor that computes frames; `cpu` by default. With `webgpu`, make the session with {@link Session.open}. If
-   * the browser's GPU is missing, refused, too small, lost or wrong, the CPU computes; {@link Statistics} tells why.
+   * The processor that computes frames; `cpu` by default. For `webgpu`, import from `phasefront/webgpu` and make the
+   * session with {@link Session.open}, or run it in a worker. If the browser's GPU is missing, refused, too small, lost
+   * or wrong, the CPU computes; {@link Statistics} tells why.
    */
   readonly backend?: "cpu" | "webgpu";
   /**

@@ -69,12 +69,16 @@ export type WorkerSessionOptions = SessionOptions<NetworkSource, TargetSource>;
 export interface WorkerSettings {
   /**
    * The number of threads that compute. By default that of the processor, at most 8, if the page is isolated from other
-   * origins and the CPU computes; otherwise 1. More than one load the module of `phasefront/threads`.
+   * origins and the CPU computes; otherwise 1. More than one load the module of `phasefront/threads`, and `backend:
+   * "webgpu"` that of `phasefront/webgpu`.
    */
   readonly threads?: number;
   /** The module, if your bundler moves it: its address, or the compiled module. */
   readonly module?: string | URL | WebAssembly.Module;
-  /** The worker, if your bundler has none for `new Worker(new URL(…, import.meta.url))`: it runs `phasefront/session-worker`. */
+  /**
+   * The worker, if your bundler has none for `new Worker(new URL(…, import.meta.url))`: it runs `phasefront/session-worker`,
+   * or with `backend: "webgpu"` `phasefront/webgpu/session-worker`.
+   */
   readonly worker?: Worker;
   /** Aborts opening, and ends the worker. */
   readonly signal?: AbortSignal;
@@ -91,23 +95,39 @@ export interface ProcessOptions extends ProcessAsyncOptions {
   readonly transfer?: Transferable[];
 }
 
-function start(threaded: boolean): Worker {
-  // Bundlers find the two files by these expressions.
-  return threaded
-    ? new Worker(new URL("./threads/session-worker.js", import.meta.url), { type: "module" })
-    : new Worker(new URL("./session-worker.js", import.meta.url), { type: "module" });
+/** The modules: for one thread of the CPU, for several, and for WebGPU. */
+type Module = "plain" | "threads" | "webgpu";
+
+function start(module: Module): Worker {
+  // Bundlers find the files by these expressions.
+  switch (module) {
+    case "plain":
+      return new Worker(new URL("./session-worker.js", import.meta.url), { type: "module" });
+    case "threads":
+      return new Worker(new URL("./threads/session-worker.js", import.meta.url), { type: "module" });
+    case "webgpu":
+      return new Worker(new URL("./webgpu/session-worker.js", import.meta.url), { type: "module" });
+  }
+}
+
+function address(module: Module): URL {
+  switch (module) {
+    case "plain":
+      return new URL("./raw/phasefront_web_bg.wasm", import.meta.url);
+    case "threads":
+      return new URL("./threads/raw/phasefront_web_bg.wasm", import.meta.url);
+    case "webgpu":
+      return new URL("./webgpu/raw/phasefront_web_bg.wasm", import.meta.url);
+  }
 }
 
 /**
  * Returns the module of a worker that {@link start} makes, compiled while the worker's scripts load, or undefined if that
  * fails: the worker then loads it, and says what is wrong.
  */
-async function compiled(threaded: boolean): Promise<WebAssembly.Module | undefined> {
-  const address = threaded
-    ? new URL("./threads/raw/phasefront_web_bg.wasm", import.meta.url)
-    : new URL("./raw/phasefront_web_bg.wasm", import.meta.url);
+async function compiled(module: Module): Promise<WebAssembly.Module | undefined> {
   try {
-    return await WebAssembly.compileStreaming(fetch(address));
+    return await WebAssembly.compileStreaming(fetch(address(module)));
   } catch {
     return undefined;
   }
@@ -163,13 +183,14 @@ export class WorkerSession {
   ): Promise<WorkerSession> {
     const { signal } = settings;
     signal?.throwIfAborted();
-    const { backend } = options;
-    const threads = settings.threads ?? (globalThis.crossOriginIsolated && backend !== "webgpu" ? undefined : 1);
-    if (threads !== 1 && backend === "webgpu")
+    const gpu = options.backend === "webgpu";
+    const threads = settings.threads ?? (globalThis.crossOriginIsolated && !gpu ? undefined : 1);
+    if (threads !== 1 && gpu)
       throw new PhasefrontError("setting", "a module with threads has no WebGPU; leave out threads or backend");
-    const session = new WorkerSession(settings.worker ?? start(threads !== 1));
+    const module = gpu ? "webgpu" : threads === 1 ? "plain" : "threads";
+    const session = new WorkerSession(settings.worker ?? start(module));
     try {
-      const source = await until(signal, session.#source(settings, threads !== 1));
+      const source = await until(signal, session.#source(settings, module));
       await until(signal, session.#ask("open", [options, mode, { threads, source }]));
     } catch (error) {
       session.close();
@@ -179,8 +200,8 @@ export class WorkerSession {
   }
 
   /** Returns the module that the worker takes, or undefined if it loads its own. */
-  #source({ module, worker }: WorkerSettings, threaded: boolean): Promise<string | WebAssembly.Module | undefined> {
-    if (module === undefined) return worker ? Promise.resolve(undefined) : compiled(threaded);
+  #source({ module, worker }: WorkerSettings, started: Module): Promise<string | WebAssembly.Module | undefined> {
+    if (module === undefined) return worker ? Promise.resolve(undefined) : compiled(started);
     return Promise.resolve(module instanceof WebAssembly.Module ? module : new URL(module, location.href).href);
   }
 

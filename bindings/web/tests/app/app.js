@@ -8,17 +8,20 @@ const depth = Uint8Array.from({ length: width * height }, (_, i) => (i * 5) % 25
 const frame = new Frame({ width, height, data }, { width, height, data: depth });
 const options = { target: { width, height } };
 
-/** Makes levels here and in workers of each of these settings, and tells the test whether they are equal. */
-export async function compare(loaded, ...settings) {
+/**
+ * Makes levels here and in workers of each of these settings and backends, and tells the test whether they are equal. The
+ * test's browser has no GPU, so that the CPU computes.
+ */
+export async function compare(loaded, ...cases) {
   try {
     await loaded;
     const here = new Session(options).process(frame).levels;
-    for (const one of settings) {
-      const session = await WorkerSession.open(options, "image", one);
+    for (const { backend, ...settings } of cases) {
+      const session = await WorkerSession.open({ ...options, backend }, "image", settings);
       const levels = await (await session.process(frame)).levels();
       session.close();
       if (levels.length !== here.length || !levels.every((level, i) => level === here[i]))
-        throw new Error(`${JSON.stringify(one)} makes other levels`);
+        throw new Error(`${JSON.stringify({ backend, ...settings })} makes other levels`);
     }
     globalThis.answer = `${here.length} levels`;
   } catch (error) {

@@ -1,7 +1,10 @@
-// For bundlers that do not know `new URL(…, import.meta.url)`: the module is an import, the worker an entry of its own.
+// For bundlers that do not know `new URL(…, import.meta.url)`: modules are imports, workers entries of their own.
 import { load } from "phasefront";
 import module from "phasefront/raw/phasefront_web_bg.wasm";
+import gpuModule from "phasefront/webgpu/raw/phasefront_web_bg.wasm";
 import { compare } from "./app.js";
 
 const worker = new Worker("session-worker.js", { type: "module" });
-void compare(load(module), { threads: 1, module, worker });
+const gpuWorker = new Worker("gpu-worker.js", { type: "module" });
+const onGpu = { backend: "webgpu", module: gpuModule, worker: gpuWorker };
+void compare(load(module), { threads: 1, module, worker }, onGpu);

@@ -2,4 +2,4 @@
 import { load } from "phasefront";
 import { compare } from "./app.js";
 
-void compare(load(), { threads: 1 }, { threads: 2 });
+void compare(load(), { threads: 1 }, { threads: 2 }, { backend: "webgpu" });

@@ -14,9 +14,9 @@ mod fit;
 
 use crate::Size;
 use crate::depth::fill_nearest;
+use crate::parallel::prelude::*;
 use fit::{Fit, Kernel, LANES, Limits};
 use ndarray::{Array2, ArrayView2};
-use rayon::prelude::*;
 
 /// The ratios of the depth's size to the grid's that are tried. A ratio that is not whole is tried only where it
 /// divides both sides.

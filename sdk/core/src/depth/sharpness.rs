@@ -5,8 +5,8 @@
 //! surfaces. Enlarged depth ramps over several pixels, the depth of a camera beside the colour camera changes at other
 //! places, and sensors have noise.
 
+use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The difference between the depths at the ends of a [`WINDOW`] above which they belong to two surfaces, as a share of
 /// the volume.
@@ -44,10 +44,10 @@ fn sharp_edges(rgb: &[f32], depth: &[f32], width: usize) -> f32 {
         let along_columns = wide!(count_edges((rgb, depth), y * width, width, below));
         (along_row.0 + along_columns.0, along_row.1 + along_columns.1)
     };
-    let (sharp, all) = rows.map(of_row).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    match all {
-        0 => 1.0,
-        all => sharp as f32 / all as f32,
+    let counts = rows.map(of_row).reduce_with(|a, b| (a.0 + b.0, a.1 + b.1));
+    match counts.unwrap_or_default() {
+        (_, 0) => 1.0,
+        (sharp, all) => sharp as f32 / all as f32,
     }
 }
 
@@ -98,20 +98,20 @@ const DIFFERENCES: usize = 2048;
 /// Returns the noise as a share of the volume: the median of |d(x−1) − 2d(x) + d(x+1)| over 0.6745·√6, which is the
 /// standard deviation of independent normal noise.
 fn noise(depth: &[f32], width: usize) -> f32 {
-    let none = || [0u32; DIFFERENCES];
-    let counts = depth
-        .par_chunks(width * LINES)
-        .fold(none, |mut counts, rows| {
-            for d in rows.chunks_exact(width).flat_map(|row| row.windows(3)) {
-                let step = (d[0] - 2.0 * d[1] + d[2]).abs() / DIFFERENCE;
-                counts[(step as usize).min(DIFFERENCES - 1)] += 1;
-            }
-            counts
-        })
-        .reduce(none, |mut a, b| {
-            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-            a
-        });
+    let of_rows = |rows: &[f32]| {
+        let mut counts = [0u32; DIFFERENCES];
+        for d in rows.chunks_exact(width).flat_map(|row| row.windows(3)) {
+            let step = (d[0] - 2.0 * d[1] + d[2]).abs() / DIFFERENCE;
+            counts[(step as usize).min(DIFFERENCES - 1)] += 1;
+        }
+        counts
+    };
+    let parts = depth.par_chunks(width * LINES).map(of_rows);
+    let counts = parts.reduce_with(|mut a, b| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        a
+    });
+    let counts = counts.unwrap_or([0; DIFFERENCES]);
     let half = counts.iter().sum::<u32>() / 2;
     let mut below = 0;
     let median = counts.iter().position(|count| {

@@ -7,7 +7,7 @@
 
 use crate::Size;
 use crate::frame::RgbdFrame;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The change of depth over a window above which it holds an edge, as a share of the volume.
 pub const EDGE: f32 = 0.1;
@@ -51,7 +51,10 @@ pub fn sharp_edges(frame: &RgbdFrame) -> f32 {
     let rows = rows.map(|i| edges(depth, part(i, height), width, (1, width), window));
     let columns = (0..width.div_ceil(LINES)).into_par_iter();
     let columns = columns.map(|i| edges(depth, part(i, width), 1, (width, height), window));
-    let (sharp, all) = rows.chain(columns).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let (sharp, all) = rows
+        .chain(columns)
+        .reduce_with(|a, b| (a.0 + b.0, a.1 + b.1))
+        .unwrap_or_default();
     share(sharp, all)
 }
 

@@ -5,11 +5,11 @@
 //! first to the last pixel of each axis.
 
 use crate::Size;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use ndarray::{ArrayView3, Axis};
 use num_complex::Complex32;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The largest gain. Light below a tenth of the brightest counts as a tenth.
 pub const MAX_GAIN: f32 = 10.0;

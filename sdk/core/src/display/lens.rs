@@ -15,9 +15,9 @@
 use crate::Size;
 use crate::display::Display;
 use crate::optics::zoom::Zoom;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// The part of the field that is free beside the zero order and its copies that the picture takes at most.

@@ -1,7 +1,7 @@
 //! The levels of a hologram in memory: bytes, or words for a display of more than 8 bits.
 
+use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The number of levels that a thread converts at a time.
 const PART: usize = 1 << 14;

@@ -6,9 +6,9 @@
 
 use crate::Size;
 use crate::display::{Display, check_colours};
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
-use rayon::prelude::*;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 

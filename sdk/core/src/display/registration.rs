@@ -6,9 +6,9 @@
 
 use crate::Size;
 use crate::display::check_colours;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
-use rayon::prelude::*;
 
 /// The shift and the scale of each colour, in the order red, green, blue. The default changes nothing.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -2,9 +2,9 @@
 //! controls how the scale changes from frame to frame.
 
 use crate::frame::Past;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
-use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Duration;
 

@@ -15,10 +15,10 @@ use crate::display::response::Response;
 use crate::display::target::Target;
 use crate::method::standing::Changed;
 use crate::method::wave::Wave;
+use crate::parallel::{self, prelude::*};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// The number of rows of a piece whose changed columns are found together.
@@ -150,7 +150,7 @@ impl Encoder {
         EncoderScratch {
             prefilter,
             wanted,
-            parts: (0..2 * rayon::current_num_threads()).map(|_| part()).collect(),
+            parts: (0..2 * parallel::current_num_threads()).map(|_| part()).collect(),
             most: vec![0.0; self.colours * self.height],
             cancel: Cancel::default(),
         }

@@ -18,9 +18,9 @@ use crate::display::Display;
 use crate::display::lens::{Lens, LensPlan};
 use crate::display::response::wrap;
 use crate::frame::RgbdFrame;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
-use rayon::prelude::*;
 use std::f32::consts::PI;
 
 /// The share of the light of the brightest colour that goes to the picture.

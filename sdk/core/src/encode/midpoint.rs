@@ -17,11 +17,11 @@ use crate::display::target::Target;
 use crate::optics::asm::{Padding, Propagator};
 use crate::optics::fft::ConvolveScratch;
 use crate::optics::zernike::Aberration;
+use crate::parallel::prelude::*;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// λ, the weight of the wave against the amplitude alone. Chosen on validation scenes by the focal stack.
 pub const WAVE: f32 = 0.5;

@@ -22,10 +22,10 @@ use crate::display::target::Target;
 use crate::optics::aperture::Opening;
 use crate::optics::asm::Propagator;
 use crate::optics::fft::{ConvolveScratch, frequency};
+use crate::parallel::prelude::*;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use num_complex::{Complex32, Complex64};
-use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 

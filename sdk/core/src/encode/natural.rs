@@ -26,11 +26,11 @@ use crate::optics::aperture::Opening;
 use crate::optics::asm::{Padding, Transfer, padded_size};
 use crate::optics::fft::{Fft2, Scratch};
 use crate::optics::zernike::Aberration;
+use crate::parallel::prelude::*;
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The share of the volume between the first and the last plane.
 pub const SPAN: f64 = 0.9;

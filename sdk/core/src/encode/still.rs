@@ -1,7 +1,7 @@
 //! Pixels that did not change since the previous frame: corrections continue from the phases that they found there.
 
+use crate::parallel::prelude::*;
 use num_complex::Complex32;
-use rayon::prelude::*;
 
 /// The largest change of a pixel's field, as a share of full light, at which the pixel counts as unchanged.
 pub const STILL: f32 = 0.1;

@@ -7,9 +7,9 @@ use super::plane::View;
 use super::plane::{Orientation, Plane};
 use super::resample::{Axis, Crop};
 use crate::Size;
+use crate::parallel::{self, prelude::*};
 use crate::runtime::error::{Error, Result};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The number of bands of rows for each thread. More than one lets other threads take over the work of a delayed
 /// thread.
@@ -145,7 +145,7 @@ impl ColourPlan {
 
     /// Allocates working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> ColourScratch {
-        let bands = match rayon::current_num_threads() {
+        let bands = match parallel::current_num_threads() {
             1 => 1,
             threads => (threads * BANDS_PER_THREAD).min(self.out.height),
         };

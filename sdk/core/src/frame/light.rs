@@ -10,8 +10,8 @@
 use super::encoding::{Knee, RgbEncoding};
 use crate::display::Display;
 use crate::display::primaries::{Matrix, inverse, product, transposed};
+use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The number of intervals of a [`Table`].
 const INTERVALS: usize = 1 << 10;

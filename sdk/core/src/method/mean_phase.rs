@@ -1,9 +1,9 @@
 //! The mean phase of a field. The constant phase of a method's field is arbitrary, and double phase wraps least around
 //! 0.
 
+use crate::parallel::{self, prelude::*};
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// What happens to the mean phase of a field.
@@ -91,7 +91,7 @@ fn sum(of_part: &(impl Fn(usize) -> Complex64 + Sync), parts: Range<usize>) -> C
         count => {
             let middle = parts.start + count.div_ceil(2);
             let halves = (|| sum(of_part, parts.start..middle), || sum(of_part, middle..parts.end));
-            let (first, second) = rayon::join(halves.0, halves.1);
+            let (first, second) = parallel::join(halves.0, halves.1);
             first + second
         }
     }

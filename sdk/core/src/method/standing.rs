@@ -13,9 +13,9 @@
 use crate::Size;
 use crate::frame::RgbdFrame;
 use crate::method::mean_phase::Sums;
+use crate::parallel::prelude::*;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
 

@@ -31,6 +31,7 @@ use crate::display::Display;
 use crate::frame::RgbdFrame;
 use crate::method::standing::{BLOCK, Changes};
 use crate::method::wave::{PixelSum, Pixels, Wave};
+use crate::parallel::{self, prelude::*};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::{Error, Result};
 use filters::Filters;
@@ -40,7 +41,6 @@ use num_complex::Complex32;
 use phasefront_kernels::Isa;
 use phasefront_kernels::fir::{Fir, Pixel, RUN};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 pub use shares::MEET;
 use shares::Slot;
 use std::cmp::Reverse;
@@ -403,7 +403,7 @@ impl SweepPlan {
                 .get(next.fetch_add(1, Ordering::Relaxed))
                 .filter(|_| !cancel.requested())
         };
-        (0..rayon::current_num_threads())
+        (0..parallel::current_num_threads())
             .into_par_iter()
             .with_max_len(1)
             .for_each(|_| {

@@ -3,10 +3,10 @@
 use super::mean_phase::{self, Sums};
 use super::standing::Changed;
 use crate::Size;
+use crate::parallel::prelude::*;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::fir::Pixel;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// The units of a wave of amplitude 1 in the sweep's fixed point. Parts of more than 2 saturate.

@@ -12,6 +12,7 @@ mod passes;
 mod size;
 
 use crate::Size;
+use crate::parallel;
 pub use convolve::ConvolveScratch;
 pub use passes::{Scratch, Work};
 pub use size::fast_size;
@@ -43,7 +44,7 @@ pub fn frequency(k: usize, n: usize) -> f64 {
 
 /// Returns the number of parts of a pass on the current thread pool.
 fn parts() -> usize {
-    match rayon::current_num_threads() {
+    match parallel::current_num_threads() {
         1 => 1,
         threads => threads * PARTS_PER_THREAD,
     }

@@ -5,8 +5,8 @@
 
 use super::{check_rows, flip};
 use crate::Size;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
-use rayon::prelude::*;
 
 /// The number of planes in a frame.
 const PLANES: usize = 24;

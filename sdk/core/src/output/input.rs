@@ -5,8 +5,10 @@ use super::{BitPlanes, Layout, Output, Placement, check_rows, rows};
 use crate::Size;
 use crate::display::levels::Levels;
 use crate::display::target::Target;
+// Without threads, the iterators of the standard library need no trait here.
+#[allow(unused_imports)]
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
-use rayon::prelude::*;
 
 /// The size and the number of the images that a modulator's input takes of a hologram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

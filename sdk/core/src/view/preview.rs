@@ -16,10 +16,10 @@ use crate::optics::asm::Propagator;
 use crate::optics::fft::ConvolveScratch;
 use crate::optics::zernike::Aberration;
 use crate::output::{Layout, rows};
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use crate::view::colours::ViewColours;
 use num_complex::Complex32;
-use rayon::prelude::*;
 
 /// The largest number of pixels of an image.
 pub const MOST_PIXELS: usize = 1 << 26;

@@ -13,9 +13,9 @@ use crate::optics::aperture::{Aperture, Opening};
 use crate::optics::asm::{self, Padding, Transfer};
 use crate::optics::fft::{Fft2, Scratch};
 use crate::optics::zernike::Aberration;
+use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
-use rayon::prelude::*;
 use std::f32::consts::TAU;
 
 /// A plan for one shape, display and range of z. It is immutable and can be shared between threads.

@@ -2,7 +2,7 @@
 
 use super::axis::AxisMap;
 use super::lanes::{any, strides};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// The number of pixels, their sums of red, green and blue, and the sum of all squares.

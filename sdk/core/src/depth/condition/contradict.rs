@@ -9,7 +9,7 @@ use super::edges::Kind;
 use super::fill::{REACH, Rim, TOLERANCE, surface};
 use crate::Size;
 use crate::frame::Crop;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The weight of the reading itself among those of its surface.
 pub(super) const OWN: f32 = 0.5;

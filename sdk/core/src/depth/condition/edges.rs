@@ -7,8 +7,8 @@
 //! single steps, while an edge of mixed readings rarely lies just between two of them.
 
 use super::lanes::{LANES, Lanes, any, lanes, strides};
+use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The least difference of depth at an edge, as a share of the volume.
 pub(super) const EDGE: f32 = 0.03;
@@ -60,7 +60,7 @@ pub(super) fn mixes(depth: &[f32], width: usize, did: Option<bool>) -> bool {
         (along_row.0 + along_columns.0, along_row.1 + along_columns.1)
     };
     let rows = (0..height).into_par_iter().map(of_row);
-    let (single, all) = rows.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let (single, all) = rows.reduce_with(|a, b| (a.0 + b.0, a.1 + b.1)).unwrap_or_default();
     let bound = match did {
         Some(true) => SINGLE + HYSTERESIS,
         Some(false) => SINGLE - HYSTERESIS,

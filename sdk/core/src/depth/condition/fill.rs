@@ -3,7 +3,7 @@
 
 use super::colour::Moments;
 use crate::depth::fill_from_nearest;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The number of neighbours on each side that fill a reading.
 pub(super) const REACH: usize = 2;

@@ -3,7 +3,7 @@
 //! something moves, colours at edges change, and the pixel is decided anew.
 
 use super::lanes::{Lanes, lanes, load, store};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The lead of the surface that the pixel had.
 pub(super) const KEEP: f32 = 6.0;

@@ -1,7 +1,7 @@
 //! Narrowing of near surfaces that are too wide: each reading close enough to an edge of a surface behind takes the
 //! nearest depth of that surface.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The least difference of depth between two surfaces, as a share of the volume.
 pub(super) const EDGE: f32 = 0.05;

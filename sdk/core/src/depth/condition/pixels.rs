@@ -7,8 +7,8 @@ use super::history::{self, History};
 use super::lanes::{self, LANES, Lanes, STRIDE, lanes, load, store};
 use super::surfaces::{MOST, Places, Readings, Surface};
 use crate::Size;
+use crate::parallel::{self, prelude::*};
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// The weight of the share of a pixel's place that a surface covers.
@@ -173,7 +173,7 @@ impl Decider<'_> {
         let (width, middle) = (self.x.cell.len(), (bands.start + bands.end) / 2);
         let pixels = self.lines(bands.start * BAND..middle * BAND).len() * width;
         let (above, below) = lines.split(pixels, 2 * width * (middle - bands.start));
-        rayon::join(
+        parallel::join(
             || self.bands(bands.start..middle, above, history),
             || self.bands(middle..bands.end, below, history),
         );

@@ -9,8 +9,8 @@
 
 use crate::Size;
 use crate::frame::Crop;
+use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The largest number of colour samples per reading along each axis.
 pub(super) const MOST_SAMPLES: usize = 4;

@@ -2,8 +2,8 @@
 //! the same surface best, so that slopes stay slopes.
 
 use crate::Size;
+use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The number of neighbours on each side.
 pub(super) const REACH: usize = 3;

@@ -1,10 +1,10 @@
 //! The filter of AA-DPM: a small Gaussian blur of the complex field that makes the neighbours in a checkerboard pair
 //! similar (Shi et al., Nature 591, 234, 2021).
 
+use crate::parallel::{self, prelude::*};
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// A separable Gaussian with an odd number of taps and sum 1. Edge values are repeated.
 pub struct AntiAlias {
@@ -46,7 +46,7 @@ impl AntiAlias {
         // The rows blurred along themselves, in a ring and behind a part's end, and one row blurred both ways.
         let rows = 3 * (self.taps.len() - 1) + 2;
         AntiAliasScratch {
-            rows: vec![Complex32::ZERO; 2 * rayon::current_num_threads() * rows * width],
+            rows: vec![Complex32::ZERO; 2 * parallel::current_num_threads() * rows * width],
             part: rows * width,
         }
     }

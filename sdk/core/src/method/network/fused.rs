@@ -4,13 +4,13 @@ use super::chain::{Chain, Precision, Quantisation, Weights};
 use super::{Head, InputKind, Source};
 use crate::Size;
 use crate::method::standing::Changes;
+use crate::parallel::prelude::*;
 use crate::runtime::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{
     Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows, Scratch, SkipSum,
     Tiling, wide,
 };
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// A chain packed for the kernels. It works for any frame size, and threads can share it.

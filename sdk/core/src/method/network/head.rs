@@ -1,11 +1,11 @@
 //! Converts a network's output to the complex field that it represents.
 
 use super::InputKind;
+use crate::parallel::prelude::*;
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
-use rayon::prelude::*;
 
 /// The number of pixels of a parallel part, and of a piece that is processed at once.
 const PART: usize = 1 << 12;

@@ -13,7 +13,7 @@
 use super::workers::Workers;
 use crate::Size;
 use crate::method::standing::{BLOCK, Changes};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The difference in normalized depth above which two pixels are on different surfaces.
 pub const JUMP: f32 = 0.02;

@@ -4,9 +4,9 @@
 //! runs.
 
 use super::{Fft2, parts};
+use crate::parallel::prelude::*;
 use num_complex::Complex32;
 use phasefront_kernels::{TILE, TILE_VALUES, each_tile_rows, wide};
-use rayon::prelude::*;
 
 /// The working memory of [`Fft2::convolve`] for one call at a time.
 pub struct ConvolveScratch {

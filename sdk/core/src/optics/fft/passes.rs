@@ -1,8 +1,8 @@
 //! The separate passes of a transform: rows, their blockwise transposition into columns, columns, and the inverse.
 
 use super::{Fft2, parts};
+use crate::parallel::prelude::*;
 use num_complex::Complex32;
-use rayon::prelude::*;
 
 /// The number of columns gathered at a time: one cache line of complex numbers.
 const BLOCK: usize = 8;

@@ -1,2 +1,0 @@
-/** Whether this folder has the module with threads; the build script changes it there. */
-export const THREADED: boolean = false;
