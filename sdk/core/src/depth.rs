@@ -14,6 +14,7 @@ pub mod smoothing;
 pub mod softness;
 pub mod stream;
 
+use crate::Bounds;
 use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, ArrayView2};
@@ -157,8 +158,11 @@ pub fn normalize(
             (near_m.unwrap_or(low), far_m.unwrap_or(high))
         }
     };
-    let least = metres.iter().copied().fold(f32::INFINITY, f32::min);
-    let most = metres.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let least = metres.iter().copied().fold(f32::INFINITY, |least, m| m.at_most(least));
+    let most = metres
+        .iter()
+        .copied()
+        .fold(f32::NEG_INFINITY, |most, m| m.at_least(most));
     if !(near.is_finite() && far.is_finite() && near >= 0.0 && (near < far || !given && near == far)) {
         return Err(Error::Frame(format!(
             "near {near} m and far {far} m are no range; near must lie before far, both in metres; the depth lies from {least} m to {most} m"
@@ -189,7 +193,7 @@ fn check_sign(depth: ArrayView2<'_, f32>) -> Result<()> {
     let negative = depth.iter().filter(|v| **v < 0.0).count();
     let positive = depth.iter().filter(|v| **v > 0.0).count();
     let ends = depth.iter().filter(|v| **v < 0.0);
-    let (least, most) = ends.fold((0.0f32, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (least, most) = ends.fold((0.0f32, f32::NEG_INFINITY), |(a, b), v| (v.at_most(a), v.at_least(b)));
     if negative <= positive || least == most {
         return Ok(());
     }

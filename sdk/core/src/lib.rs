@@ -24,6 +24,8 @@
 //! | [`output`] | from levels to modulator images; the catalogue of modulators |
 //! | [`view`] | refocused views, previews |
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod depth;
 #[cfg(feature = "tract")]
 pub mod depth_network;
@@ -38,4 +40,4 @@ pub mod pipeline;
 pub mod runtime;
 pub mod view;
 
-pub use phasefront_kernels::{Size, parallel};
+pub use phasefront_kernels::{Bounds, Size, parallel};

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 /// The modules, lowest first. If a group's own modules are listed one by one, they depend on each other in this order
 /// too.
 const LAYERS: &[&str] = &[
+    "Bounds",
     "Size",
     "parallel",
     "runtime::error",

@@ -15,6 +15,7 @@
 //! The channels of a row are in groups of four: `[channel/4][pixel][4]`. The concatenated network input starts a new
 //! group.
 
+use crate::Bounds;
 use crate::Size;
 use crate::rows::Rows;
 use crate::wavefront::{self, Chain, Geometry, LastRows, Scratch, Slots, SlotsMut, SourceRow, Tiling};
@@ -535,7 +536,7 @@ impl Quantiser {
     #[inline(always)]
     fn quantise(self, real: f32) -> u8 {
         let zero = f32::from(self.zero_point);
-        let steps = (real / self.scale).max(-zero).min(255.0 - zero);
+        let steps = (real / self.scale).at_least(-zero).at_most(255.0 - zero);
         rint_bits(steps).wrapping_add(u32::from(self.zero_point)) as u8
     }
 
@@ -594,7 +595,7 @@ fn quantise_by(
 pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
     for group in row.chunks_exact_mut(geometry.stride()) {
         for value in &mut group[geometry.start()..][..GROUP * geometry.width] {
-            let rounded = rint_bits((f32::from(*value) * factor).min(255.0)) as u8;
+            let rounded = rint_bits((f32::from(*value) * factor).at_most(255.0)) as u8;
             *value = rounded.saturating_add(zero_point);
         }
     }

@@ -20,6 +20,9 @@
 //!
 //! This crate does not depend on ONNX, tract or optics.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+mod bounds;
 mod f32;
 mod fft;
 pub mod fir;
@@ -53,6 +56,7 @@ mod wasm;
 
 #[cfg(target_arch = "x86_64")]
 mod x86;
+pub use bounds::Bounds;
 pub use f32::{F32Chain, F32Layer};
 pub use fft::transforms;
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};

@@ -1,5 +1,6 @@
 //! Kernels in plain Rust: the definition that every other instruction set is tested against.
 
+use crate::Bounds;
 use crate::int8::{GROUP, Kernels, LayerKernels, Packed, RowKernels, Taps, quantise_row, rescale_row};
 use crate::wavefront::{Geometry, Slots};
 use crate::{OUTPUTS, f32};
@@ -49,7 +50,7 @@ fn hidden_row(layer: &Packed, rows: Slots<'_, u8>, skip: Option<&[u8]>, out: &mu
                 (Some(factors), Some(skip)) => {
                     let a = match factors.relu {
                         Some(factor) => v.clamp(0.0, 255.0).round_ties_even() * factor,
-                        None => v.max(0.0),
+                        None => v.at_least(0.0),
                     };
                     a + f32::from(skip[at]) * factors.skip
                 }
@@ -101,8 +102,8 @@ fn f32_hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>,
             Some(skip) => out
                 .iter_mut()
                 .zip(&skip[range])
-                .for_each(|(out, skip)| *out = out.max(0.0) + skip),
-            None => out.iter_mut().for_each(|out| *out = out.max(0.0)),
+                .for_each(|(out, skip)| *out = out.at_least(0.0) + skip),
+            None => out.iter_mut().for_each(|out| *out = out.at_least(0.0)),
         }
     }
 }

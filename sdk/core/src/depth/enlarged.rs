@@ -12,6 +12,7 @@
 
 mod fit;
 
+use crate::Bounds;
 use crate::Size;
 use crate::depth::fill_nearest;
 use crate::parallel::prelude::*;
@@ -219,9 +220,9 @@ fn edges(values: &[f32], holes: &[bool]) -> Vec<bool> {
     let width = values.len();
     let is_edge = |x: usize| {
         let near = &values[x - REACH..=x + REACH];
-        let (least, most) = near
-            .iter()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (least, most) = near.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| {
+            (v.at_most(a), v.at_least(b))
+        });
         most - least > EDGE && !holes[x - MARGIN..=x + MARGIN].contains(&true)
     };
     (0..width)
@@ -313,7 +314,7 @@ impl Enlarged {
             *reading = match 2 * missing > cell.len() {
                 true => f32::NAN,
                 false if least >= 0.0 && *reading < ZERO * most => 0.0,
-                false => reading.clamp(least.min(0.0), most),
+                false => reading.clamp(least.at_most(0.0), most),
             };
         }
         readings.as_standard_layout().into_owned()

@@ -1,5 +1,6 @@
 //! Conversion of the depth images and confidence maps of phones to metres and confidences in 0..=1.
 
+use crate::Bounds;
 use crate::Size;
 use crate::depth::{DepthUnit, NO_READING_FROM};
 use crate::frame::{Plane, check_size};
@@ -211,7 +212,7 @@ impl<'a> DepthImage<'a> {
                 let (reading, mut sure) = self.format.reading(pixel);
                 if let Some((format, plane)) = self.confidence {
                     let byte = plane.bytes[y * plane.row_stride + x * plane.pixel_stride];
-                    sure = sure.min(format.confidence(byte));
+                    sure = sure.at_most(format.confidence(byte));
                 }
                 let is_reading = !reading.is_nan() && sure >= least;
                 (*value, *confidence) = match is_reading {

@@ -5,6 +5,7 @@
 //! Conditioning makes a soft edge sharp in the middle, so the measure compares the largest step of an edge with the
 //! whole change around it.
 
+use crate::Bounds;
 use crate::Size;
 use crate::frame::RgbdFrame;
 use crate::parallel::prelude::*;
@@ -93,10 +94,10 @@ fn edges(
             }
             let slope = |from: usize, steps: usize| {
                 let step = (at(from + steps) - at(from)) / steps as f32 * change_of_window.signum();
-                step.max(0.0) * window as f32
+                step.at_least(0.0) * window as f32
             };
             let (left, right) = (start.min(window), (length - 1 - end).min(window));
-            let whole = change_of_window.abs() - slope(start - left, left).max(slope(end, right));
+            let whole = change_of_window.abs() - slope(start - left, left).at_least(slope(end, right));
             if whole <= EDGE {
                 continue;
             }

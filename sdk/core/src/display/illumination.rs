@@ -4,6 +4,7 @@
 //! Beams are smooth, so the map is coarse. It is interpolated linearly between nodes that are evenly spaced from the
 //! first to the last pixel of each axis.
 
+use crate::Bounds;
 use crate::Size;
 use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
@@ -44,11 +45,11 @@ impl Illumination {
             if plane.iter().any(|a| !a.is_finite() || *a < 0.0) {
                 return refuse("an amplitude below 0 or not finite".into());
             }
-            let most = plane.iter().copied().fold(0.0, f32::max);
+            let most = plane.iter().fold(0.0, |most, a| a.at_least(most));
             if most == 0.0 {
                 return refuse("a colour without light".into());
             }
-            gain.extend(plane.iter().map(|a| (most / a).min(MAX_GAIN)));
+            gain.extend(plane.iter().map(|a| (most / a).at_most(MAX_GAIN)));
         }
         Ok(Illumination {
             nodes: (rows, columns),

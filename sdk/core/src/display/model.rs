@@ -10,6 +10,7 @@
 //! from there as on an ideal display. c is piecewise linear, A is bilinear over the first order, and L and Q are
 //! bilinear over the modulator. All are the same for each pixel of a colour otherwise.
 
+use crate::Bounds;
 use crate::Size;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
@@ -212,7 +213,7 @@ pub fn pupil_node(frequency: f64) -> (usize, f32) {
 /// Returns the node before `at` of `count` and the part of the way to the next.
 #[inline(always)]
 fn node(at: f32, count: usize) -> (usize, f32) {
-    let before = (at.max(0.0) as usize).min(count - 2);
+    let before = (at.at_least(0.0) as usize).min(count - 2);
     (before, (at - before as f32).clamp(0.0, 1.0))
 }
 

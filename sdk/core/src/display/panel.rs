@@ -4,6 +4,7 @@
 //! The panel is applied between the encoder and the response, to phases in memory. The encoder's sweep does not depend
 //! on it.
 
+use crate::Bounds;
 use crate::Size;
 use crate::display::{Display, check_colours};
 use crate::parallel::prelude::*;
@@ -320,9 +321,9 @@ impl Nearest {
             // The copy of the phase, in whole turns, that lies in the range and nearest to the previous pixel.
             let whole = (before - turn)
                 .round()
-                .max(0.0)
-                .min((self.most - turn).max(0.0).floor());
-            before = (turn + whole).min(self.most);
+                .at_least(0.0)
+                .at_most((self.most - turn).at_least(0.0).floor());
+            before = (turn + whole).at_most(self.most);
             let step = (before * STEPS + 0.5) as usize;
             *level = self.level[step.min(self.level.len() - 1)];
         }

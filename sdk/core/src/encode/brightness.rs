@@ -1,6 +1,7 @@
 //! The amplitude that maps to full light, and the brightness of a field without its brightest points. A session
 //! controls how the scale changes from frame to frame.
 
+use crate::Bounds;
 use crate::frame::Past;
 use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
@@ -149,7 +150,7 @@ impl Percentile {
             is
         }))
         .unwrap_or(0);
-        ((last + 1) as f32 * (MOST / BINS as f32)).max(LEAST)
+        ((last + 1) as f32 * (MOST / BINS as f32)).at_least(LEAST)
     }
 }
 

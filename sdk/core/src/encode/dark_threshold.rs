@@ -5,6 +5,7 @@
 //!
 //! The mean phase is removed beforehand, so the real axis is the phase of the bright parts.
 
+use crate::Bounds;
 use num_complex::Complex32;
 
 /// Moves the dark values of rows to the real axis.
@@ -28,7 +29,7 @@ impl DarkThreshold {
     pub(super) fn draw(self, row: &[Complex32], to: &mut [Complex32]) {
         for (u, to) in row.iter().zip(to) {
             let amplitude = (u.re * u.re + u.im * u.im).sqrt();
-            let weight = (amplitude * self.per_amplitude).min(1.0);
+            let weight = (amplitude * self.per_amplitude).at_most(1.0);
             to.re = weight * u.re + (1.0 - weight) * amplitude;
             to.im = weight * u.im;
         }

@@ -1,6 +1,7 @@
 //! The double phase method, Eq. 7. It represents one complex value A·exp(iφ) by two phases φ ± acos A on the two
 //! colours of a checkerboard, whose light adds up to the value.
 
+use crate::Bounds;
 use crate::display::response::{Response, wrap};
 use num_complex::Complex32;
 use phasefront_kernels::wide;
@@ -10,7 +11,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// is the amplitude divided by `scale`, clamped to 1. A scale of 0 means darkness.
 pub fn encode_value(value: Complex32, x: usize, y: usize, scale: f32) -> f32 {
     let amplitude = if scale > 0.0 {
-        (value.norm() / scale).min(1.0)
+        (value.norm() / scale).at_most(1.0)
     } else {
         0.0
     };
@@ -31,11 +32,11 @@ fn largest(row: &[Complex32]) -> f32 {
     let mut most = [0.0f32; 16];
     for run in runs {
         for (most, value) in most.iter_mut().zip(run) {
-            *most = most.max(value.norm_sqr());
+            *most = value.norm_sqr().at_least(*most);
         }
     }
     let rest = rest.iter().map(Complex32::norm_sqr);
-    rest.chain(most).fold(0.0, f32::max)
+    rest.chain(most).fold(0.0, |most, v| v.at_least(most))
 }
 
 /// Encodes row `y` of a plane like [`encode_value`], to 1e-5 rad.
@@ -117,7 +118,7 @@ fn phase_run(values: &[Complex32], phases: &mut [f32]) {
 /// Returns the phase of one value. It has no branches, so loops over it vectorise.
 #[inline(always)]
 fn encode_one(value: Complex32, inverse: f32, sign: f32) -> f32 {
-    let amplitude = (value.norm_sqr().sqrt() * inverse).min(1.0);
+    let amplitude = (value.norm_sqr().sqrt() * inverse).at_most(1.0);
     one_turn(atan2(value.im, value.re) + sign * acos(amplitude))
 }
 
@@ -142,7 +143,7 @@ fn acos(a: f32) -> f32 {
         -0.001_262_491_1,
     ];
     let polynomial = C.iter().rev().fold(0.0, |sum, c| sum * a + c);
-    (1.0 - a).max(0.0).sqrt() * polynomial
+    (1.0 - a).at_least(0.0).sqrt() * polynomial
 }
 
 /// Returns the angle of (x, y) to 1e-6, or 0 for the origin, from a polynomial on the octant (Abramowitz and Stegun,
@@ -161,7 +162,7 @@ fn atan2(y: f32, x: f32) -> f32 {
         0.002_866_225_7,
     ];
     let (ax, ay) = (x.abs(), y.abs());
-    let slope = ax.min(ay) / ax.max(ay).max(f32::MIN_POSITIVE);
+    let slope = ax.at_most(ay) / ax.at_least(ay).at_least(f32::MIN_POSITIVE);
     let square = slope * slope;
     let octant = slope * C.iter().rev().fold(0.0, |sum, c| sum * square + c);
     let quadrant = if ay > ax { FRAC_PI_2 - octant } else { octant };

@@ -9,6 +9,7 @@ use super::local::{LocalFilter, LocalScratch, REACH, Wanted};
 use super::source::Source;
 use super::start::{Start, StartScratch};
 use super::{EncoderOptions, double_phase};
+use crate::Bounds;
 use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::response::Response;
@@ -305,7 +306,7 @@ impl Encoder {
                 most[0] = double_phase::max_norm_sqr(values);
             }
         });
-        let scale = most.iter().copied().fold(0.0, f32::max).sqrt();
+        let scale = most.iter().copied().fold(0.0, |most, v| v.at_least(most)).sqrt();
         scratch.most = most;
         scale
     }

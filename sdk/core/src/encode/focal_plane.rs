@@ -13,6 +13,7 @@
 //! picture over the part c of the modulator. A constant phase would gather nearly all light in the middle of the
 //! modulator. A random phase spreads it evenly, but has points of no light between the pixels, which stay as speckle.
 
+use crate::Bounds;
 use crate::Size;
 use crate::display::Display;
 use crate::display::lens::{Lens, LensPlan};
@@ -109,7 +110,7 @@ pub fn cut(depth: &[f32], count: usize, display: &Display) -> Planes {
     let mut reach = vec![(1.0f32, 0.0f32); count];
     for d in depth {
         let (nearest, farthest) = &mut reach[plane(d)];
-        (*nearest, *farthest) = (nearest.min(*d), farthest.max(*d));
+        (*nearest, *farthest) = (d.at_most(*nearest), d.at_least(*farthest));
     }
     let with_pixels = reach.iter().enumerate().filter(|(_, reach)| reach.0 <= reach.1);
     let z_m = with_pixels.map(|(plane, (nearest, farthest))| {

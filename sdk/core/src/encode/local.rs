@@ -15,6 +15,7 @@
 //! the frame keeps seven rows for each step and begins three rows earlier for each step.
 
 use super::start::{Start, StartScratch};
+use crate::Bounds;
 use crate::Size;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
@@ -299,7 +300,7 @@ fn begin(field: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32,
 #[inline(always)]
 fn begin_value(f: Complex32, g: Complex32, light: f32, per_scale: f32, sign: f32) -> Complex32 {
     let norm = (f.re * f.re + f.im * f.im).sqrt();
-    let cosine = (norm * per_scale).min(1.0);
+    let cosine = (norm * per_scale).at_most(1.0);
     let sine = sign * (1.0 - cosine * cosine).sqrt();
     let dark = norm <= f32::MIN_POSITIVE;
     let inverse = 1.0 / if dark { 1.0 } else { norm };
@@ -322,7 +323,7 @@ fn counted(re: f32, im: f32) -> Complex32 {
 fn project(drawn: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32, to: &mut [Complex32]) {
     let values = drawn.iter().zip(goal).zip(light);
     for (((z, g), light), to) in values.zip(to) {
-        let square = (z.re * z.re + z.im * z.im).max(f32::MIN_POSITIVE);
+        let square = (z.re * z.re + z.im * z.im).at_least(f32::MIN_POSITIVE);
         let length = light / square.sqrt();
         *to = counted(g.re * per_scale - z.re * length, g.im * per_scale - z.im * length);
     }

@@ -11,6 +11,7 @@
 //! focus. λ = 1 corrects the whole wave, including the phase, which the eye does not see.
 
 use super::still::Still;
+use crate::Bounds;
 use crate::Size;
 use crate::display::illumination::Illumination;
 use crate::display::target::Target;
@@ -198,7 +199,7 @@ fn missing_of(u: &mut [Complex32], wanted: &[Complex32], per_scale: f32) {
     for (u, wanted) in u.iter_mut().zip(wanted) {
         let (re, im) = (wanted.re * per_scale, wanted.im * per_scale);
         let amplitude = (re * re + im * im).sqrt();
-        let length = (u.re * u.re + u.im * u.im).max(f32::MIN_POSITIVE).sqrt();
+        let length = (u.re * u.re + u.im * u.im).at_least(f32::MIN_POSITIVE).sqrt();
         let keep = (1.0 - WAVE) * amplitude / length - 1.0;
         u.re = WAVE * re + keep * u.re;
         u.im = WAVE * im + keep * u.im;
@@ -210,7 +211,7 @@ fn missing_of(u: &mut [Complex32], wanted: &[Complex32], per_scale: f32) {
 fn step_on(shown: &mut [Complex32], missing: &[Complex32], light: &[f32]) {
     for ((shown, missing), light) in shown.iter_mut().zip(missing).zip(light) {
         let (re, im) = (shown.re + GAIN * missing.re, shown.im + GAIN * missing.im);
-        let length = light / (re * re + im * im).max(f32::MIN_POSITIVE).sqrt();
+        let length = light / (re * re + im * im).at_least(f32::MIN_POSITIVE).sqrt();
         shown.re = re * length;
         shown.im = im * length;
     }

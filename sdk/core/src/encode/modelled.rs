@@ -15,6 +15,7 @@
 //! that brings cT nearest to u: the brightness that this display reaches, and a phase that the eye does not see.
 
 use super::midpoint::{MidpointSteps, WAVE};
+use crate::Bounds;
 use crate::Size;
 use crate::display::model::Model;
 use crate::display::response::wrap;
@@ -185,7 +186,7 @@ impl ModelSteps {
     fn begin(&self, colour: usize, phases: &mut [f32]) {
         let model = &self.model.colours()[colour];
         (phases.par_chunks_exact_mut(self.width).flatten())
-            .for_each(|phase| *phase = model.inverse(model.nearest(wrap(*phase + PI))).min(TAU.next_down()));
+            .for_each(|phase| *phase = model.inverse(model.nearest(wrap(*phase + PI))).at_most(TAU.next_down()));
     }
 
     /// Replaces `phases` by those that undo crosstalk and the learned curve, as far as the pixels reach.
@@ -221,7 +222,7 @@ impl ModelSteps {
             .zip(responses.par_chunks_exact(width));
         rows.for_each(|(phases, own)| {
             for (phase, own) in phases.iter_mut().zip(own) {
-                *phase = model.inverse(*own).min(TAU.next_down());
+                *phase = model.inverse(*own).at_most(TAU.next_down());
             }
         });
     }
@@ -343,7 +344,7 @@ impl ModelSteps {
         rows.for_each(|(u, wanted)| {
             for (u, wanted) in u.iter_mut().zip(wanted) {
                 let wanted = wanted * factor;
-                let keep = (1.0 - WAVE) * wanted.norm() / u.norm().max(f32::MIN_POSITIVE) - 1.0;
+                let keep = (1.0 - WAVE) * wanted.norm() / u.norm().at_least(f32::MIN_POSITIVE) - 1.0;
                 *u = wanted * WAVE + *u * keep;
             }
         });
@@ -353,7 +354,7 @@ impl ModelSteps {
         rows.zip(of.light.par_chunks_exact(width))
             .for_each(|(((slopes, shown), missing), light)| {
                 for (((slope, shown), missing), light) in slopes.iter_mut().zip(shown).zip(missing).zip(light) {
-                    *slope = -(shown.conj() * missing).im / light.norm_sqr().max(DIMMEST * DIMMEST);
+                    *slope = -(shown.conj() * missing).im / light.norm_sqr().at_least(DIMMEST * DIMMEST);
                 }
             });
     }

@@ -14,6 +14,7 @@
 //! random phase as start ends far lower.
 
 use super::still::Still;
+use crate::Bounds;
 use crate::Size;
 use crate::display::Display;
 use crate::display::illumination::Illumination;
@@ -108,7 +109,7 @@ impl NaturalScratch {
 
 /// Returns γ of `maps` maps: the more there are, the less each changes the amplitudes. One map diverges at 1.
 pub fn rate(maps: usize) -> f32 {
-    (0.4 + 0.3 * maps as f32).min(1.5)
+    (0.4 + 0.3 * maps as f32).at_most(1.5)
 }
 
 /// Returns after how many steps each of `planes` planes has had its turn. Steps that take the even and the odd planes
@@ -326,7 +327,7 @@ impl NaturalSteps {
         if let Some(registration) = &self.registration {
             (wave.iter_mut().zip(plane.iter())).for_each(|(wave, value)| *wave = Complex32::new(*value, 0.0));
             registration.apply(colour, wave, scratch);
-            (plane.iter_mut().zip(wave.iter())).for_each(|(value, wave)| *value = wave.re.max(0.0));
+            (plane.iter_mut().zip(wave.iter())).for_each(|(value, wave)| *value = wave.re.at_least(0.0));
         }
     }
 

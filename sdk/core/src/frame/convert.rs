@@ -6,6 +6,7 @@ use super::light::LightPlan;
 use super::plane::View;
 use super::plane::{Orientation, Plane};
 use super::resample::{Axis, Crop};
+use crate::Bounds;
 use crate::Size;
 use crate::parallel::{self, prelude::*};
 use crate::runtime::error::{Error, Result};
@@ -313,7 +314,7 @@ pub fn luminance(rgb: &[f32], amplitude: &mut [f32]) {
             wide!({
                 for (((to, r), g), b) in amplitude.iter_mut().zip(red).zip(green).zip(blue) {
                     let light = WEIGHTS[0] * r * r + WEIGHTS[1] * g * g + WEIGHTS[2] * b * b;
-                    *to = light.sqrt().min(1.0);
+                    *to = light.sqrt().at_most(1.0);
                 }
             });
         });

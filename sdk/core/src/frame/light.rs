@@ -8,6 +8,7 @@
 //! laser shows the luminance.
 
 use super::encoding::{Knee, RgbEncoding};
+use crate::Bounds;
 use crate::display::Display;
 use crate::display::primaries::{Matrix, inverse, product, transposed};
 use crate::parallel::prelude::*;
@@ -150,12 +151,12 @@ impl Gamut {
     fn compress(&self, [red, green, blue]: [&mut [f32]; 3]) {
         let (from, rate) = (self.knee.from as f32, self.knee.rate as f32);
         for ((r, g), b) in red.iter_mut().zip(green).zip(blue) {
-            let most = r.max(*g).max(*b);
-            let saturation = (most - r.min(*g).min(*b)) / most.max(f32::MIN_POSITIVE);
-            let excess = (saturation - from).max(0.0);
-            let kept = saturation.min(from) + excess / (1.0 + rate * excess);
-            let factor = kept / saturation.max(f32::MIN_POSITIVE);
-            let full = 1.0 / most.max(1.0);
+            let most = r.at_least(*g).at_least(*b);
+            let saturation = (most - r.at_most(*g).at_most(*b)) / most.at_least(f32::MIN_POSITIVE);
+            let excess = (saturation - from).at_least(0.0);
+            let kept = saturation.at_most(from) + excess / (1.0 + rate * excess);
+            let factor = kept / saturation.at_least(f32::MIN_POSITIVE);
+            let full = 1.0 / most.at_least(1.0);
             for light in [r, g, b] {
                 *light = (most - factor * (most - *light)) * full;
             }
@@ -280,7 +281,7 @@ impl LightPlan {
                     wide!({
                         for (((to, r), g), b) in out.iter_mut().zip(&*red).zip(&*green).zip(&*blue) {
                             let light = weights[0] * r + weights[1] * g + weights[2] * b;
-                            *to = light.sqrt().min(1.0);
+                            *to = light.sqrt().at_most(1.0);
                         }
                     });
                 });
@@ -319,7 +320,7 @@ impl LightPlan {
                 let [wr, wg, wb] = highlights.luminance;
                 wide!(for ((r, g), b) in red.iter_mut().zip(&mut *green).zip(&mut *blue) {
                     let luminance = wr * *r + wg * *g + wb * *b;
-                    let gain = table.at(luminance.sqrt().sqrt().min(1.0));
+                    let gain = table.at(luminance.sqrt().sqrt().at_most(1.0));
                     (*r, *g, *b) = below_full([*r, *g, *b], gain, from, rate).into();
                 });
             }
@@ -335,10 +336,10 @@ impl LightPlan {
 #[inline(always)]
 fn below_full(colour: [f32; 3], gain: f32, from: f32, rate: f32) -> [f32; 3] {
     let [r, g, b] = colour;
-    let most = gain * r.max(g).max(b);
-    let excess = (most - from).max(0.0);
-    let kept = most.min(from) + excess / (1.0 + rate * excess);
-    let factor = gain * (kept.min(1.0) / most.max(f32::MIN_POSITIVE));
+    let most = gain * r.at_least(g).at_least(b);
+    let excess = (most - from).at_least(0.0);
+    let kept = most.at_most(from) + excess / (1.0 + rate * excess);
+    let factor = gain * (kept.at_most(1.0) / most.at_least(f32::MIN_POSITIVE));
     colour.map(|light| factor * light)
 }
 
@@ -359,7 +360,7 @@ fn mix(matrix: &[[f32; 3]; 3], gamut: &Gamut, [red, green, blue]: [&mut [f32]; 3
             for ((to_r, to_g), to_b) in red.iter_mut().zip(&mut *green).zip(&mut *blue) {
                 let light = |m: [f32; 3]| m[0] * *to_r + m[1] * *to_g + m[2] * *to_b;
                 let (r, g, b) = (light(mr), light(mg), light(mb));
-                let (most, least) = (r.max(g).max(b), r.min(g).min(b));
+                let (most, least) = (r.at_least(g).at_least(b), r.at_most(g).at_most(b));
                 outside |= u32::from(least < least_share * most) | u32::from(most > 1.0 + ROUNDING);
                 (*to_r, *to_g, *to_b) = (r, g, b);
             }

@@ -1,5 +1,6 @@
 //! Checks of complex fields that come from elsewhere.
 
+use crate::Bounds;
 use crate::Size;
 use crate::display::target::Target;
 use crate::runtime::error::{Error, Result};
@@ -37,7 +38,10 @@ pub fn check(field: &[Complex32], size: Size, target: &Target) -> Result<()> {
             at / (height * width)
         )));
     }
-    let most = field.iter().map(|value| value.norm()).fold(0.0, f32::max);
+    let most = field
+        .iter()
+        .map(|value| value.norm())
+        .fold(0.0, |most, v| v.at_least(most));
     match most {
         0.0 => Err(Error::Frame("the field is dark: all of its values are 0".into())),
         most if !MOST.contains(&most) => Err(Error::Frame(format!(

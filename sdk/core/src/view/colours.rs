@@ -1,7 +1,9 @@
 //! The colours of a view on a screen: amplitudes of laser light become bytes of a picture.
 
+use crate::Bounds;
 use crate::display::Display;
 use crate::frame::{RgbEncoding, light_to_srgb};
+use phasefront_kernels::wide;
 use std::sync::LazyLock;
 
 /// How a view's amplitudes become a picture's red, green and blue.
@@ -61,12 +63,43 @@ impl ViewColours {
 
     /// Returns the bytes red, green and blue for the amplitudes of three lasers, or of one.
     pub fn bytes(&self, amplitude: &[f32]) -> [u8; 3] {
-        match self.linear(amplitude) {
-            None => {
-                let byte = |v: f32| (v * 255.0 + 0.5) as u8;
-                [0, 1, 2].map(|c| byte(*amplitude.get(c).unwrap_or(&amplitude[0])))
+        let mut bytes = [[0]; 3];
+        self.rows(amplitude.as_chunks::<1>().0, &mut bytes);
+        bytes.map(|[byte]| byte)
+    }
+
+    /// Converts rows of the amplitudes of three lasers, or of one, to rows of bytes, red, green and blue.
+    pub fn rows<const N: usize>(&self, amplitudes: &[[f32; N]], bytes: &mut [[u8; N]; 3]) {
+        let Some(matrix) = self.matrix() else {
+            for (colour, bytes) in bytes.iter_mut().enumerate() {
+                let row = amplitudes.get(colour).unwrap_or(&amplitudes[0]);
+                wide!(for (byte, v) in bytes.iter_mut().zip(row) {
+                    *byte = (v * 255.0 + 0.5) as u8;
+                });
             }
-            Some(linear) => linear.map(|light| CURVE[(light.clamp(0.0, 1.0).sqrt() * INTERVALS as f32 + 0.5) as usize]),
+            return;
+        };
+        let curve: &[u8; INTERVALS + 1] = &CURVE;
+        let [first, others @ ..] = amplitudes else { return };
+        for (bytes, share) in bytes.iter_mut().zip(matrix) {
+            let mut light = [0.0; N];
+            let mut places = [0u16; N];
+            wide!({
+                for (light, a) in light.iter_mut().zip(first) {
+                    *light = share[0] * (a * a);
+                }
+                for (row, share) in others.iter().zip(&share[1..]) {
+                    for (light, a) in light.iter_mut().zip(row) {
+                        *light += share * (a * a);
+                    }
+                }
+                for (place, light) in places.iter_mut().zip(&light) {
+                    *place = (light.at_least(0.0).at_most(1.0).sqrt() * INTERVALS as f32 + 0.5) as u16;
+                }
+            });
+            for (byte, place) in bytes.iter_mut().zip(&places) {
+                *byte = curve[usize::from(*place)];
+            }
         }
     }
 }

@@ -20,6 +20,7 @@ use crate::parallel::prelude::*;
 use crate::runtime::error::{Error, Result};
 use crate::view::colours::ViewColours;
 use num_complex::Complex32;
+use phasefront_kernels::wide;
 
 /// The largest number of pixels of an image.
 pub const MOST_PIXELS: usize = 1 << 26;
@@ -60,7 +61,10 @@ fn check_screen(Size { width, height }: Size) -> Result<()> {
 /// The working memory of a [`Preview`] for one call at a time.
 pub struct PreviewScratch {
     field: Vec<Complex32>,
+    /// The amplitudes of one colour of the field.
     amplitude: Vec<f32>,
+    /// The amplitudes of all colours, with rows as wide as the screen.
+    wide: Vec<f32>,
     propagation: Option<ConvolveScratch>,
 }
 
@@ -168,7 +172,8 @@ impl Preview {
         let size = self.small.height * self.small.width;
         PreviewScratch {
             field: vec![Complex32::ZERO; size],
-            amplitude: vec![0.0; self.colours * size],
+            amplitude: vec![0.0; size],
+            wide: vec![0.0; self.colours * self.small.height * self.screen.width],
             propagation: self.propagators.as_ref().map(|p| p[0].scratch()),
         }
     }
@@ -212,8 +217,8 @@ impl Preview {
             alike => std::array::from_fn(|l| Complex32::from_polar(light, alike.phase(l as u8, 0))),
         };
         let planes = levels.chunks_exact(height * width);
-        let amplitudes = (scratch.amplitude).chunks_exact_mut(small_height * small_width);
-        for (colour, (levels, amplitude)) in planes.zip(amplitudes).enumerate() {
+        let wide = (scratch.wide).chunks_exact_mut(small_height * self.screen.width);
+        for (colour, (levels, wide)) in planes.zip(wide).enumerate() {
             (scratch.field.par_chunks_exact_mut(small_width))
                 .zip(levels.par_chunks_exact(width * self.factor))
                 .enumerate()
@@ -231,11 +236,17 @@ impl Preview {
             if let (Some(plans), Some(scratch_wave)) = (&self.propagators, &mut scratch.propagation) {
                 plans[colour].propagate(&mut scratch.field, scratch_wave);
             }
-            for (amplitude, value) in amplitude.iter_mut().zip(&scratch.field) {
-                *amplitude = value.norm();
-            }
+            (wide.par_chunks_exact_mut(self.screen.width))
+                .zip(scratch.amplitude.par_chunks_exact_mut(small_width))
+                .zip(scratch.field.par_chunks_exact(small_width))
+                .for_each(|((wide, amplitude), field)| {
+                    wide!(for (amplitude, value) in amplitude.iter_mut().zip(field) {
+                        *amplitude = value.norm_sqr().sqrt();
+                    });
+                    self.x.apply(amplitude, 0, wide);
+                });
         }
-        self.draw(&scratch.amplitude, layout, rows);
+        self.draw(&scratch.wide, layout, rows);
         Ok(())
     }
 
@@ -273,24 +284,29 @@ impl Preview {
         }
     }
 
-    /// Converts the planes of amplitudes to pixels of the screen.
-    fn draw<'a>(&self, amplitude: &[f32], layout: Layout, rows: impl IndexedParallelIterator<Item = &'a mut [u8]>) {
-        let Size { width, height } = self.small;
+    /// Converts the planes of amplitudes, with rows as wide as the screen, to its pixels.
+    fn draw<'a>(&self, wide: &[f32], layout: Layout, rows: impl IndexedParallelIterator<Item = &'a mut [u8]>) {
+        /// The pixels that are converted at a time.
+        const RUN: usize = 128;
+        let (width, height) = (self.screen.width, self.small.height);
         rows.enumerate().for_each(|(y, pixels)| {
-            let mean = |colour: usize, x: usize| {
-                let plane = &amplitude[colour * height * width..];
-                let row = |(row, weight): (usize, f32)| {
-                    let row = &plane[row * width..][..width];
-                    weight * self.x.taps(x).map(|(at, w)| w * row[at]).sum::<f32>()
-                };
-                self.y.taps(y).map(row).sum::<f32>()
-            };
-            for (x, pixel) in pixels.chunks_exact_mut(layout.pixel_bytes()).enumerate() {
-                let bytes = match self.colours {
-                    1 => self.view.bytes(&[mean(0, x)]),
-                    _ => self.view.bytes(&[0, 1, 2].map(|colour| mean(colour, x))),
-                };
-                layout.write_pixel(0, |colour| bytes[colour].into(), pixel);
+            for (run, pixels) in pixels.chunks_mut(RUN * layout.pixel_bytes()).enumerate() {
+                let mut amplitudes = [[0.0; RUN]; 3];
+                let mut bytes = [[0; RUN]; 3];
+                let count = pixels.len() / layout.pixel_bytes();
+                for (colour, amplitudes) in amplitudes[..self.colours].iter_mut().enumerate() {
+                    let plane = &wide[colour * height * width..][..height * width];
+                    for (row, weight) in self.y.taps(y) {
+                        let row = &plane[row * width + run * RUN..][..count];
+                        wide!(for (amplitude, value) in amplitudes.iter_mut().zip(row) {
+                            *amplitude += weight * value;
+                        });
+                    }
+                }
+                self.view.rows(&amplitudes[..self.colours], &mut bytes);
+                for (x, pixel) in pixels.chunks_exact_mut(layout.pixel_bytes()).enumerate() {
+                    layout.write_pixel(0, |colour| bytes[colour][x].into(), pixel);
+                }
             }
         });
     }
@@ -336,6 +352,49 @@ mod tests {
         let mut levels = vec![0; 3 * height * width];
         let modulation = home.modulate(None, &mut field, LevelsMut::Bytes(&mut levels), &mut scratch);
         (levels, modulation.scale)
+    }
+
+    /// Each pixel is the mean of the samples of the small field that its axes name, for screens of odd sizes and one
+    /// laser, with gaps between rows.
+    #[test]
+    fn pixels_are_means_of_the_small_field() {
+        for (toml, screen) in [("", (131, 7)), ("", (300, 129)), ("wavelengths_nm = [532]", (129, 50))] {
+            let (width, height) = screen;
+            let display = Display::from_toml(toml).unwrap();
+            let colours = display.colours();
+            let screen = Size { width, height };
+            let preview = Preview::new(SIZE, &display.clone().into(), 0.0, screen).unwrap();
+            let preview = preview.with_view_colours(ViewColours::new(crate::frame::RgbEncoding::Srgb, &display));
+            let small = preview.small();
+            let field: Vec<f32> = (0..colours * small.pixels())
+                .map(|i| (i * 37 % 101) as f32 / 90.0)
+                .collect();
+            let mut wide = vec![0.0; colours * small.height * width];
+            for (wide, row) in wide.chunks_exact_mut(width).zip(field.chunks_exact(small.width)) {
+                preview.x.apply(row, 0, wide);
+            }
+            let stride = 3 * width + 5;
+            let mut image = vec![9; stride * height];
+            let into = rows(&mut image, stride, (height, 3 * width)).unwrap();
+            preview.draw(&wide, Layout::Rgb, into);
+            for (y, row) in image.chunks_exact(stride).enumerate() {
+                for (x, pixel) in row[..3 * width].chunks_exact(3).enumerate() {
+                    let mean = |colour: usize| -> f32 {
+                        let sample = |(at, share): (usize, f32), y| {
+                            share * field[(colour * small.height + y) * small.width + at]
+                        };
+                        let along_x =
+                            |(y, share): (usize, f32)| share * preview.x.taps(x).map(|tap| sample(tap, y)).sum::<f32>();
+                        preview.y.taps(y).map(along_x).sum()
+                    };
+                    let amplitudes: Vec<f32> = (0..colours).map(mean).collect();
+                    let expected = preview.view.bytes(&amplitudes);
+                    let near = pixel.iter().zip(expected).all(|(is, right)| is.abs_diff(right) <= 1);
+                    assert!(near, "{toml} {screen} {x} {y}: {pixel:?}, {expected:?} is right");
+                }
+                assert_eq!(row[3 * width..], [9; 5]);
+            }
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::device::{Constants, Device, Dispatch};
 use crate::input::{ChainInput, Form, Packer, Source};
 use crate::numbers::{Float, GROUP, Numbers};
 use crate::{GpuError, Result};
+use phasefront_core::Bounds;
 use phasefront_core::Size;
 use phasefront_core::method::network::chain::{Chain, Layer, Weights};
 use phasefront_core::method::network::{Head, InputKind, Network};
@@ -521,7 +522,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
         let next = (i + 1 == last).then(|| {
             let zero = whole.layers[last].zero_point;
             let rounded = |q: u8| match layer.requantise.rescale {
-                Some(factor) => (f32::from(q) * factor).min(255.0).round_ties_even() as u8,
+                Some(factor) => (f32::from(q) * factor).at_most(255.0).round_ties_even() as u8,
                 None => q,
             };
             (0..=255).map(|q| rounded(q).saturating_add(zero)).collect()

@@ -7,6 +7,7 @@
 //! single steps, while an edge of mixed readings rarely lies just between two of them.
 
 use super::lanes::{LANES, Lanes, any, lanes, strides};
+use crate::Bounds;
 use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
 
@@ -160,7 +161,7 @@ fn find_near(bent: &[bool], width: usize, y: usize, kinds: &mut [Kind]) {
 fn kind_at_edge(depth: &[f32], width: usize, (y, x): (usize, usize), mixes: bool) -> Kind {
     let (least, most) = range(depth, width, y, x);
     let value = depth[y * width + x];
-    let margin = (MIXED * (most - least)).max(MIXED_BY);
+    let margin = (MIXED * (most - least)).at_least(MIXED_BY);
     if most - least <= EDGE {
         Kind::Inside
     } else if mixes && value - least >= margin && most - value >= margin {
@@ -184,8 +185,8 @@ fn range(depth: &[f32], width: usize, y: usize, x: usize) -> (f32, f32) {
     let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
     for y in y.saturating_sub(1)..(y + 2).min(height) {
         for value in &depth[y * width + x.saturating_sub(1)..y * width + (x + 2).min(width)] {
-            least = value.min(least);
-            most = value.max(most);
+            least = value.at_most(least);
+            most = value.at_least(most);
         }
     }
     (least, most)
@@ -210,8 +211,8 @@ fn are_bent(depth: &[f32], width: usize, y: usize, x: usize) -> [bool; LANES] {
         for dx in 0..5 {
             let (values, step_x, step_y) = (values(row(dy), dx), dx as f32 - 2.0, dy as f32 - 2.0);
             let v: Lanes = lanes(|i| values[i] - middle[i]);
-            least = lanes(|i| v[i].min(least[i]));
-            most = lanes(|i| v[i].max(most[i]));
+            least = lanes(|i| v[i].at_most(least[i]));
+            most = lanes(|i| v[i].at_least(most[i]));
             sum = lanes(|i| sum[i] + v[i]);
             squares = lanes(|i| squares[i] + v[i] * v[i]);
             slope_x = lanes(|i| slope_x[i] + v[i] * step_x);

@@ -6,6 +6,7 @@ use super::edges::Kind;
 use super::history::{self, History};
 use super::lanes::{self, LANES, Lanes, STRIDE, lanes, load, store};
 use super::surfaces::{MOST, Places, Readings, Surface};
+use crate::Bounds;
 use crate::Size;
 use crate::parallel::{self, prelude::*};
 use phasefront_kernels::wide;
@@ -396,7 +397,7 @@ impl Decider<'_> {
                     theirs[1][i] - colours[1][i],
                     theirs[2][i] - colours[2][i],
                 ];
-                near * quarter(r * r + g * g + b * b, ALIKE).max(LEAST_ALIKE)
+                near * quarter(r * r + g * g + b * b, ALIKE).at_least(LEAST_ALIKE)
             });
             sum = lanes(|i| {
                 let for_first = (depth[i] - own[i]).abs() <= (depth[i] - second[i]).abs();
@@ -469,7 +470,7 @@ fn choose<const N: usize>(
         let leads = history::leads(surface.depth, held, &nearest);
         let theirs = surface.depth_at(places);
         let score: Lanes<N> = lanes(|i| {
-            let evidence = (likelihood[i] - most[i]).max(-MOST_EVIDENCE);
+            let evidence = (likelihood[i] - most[i]).at_least(-MOST_EVIDENCE);
             PLACE * covers[i] + evidence + leads[i]
         });
         // The former first surface, or this one, may be the second.

@@ -3,6 +3,7 @@
 
 use super::edges::{BESIDE, EDGE, MIXED, MIXED_BY, SINGLE, UNEXPLAINED, WHOLE};
 use super::{Misfit, contradict, fill, narrow, pixels, register, smooth, surfaces};
+use crate::Bounds;
 use crate::Size;
 use crate::depth::{fill_nearest, sharpness};
 use crate::frame::Crop;
@@ -122,7 +123,7 @@ fn evidence(
             };
             let top = start(y, axis == 1, shift_y + outward(down), rows);
             let left = start(x, axis == 0, shift_x + outward(right), columns);
-            let weight = f64::from(step.abs().min(*register::EDGE.end()));
+            let weight = f64::from(step.abs().at_most(*register::EDGE.end()));
             let reading = (top..(top + samples).min(rows))
                 .flat_map(|y| (left..(left + samples).min(columns)).map(move |x| (y, x)));
             sum += weight * reading.map(|at| edges[axis][at]).sum::<f64>();
@@ -397,8 +398,8 @@ fn mixes(depth: &Array2<f32>) -> bool {
     let steps = windows.iter().map(|d| [0, 1, 2].map(|k| (d[k + 1] - d[k]).abs()));
     let edges: Vec<bool> = (windows.iter().map(|d| (d[3] - d[0]).abs()))
         .zip(steps)
-        .filter(|(whole, steps)| *whole > WHOLE && steps[1] >= steps[0].max(steps[2]))
-        .map(|(whole, steps)| steps[0].max(steps[2]) < BESIDE * whole)
+        .filter(|(whole, steps)| *whole > WHOLE && steps[1] >= steps[0].at_least(steps[2]))
+        .map(|(whole, steps)| steps[0].at_least(steps[2]) < BESIDE * whole)
         .collect();
     let single = edges.iter().filter(|single| **single).count();
     edges.is_empty() || (single as f32) < SINGLE * edges.len() as f32
@@ -408,7 +409,7 @@ fn mixes(depth: &Array2<f32>) -> bool {
 fn kinds_of(depth: &Array2<f32>, mixes: bool) -> Array2<(bool, bool)> {
     let range = |at: (usize, usize), reach: usize| {
         near(Size::from_shape(depth.dim()), at, reach).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), (at, _)| {
-            (a.min(depth[at]), b.max(depth[at]))
+            (depth[at].at_most(a), depth[at].at_least(b))
         })
     };
     let is_steep = |at: (usize, usize)| range(at, 1).1 - range(at, 1).0 > EDGE;
@@ -433,7 +434,7 @@ fn kinds_of(depth: &Array2<f32>, mixes: bool) -> Array2<(bool, bool)> {
     Array2::from_shape_fn(depth.dim(), |at| {
         let (least, most) = range(at, 1);
         let is_edge = is_steep(at) && near(Size::from_shape(depth.dim()), at, 1).any(|(at, _)| bent[at]);
-        let margin = (MIXED * (most - least)).max(MIXED_BY);
+        let margin = (MIXED * (most - least)).at_least(MIXED_BY);
         (
             is_edge,
             mixes && is_edge && depth[at] - least >= margin && most - depth[at] >= margin,
@@ -503,7 +504,7 @@ impl Surface {
 
 /// Returns the bilinear weights of 3×3 readings at the offset `dx`, `dy` from the middle one.
 fn place_of(dx: f32, dy: f32) -> [f32; 9] {
-    let weight = |offset: f32, k: usize| (1.0 - (offset - (k as f32 - 1.0)).abs()).max(0.0);
+    let weight = |offset: f32, k: usize| (1.0 - (offset - (k as f32 - 1.0)).abs()).at_least(0.0);
     std::array::from_fn(|k| weight(dx, k % 3) * weight(dy, k / 3))
 }
 

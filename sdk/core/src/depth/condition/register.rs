@@ -7,6 +7,7 @@
 //! Colour is sampled at up to four places per reading along each axis, so a shift is found to a quarter of a reading.
 //! Colour edges count in proportion to their surroundings: a texture has many.
 
+use crate::Bounds;
 use crate::Size;
 use crate::frame::Crop;
 use crate::parallel::prelude::*;
@@ -369,5 +370,5 @@ fn step(
     let turn = depth[after] + depth[after + by] - depth[before] - depth[before + by];
     let (right, down) = if axis == 0 { (step, turn) } else { (turn, step) };
     let direction = 2 * usize::from(down < 0.0) + usize::from(right < 0.0);
-    Some((step.abs().min(*EDGE.end()), direction))
+    Some((step.abs().at_most(*EDGE.end()), direction))
 }

@@ -1,6 +1,7 @@
 //! Smoothing within surfaces. Along rows and then columns, each reading moves onto the line that fits its neighbours of
 //! the same surface best, so that slopes stay slopes.
 
+use crate::Bounds;
 use crate::Size;
 use crate::parallel::prelude::*;
 use phasefront_kernels::wide;
@@ -77,7 +78,7 @@ fn fit(taps: [&[f32]; TAPS], to: &mut [f32]) {
             let step = k as f32 - REACH as f32;
             let difference = tap[x] - middle;
             let share = difference * (1.0 / TOLERANCE);
-            let near = (1.0 - share * share).max(0.0);
+            let near = (1.0 - share * share).at_least(0.0);
             let weight = near * near;
             w += weight;
             wk += weight * step;

@@ -8,6 +8,7 @@
 use super::colour::Moments;
 use super::edges::Kind;
 use super::lanes::{Lanes, lanes};
+use crate::Bounds;
 
 /// The largest difference between the readings of a surface and their mean, as a share of the volume.
 pub(super) const TOLERANCE: f32 = 0.03;
@@ -57,7 +58,7 @@ impl Surface {
     fn finish(&mut self) {
         let mean = self.moments.mean();
         let square = mean.iter().map(|v| v * v).sum::<f32>();
-        let variance = (self.moments.squares / self.moments.count - square).max(LEAST_VARIANCE);
+        let variance = (self.moments.squares / self.moments.count - square).at_least(LEAST_VARIANCE);
         self.colour = mean;
         self.narrow = -0.5 / variance;
         self.peak = -1.5 * libm::logf(variance);
@@ -240,9 +241,9 @@ impl<const N: usize> Places<N> {
             row,
             rows: [1.0 - below, below],
             columns: [
-                lanes(|i| (-dx[i]).max(0.0)),
+                lanes(|i| (-dx[i]).at_least(0.0)),
                 lanes(|i| 1.0 - dx[i].abs()),
-                lanes(|i| dx[i].max(0.0)),
+                lanes(|i| dx[i].at_least(0.0)),
             ],
         }
     }

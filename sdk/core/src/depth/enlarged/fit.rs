@@ -1,6 +1,7 @@
 //! The least squares fit of a line of pixels by an enlarged line of readings.
 
 use super::Enlarging;
+use crate::Bounds;
 use ndarray::ArrayView2;
 
 /// The number of readings that make a pixel, at most.
@@ -93,7 +94,9 @@ impl Limits {
     /// Returns the ends of the numbers of `depth` that are finite.
     pub(super) fn of(depth: ArrayView2<'_, f32>) -> Self {
         let finite = depth.iter().filter(|v| v.is_finite());
-        let (least, most) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let (least, most) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| {
+            (v.at_most(a), v.at_least(b))
+        });
         Limits { least, most }
     }
 
@@ -245,7 +248,7 @@ impl Fit {
                 for lane in 0..LANES {
                     let is_hidden = limits.hide(values[lane], made[lane]);
                     let now = if is_hidden { made[lane] } else { values[lane] };
-                    changed[lane] = changed[lane].max((now - wanted[lane]).abs());
+                    changed[lane] = changed[lane].at_least((now - wanted[lane]).abs());
                     wanted[lane] = now;
                 }
             }

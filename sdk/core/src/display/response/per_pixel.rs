@@ -25,6 +25,7 @@
 //! which is interpolated in the same way, the smallest phase is nearer than the largest, so phase 0 determines the
 //! level. All arithmetic is in f32.
 
+use crate::Bounds;
 use crate::Size;
 use crate::runtime::error::{Error, Result};
 use std::f32::consts::TAU;
@@ -423,7 +424,7 @@ impl Between<'_> {
             let turn = self.turn.0 + self.turn.1 * fx;
             let phase = if wanted[i] >= turn { 0.0 } else { wanted[i] };
             let t = phase * per_radian;
-            let k = whole(t).min(last);
+            let k = whole(t).at_most(last);
             (along[i], part[i], interval[i]) = (fx, t - k, bits(k) & 63);
         }
         let ends: [[f32; 4]; LANES] = interval.map(|k| self.ends[k as usize]);

@@ -2,6 +2,7 @@
 //! tested against it.
 
 use super::chain::{Chain, Quantisation, Weights};
+use crate::Bounds;
 use crate::Size;
 
 /// The pixels of a square of two by two, from the upper left.
@@ -92,7 +93,7 @@ fn layers(chain: &Chain, input: &[f32], size: Size) -> Vec<f32> {
         round(&mut x, rounding.input);
         output = convolve(&x, &real_kernel(layer), layer.outputs, size);
         if i < last {
-            output.iter_mut().for_each(|v| *v = v.max(0.0));
+            output.iter_mut().for_each(|v| *v = v.at_least(0.0));
         }
         inputs.push(x);
     }
