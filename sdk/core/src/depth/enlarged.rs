@@ -96,7 +96,7 @@ pub fn find(depth: ArrayView2<'_, f32>) -> Option<Enlarged> {
     }
     let lines = [Lines::new(depth)?, Lines::new(depth.reversed_axes())?];
     let tried: Vec<Enlarged> = candidates(size);
-    let errors: Vec<[f64; 2]> = tried.par_iter().map(|map| map.errors(&lines, 0.0, false)).collect();
+    let errors: Vec<[f64; 2]> = tried.par_iter().map(|map| map.errors(&lines, false)).collect();
     let joint = |errors: &[f64; 2]| errors[0] + errors[1];
     let least = errors.iter().map(joint).fold(f64::INFINITY, f64::min);
     let comparable = tried.into_iter().zip(errors);
@@ -104,12 +104,12 @@ pub fn find(depth: ArrayView2<'_, f32>) -> Option<Enlarged> {
         .filter(|(_, errors)| joint(errors) <= COMPARABLE * least + 2.0 * EXACT)
         .collect();
     let contrasts: Vec<(Enlarged, f64)> = (comparable.into_par_iter())
-        .map(|(map, errors)| (map, map.contrast(&lines, errors)))
+        .filter_map(|(map, errors)| Some((map, map.contrast(&lines, errors)?)))
         .collect();
     let best = contrasts.iter().map(|(_, contrast)| *contrast).fold(0.0, f64::max);
     let alike = contrasts
         .into_iter()
-        .filter(|(_, contrast)| *contrast >= CONTRAST && *contrast >= best.min(HIGH_CONTRAST) / ALIKE);
+        .filter(|(_, contrast)| *contrast >= best.min(HIGH_CONTRAST) / ALIKE);
     // Blocks of 8 pixels are blocks of 4 and of 2 as well.
     let blocks = |map: &Enlarged| if map.by == Enlarging::Nearest { map.factor } else { 0.0 };
     alike
@@ -231,29 +231,33 @@ fn edges(values: &[f32], holes: &[bool]) -> Vec<bool> {
 }
 
 impl Enlarged {
-    /// Returns the mean squared error of the fit at edges along rows and along columns, with the grid shifted by
-    /// `shift` readings. With `cut`, what lies beyond the ends of the depth was cut off.
-    fn errors(&self, lines: &[Lines; 2], shift: f64, cut: bool) -> [f64; 2] {
-        let grids = [self.grid.width, self.grid.height];
-        std::array::from_fn(|axis| {
-            let pixels = lines[axis].values[0].len();
-            let fit = Fit::new(pixels, grids[axis], self.kernel, shift);
-            let mut squares = Vec::new();
-            let mut scratch = fit.scratch();
-            let limits = if cut { lines[axis].limits } else { Limits::NONE };
-            for (values, edges) in lines[axis].values.chunks(LANES).zip(lines[axis].edges.chunks(LANES)) {
-                let errors = fit.errors(values, limits, &mut scratch);
-                for (lane, edges) in edges.iter().enumerate() {
-                    let at_edges = errors.iter().zip(edges).filter(|(_, is_edge)| **is_edge);
-                    squares.extend(at_edges.map(|(errors, _)| errors[lane] * errors[lane]));
-                }
+    /// Returns the mean squared errors of the fit at edges along rows and along columns. With `cut`, what lies beyond
+    /// the ends of the depth was cut off.
+    fn errors(&self, lines: &[Lines; 2], cut: bool) -> [f64; 2] {
+        std::array::from_fn(|axis| self.error(lines, axis, 0.0, cut))
+    }
+
+    /// Returns the mean squared error along an axis, with the grid shifted by `shift` readings.
+    fn error(&self, lines: &[Lines; 2], axis: usize, shift: f64, cut: bool) -> f64 {
+        let grid = [self.grid.width, self.grid.height][axis];
+        let lines = &lines[axis];
+        let pixels = lines.values[0].len();
+        let fit = Fit::new(pixels, grid, self.kernel, shift);
+        let mut squares = Vec::new();
+        let mut scratch = fit.scratch();
+        let limits = if cut { lines.limits } else { Limits::NONE };
+        for (values, edges) in lines.values.chunks(LANES).zip(lines.edges.chunks(LANES)) {
+            let errors = fit.errors(values, limits, &mut scratch);
+            for (lane, edges) in edges.iter().enumerate() {
+                let at_edges = errors.iter().zip(edges).filter(|(_, is_edge)| **is_edge);
+                squares.extend(at_edges.map(|(errors, _)| errors[lane] * errors[lane]));
             }
-            let kept = ((KEPT * squares.len() as f64).ceil() as usize).clamp(1, squares.len());
-            squares.select_nth_unstable_by(kept - 1, f64::total_cmp);
-            // A fit of n pixels by m readings leaves (n − m)/n of white noise.
-            let left = 1.0 - grids[axis] as f64 / pixels as f64;
-            squares[..kept].iter().sum::<f64>() / kept as f64 / left
-        })
+        }
+        let kept = ((KEPT * squares.len() as f64).ceil() as usize).clamp(1, squares.len());
+        squares.select_nth_unstable_by(kept - 1, f64::total_cmp);
+        // A fit of n pixels by m readings leaves (n − m)/n of white noise.
+        let left = 1.0 - grid as f64 / pixels as f64;
+        squares[..kept].iter().sum::<f64>() / kept as f64 / left
     }
 
     /// Returns this map, with that of Keys' cubics which fits better where overshoots are cut off: they hide which one
@@ -263,22 +267,29 @@ impl Enlarged {
             return self;
         }
         let cubics = [Kernel::CubicHalf, Kernel::CubicThreeQuarters].map(|kernel| Enlarged { kernel, ..self });
-        let error = |map: &Enlarged| map.errors(lines, 0.0, true).iter().sum::<f64>();
+        let error = |map: &Enlarged| map.errors(lines, true).iter().sum::<f64>();
         let [half, other] = cubics.each_ref().map(error);
         cubics[usize::from(other < half)]
     }
 
-    /// Returns the least ratio of the errors of shifted grids to `errors`, those of this one: the smaller of that along
-    /// rows and along columns.
-    fn contrast(&self, lines: &[Lines; 2], errors: [f64; 2]) -> f64 {
+    /// Returns the least ratio of the errors of shifted grids, along rows and along columns, to `errors`, those of this
+    /// grid. Returns `None` at the first that is below [`CONTRAST`].
+    fn contrast(&self, lines: &[Lines; 2], errors: [f64; 2]) -> Option<f64> {
         let parts = match self.by {
             Enlarging::Nearest => self.factor.round() as usize,
             _ => 4,
         };
-        let shifted = (1..parts).map(|part| self.errors(lines, part as f64 / parts as f64, false));
-        let least = shifted.fold([f64::INFINITY; 2], |least, [x, y]| [least[0].min(x), least[1].min(y)]);
-        let ratio = |axis: usize| least[axis] / errors[axis].max(EXACT);
-        ratio(0).min(ratio(1))
+        let mut least = f64::INFINITY;
+        for shift in (1..parts).map(|part| part as f64 / parts as f64) {
+            for (axis, error) in errors.into_iter().enumerate() {
+                let ratio = self.error(lines, axis, shift, false) / error.max(EXACT);
+                if ratio < CONTRAST {
+                    return None;
+                }
+                least = least.min(ratio);
+            }
+        }
+        Some(least)
     }
 
     /// Returns the readings of the grid, (h, w), of `depth`, (H, W), which [`find`] examined: those whose enlargement
