@@ -1,7 +1,7 @@
 //! Minimum and maximum of two numbers, as processors have them.
 
-/// Bounds of a number. A number that is NaN becomes the bound, as with [`f32::min`] and [`f32::max`]. Those also return a
-/// number whose bound is NaN, which costs more, and in WebAssembly they call a function for each number.
+/// Bounds of a number. A number that is NaN becomes the bound, as with [`f32::min`] and [`f32::max`]. Those also return
+/// a number whose bound is NaN, which costs more, and in WebAssembly they call a function for each number.
 pub trait Bounds {
     /// Returns the smaller number, or `most` if `self` is NaN.
     fn at_most(self, most: Self) -> Self;
