@@ -1,9 +1,9 @@
 // Tests the built package in browsers, without and with threads.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { gzipSync } from "node:zlib";
 import { join } from "node:path";
 import { after, before, describe, test } from "node:test";
+import { gzipSync } from "node:zlib";
 import { BROWSERS, BUILT, ROOT } from "./support.js";
 
 const suite = join(ROOT, "tests/conformance");
